@@ -107,19 +107,17 @@ def read_model(source: str | Path | Mapping[str, Any]) -> Model:
         For what the model can't have: the key and the nearest known name.
     """
     place = "model" if isinstance(source, Mapping) else Path(source)
-    content = source if isinstance(source, Mapping) else _toml(Path(source))
     try:
+        content = (
+            tomllib.loads(read_text(place, "file", "check the path", "TOML"))
+            if isinstance(place, Path)
+            else source
+        )
         return Model.model_validate(content)
+    except tomllib.TOMLDecodeError as problem:
+        raise InputError(place, f"this is no TOML ({problem})", "correct it") from None
     except ValidationError as fault:
         raise as_input_error(place, fault, Model) from None
-
-
-def _toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file."""
-    try:
-        return tomllib.loads(read_text(path, "file", "check the path", "TOML"))
-    except tomllib.TOMLDecodeError as problem:
-        raise InputError(path, f"this is no TOML ({problem})", "correct it") from None
 
 
 class Given(NamedTuple):
@@ -295,6 +293,7 @@ def refuse_inert_effects(model: Model, given: Sequence[Given], place: str) -> No
         Which effect, what is missing, what to do.
     """
     pendulum, seen = model.pendulum, set[str]()
+    noisy = model.noise_rad > 0.0 or (model.sensor is not None and model.sensor.noise_volts > 0.0)
     damped = any(
         (
             pendulum.a,
@@ -332,7 +331,7 @@ def refuse_inert_effects(model: Model, given: Sequence[Given], place: str) -> No
                 "add [converter]",
             ),
             (
-                name == "coloured-noise" and not _noise(model),
+                name == "coloured-noise" and not noisy,
                 "it colours the noise, and there is none",
                 "give noise_rad, or noise_volts",
             ),
@@ -344,11 +343,6 @@ def refuse_inert_effects(model: Model, given: Sequence[Given], place: str) -> No
         ):
             refuse_if(wrong, where, problem, remedy)
         seen.add(name)
-
-
-def _noise(model: Model) -> bool:
-    """Whether the readings have any."""
-    return model.noise_rad > 0.0 or (model.sensor is not None and model.sensor.noise_volts > 0.0)
 
 
 def simulate(model: Model, source: str = "simulated", place: str = "the model") -> Recording:
@@ -443,10 +437,11 @@ def _angles(
         "effects are solved for a linear torque",
         'leave restoring out and add the effect "circular-error"',
     )
-    if moving:
-        angle = _with_effects(equation, release, moving, taken, place)
-    else:
-        angle = sample(equation, release, taken)
+    angle = (
+        _with_effects(equation, release, moving, taken, place)
+        if moving
+        else sample(equation, release, taken)
+    )
     return instrument.shaken(angle, time, equation)
 
 
