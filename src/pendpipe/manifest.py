@@ -19,7 +19,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from pendpipe.errors import DamagedError, InputError
 from pendpipe.files import digest, read_json, sha256, write_json
@@ -91,11 +91,17 @@ class Manifest:
 
     def write(self) -> None:
         """Write it; two runs of the same campaign write the same bytes."""
-        content: dict[str, Any] = {"schema_version": 1, "stage": self.stage}
-        content["version"] = __version__
-        for name in ("outputs", "extras", "sources"):
-            content[name] = {key: entry._asdict() for key, entry in getattr(self, name).items()}
-        content |= {"inputs": self.inputs, "repaired": list(self.repaired)}
+        content = {
+            "schema_version": 1,
+            "stage": self.stage,
+            "version": __version__,
+            **{
+                name: {key: entry._asdict() for key, entry in getattr(self, name).items()}
+                for name in ("outputs", "extras", "sources")
+            },
+            "inputs": self.inputs,
+            "repaired": list(self.repaired),
+        }
         write_json(self.path, content | {"check": digest(content)})
 
     def damages(self, *, hash_all: bool = False) -> list[Damage]:

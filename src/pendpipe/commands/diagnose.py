@@ -89,8 +89,8 @@ ARGUMENTS: Final = (
 
 def run(arguments: Arguments) -> int:
     """Diagnose, write the result, and print the answer."""
+    keep_memory()
     if len(arguments.files) > 1:
-        keep_memory()
         return _diagnose_several(arguments)
     arguments.file, given = arguments.files[0], arguments.calibration
     arguments.calibration = given[0] if given else None
@@ -100,7 +100,6 @@ def run(arguments: Arguments) -> int:
         "a campaign's record needs a folder",
         "add --out DIR",
     )
-    keep_memory()
     fixed = parse_fixed(arguments.fix, arguments.baseline)
     if arguments.out is not None and Path(arguments.file).is_file():
         # Before the work: a long diagnosis must not end without a folder to write to.
@@ -140,9 +139,7 @@ def _diagnose(arguments: Arguments, fixed: dict[str, float]) -> int:
         if isinstance(error, DamagedError) or not Path(arguments.file).is_file():
             raise
         return _not_analysable(arguments, within_results(error, arguments.refused), provenance)
-    content = outcome.to_dict()
-    if arguments.out is not None:
-        content = _write(arguments, outcome)
+    content = outcome.to_dict() if arguments.out is None else _write(arguments, outcome)
     for warning in content["warnings"]:
         tell(f"{arguments.file}: {warning}")
     print_answer(arguments, content, content["statement"])

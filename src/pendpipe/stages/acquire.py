@@ -46,19 +46,16 @@ def acquire_record(
         If the source can't be read or opened: the file or port, what is wrong, a remedy.
     """
     record = campaign.record(name)
-    if record.source == "simulated":
-        recording = _simulated(campaign, record)
-    elif record.source.startswith("dataq:"):
+    if record.source.startswith("dataq:"):
         _instrument(
             record,
             out,
             f"pendpipe acquire --campaign {place} --record {name} --anew records it anew",
             anew=anew,
         )
-        return
     else:
-        recording = _file(record)
-    write_plain(out, recording)
+        made = _simulated(campaign, record) if record.source == "simulated" else _file(record)
+        write_plain(out, made)
 
 
 def _simulated(campaign: Campaign, record: Record) -> Recording:
@@ -168,8 +165,7 @@ def _file(record: Record) -> Recording:
     """Read a recording that somebody else made."""
     from pendpipe.formats import ReadOptions, read
 
-    path = record.file
-    assert path is not None
+    path = Path(record.source)
     options = ReadOptions(channel=record.channel or None, volts_per_radian=record.volts_per_radian)
     recording = read(path, options)
     # The folder is the user's own business: the results name the file only.

@@ -131,6 +131,21 @@ def _comparison(
     return compare(separated.records, around, errors)
 
 
+_OF_A_FIT: Final = (
+    "quality_factor_limit",
+    "method",
+    "noise_rms_rad",
+    "residual_rms_rad",
+    "chi2_per_dof",
+    "samples",
+    "turning_points",
+    "cuts",
+    "light",
+    "light_reason",
+)
+"""What is taken over from fit.json as it stands."""
+
+
 def _record(
     campaign: Campaign,
     result: RecordResult,
@@ -153,28 +168,17 @@ def _record(
         return content
     fit = result.fit.to_dict()
     split = next((s for s in separated.records if s.measured.record == row.record), None)
-    content |= {name: fit["parameters"][name] for name in fit["parameters"]}
-    content |= {
-        name: fit[name]
-        for name in (
-            "quality_factor_limit",
-            "method",
-            "noise_rms_rad",
-            "residual_rms_rad",
-            "chi2_per_dof",
-            "samples",
-            "turning_points",
-            "cuts",
-            "light",
-            "light_reason",
-        )
-    }
     excluded = [] if result.usable else [f"not separated: {fit['light_reason']}"]
-    content["warnings"] = [*excluded, *fit["warnings"], *result.calibration["warnings"]]
-    content["volts_per_radian"] = result.calibration["volts_per_radian"]
     points = read_turning_points(campaign.folder / row.record / "turning_points.csv")
-    content["start_s"], content["stop_s"] = float(points.time_s[0]), float(points.time_s[-1])
-    content["misfit"] = amplitude_misfit(points)
+    content |= {
+        **fit["parameters"],
+        **{name: fit[name] for name in _OF_A_FIT},
+        "warnings": [*excluded, *fit["warnings"], *result.calibration["warnings"]],
+        "volts_per_radian": result.calibration["volts_per_radian"],
+        "start_s": float(points.time_s[0]),
+        "stop_s": float(points.time_s[-1]),
+        "misfit": amplitude_misfit(points),
+    }
     if split is not None:
         # The losses after Eq. 17, the errors of the calibration and of k in them.
         content |= {
