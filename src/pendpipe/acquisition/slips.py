@@ -81,7 +81,12 @@ def _next_slip(data: bytes, begin: int, size: int) -> Cut | None:
         here, beside = _roughness(data, begin + first * size, _SNIPPET, size)
         if _CLEARLY * here.mean() < beside.mean():
             in_step = first
-        elif in_step is not None and _slipped(here, beside):
+        # Nearly everything has to be smoother when read a byte later.
+        elif (
+            in_step is not None
+            and _CLEARLY * beside.mean() < here.mean()
+            and np.mean(beside < here) > _MOSTLY
+        ):
             return _slip(data, begin, size, in_step, first + _SNIPPET)
     return None
 
@@ -102,12 +107,6 @@ def _slip(data: bytes, begin: int, size: int, first: int, last: int) -> Cut:
     if len(jumps) == 1 or sorted(jumps)[1] >= 2.0 * jumps[best]:
         return Cut(stop, start + 2 * best + 1, "slip")
     return Cut(stop, start + size - 1, "slip, channels unsure")
-
-
-def _slipped(here: FloatArray, beside: FloatArray) -> bool:
-    """Whether nearly everything is smoother when read a byte later."""
-    clearly = _CLEARLY * beside.mean() < here.mean()
-    return bool(clearly and np.mean(beside < here) > _MOSTLY)
 
 
 def _onwards(words: AnyArray) -> FloatArray:
