@@ -80,13 +80,14 @@ def caliper(campaign: Campaign) -> str:
     """Digest all that the sensor's calibration depends on."""
     settings, source = campaign.configuration, caliper_source(campaign)
     home, truth = Path(settings.results, "calibration"), settings.simulated
-    content = {
-        "run": settings.calibration and settings.calibration.model_dump(),
-        "seed": settings.seed,
-        "source_sha256": source and source_sha256(home, "caliper", source),
-        "instrument": truth and truth.model_dump(include={"sensor", "device"}),
-    }
-    return digest(content)
+    return digest(
+        {
+            "run": settings.calibration and settings.calibration.model_dump(),
+            "seed": settings.seed,
+            "source_sha256": source and source_sha256(home, "caliper", source),
+            "instrument": truth and truth.model_dump(include={"sensor", "device"}),
+        }
+    )
 
 
 def caliper_source(campaign: Campaign) -> Path | None:

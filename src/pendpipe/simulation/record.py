@@ -136,5 +136,4 @@ class SensorVolts:
     def __call__(self, time_s: FloatArray) -> FloatArray:
         """Return volts at ascending times since the record's start; shape (n,)."""
         noise = self.sensor.noise_volts * self.random.standard_normal(len(time_s))
-        signal = self.sensor.offset_volts + self.sensor.volts_per_radian * self.angle(time_s)
-        return signal + noise
+        return self.sensor.offset_volts + self.sensor.volts_per_radian * self.angle(time_s) + noise

@@ -256,35 +256,32 @@ def _campaign_numbers(found: Comparison | None) -> dict[str, Any]:
     names = ("viscous_exponents", "theory_factor", "history_coefficient", "checks", "budget")
     if found is None:
         return dict.fromkeys((*names, "steady_stokes_percent"))
-    exponents = {
-        branch: {
-            **fitted.exponent.as_json(),
-            "sd_own": fitted.sd_own,
-            "sd_common": fitted.sd_common,
-            "curvature": fitted.curvature.as_json(),
-            "local_slopes": list(fitted.local_slopes),
-            "ranges": [asdict(part) for part in fitted.ranges],
-            "records": list(fitted.records),
-        }
-        for branch, fitted in found.exponents.items()
-    }
-    checks = [
-        {
-            "history": check.history,
-            "hysteresis": check.hysteresis,
-            "chi2": check.chi2,
-            "dof": check.degrees_of_freedom,
-            "ratio": check.ratio,
-        }
-        for check in found.checks
-    ]
-    budget = [{"source": name, "relative_sd": sd} for name, sd in found.budget.items()]
     return {
-        "viscous_exponents": exponents,
+        "viscous_exponents": {
+            branch: {
+                **fitted.exponent.as_json(),
+                "sd_own": fitted.sd_own,
+                "sd_common": fitted.sd_common,
+                "curvature": fitted.curvature.as_json(),
+                "local_slopes": list(fitted.local_slopes),
+                "ranges": [asdict(part) for part in fitted.ranges],
+                "records": list(fitted.records),
+            }
+            for branch, fitted in found.exponents.items()
+        },
         "theory_factor": _shared(found.theory_factor),
         "history_coefficient": _shared(found.history_coefficient),
-        "checks": checks,
-        "budget": budget,
+        "checks": [
+            {
+                "history": check.history,
+                "hysteresis": check.hysteresis,
+                "chi2": check.chi2,
+                "dof": check.degrees_of_freedom,
+                "ratio": check.ratio,
+            }
+            for check in found.checks
+        ],
+        "budget": [{"source": name, "relative_sd": sd} for name, sd in found.budget.items()],
         "steady_stokes_percent": list(found.steady_stokes_percent),
     }
 

@@ -66,5 +66,6 @@ def diagnose_campaign(campaign: Campaign) -> dict[str, Any]:
             "it takes three records with a geometry, two of them with a sphere in a fluid",
             provenance,
         )
-    level = campaign.configuration.diagnose.level
-    return campaign_diagnosis(search(*found, level=level), provenance)
+    return campaign_diagnosis(
+        search(*found, level=campaign.configuration.diagnose.level), provenance
+    )

@@ -132,6 +132,5 @@ def _separated(content: dict[str, Any]) -> SeparatedRecord:
             for name, entry in entries.items()
         }
 
-    measured = MeasuredRecord(**fields(content["measured"]))
-    others = {name: entry for name, entry in content.items() if name != "measured"}
-    return SeparatedRecord(measured=measured, **fields(others))
+    measured = MeasuredRecord(**fields(content.pop("measured")))
+    return SeparatedRecord(measured=measured, **fields(content))
