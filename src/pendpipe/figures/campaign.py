@@ -304,13 +304,18 @@ def draw_fig05(comparison: Mapping[str, Any]) -> Figure:
     lowered = second_scale(
         "right", at, [str(p) for p in _SHIFTS_PERCENT], "Lowering of the frequency (%)"
     )
-    about = {
-        "xlabel": "Frequency (Hz)",
-        "ylabel": "Lengthening of the period (%)",
-        "xlim": (0.0, None),
-    }
-    scales = [logarithmic("y", 100.0), lowered]
-    return figure_of(3.8, Panel([*causes, *symbols, *scales], about, key=2))
+    return figure_of(
+        3.8,
+        Panel(
+            [*causes, *symbols, logarithmic("y", 100.0), lowered],
+            {
+                "xlabel": "Frequency (Hz)",
+                "ylabel": "Lengthening of the period (%)",
+                "xlim": (0.0, None),
+            },
+            key=2,
+        ),
+    )
 
 
 def _cause(comparison: Mapping[str, Any], name: str, cause: str) -> list[Mark]:
@@ -336,12 +341,18 @@ def draw_fig06(comparison: Mapping[str, Any]) -> Figure:
     """Draw log10 Q_v against frequency: Eq. 16, steady Stokes flow, and what was measured."""
     names = branches(comparison)
     marks = [mark for name in names for mark in _viscous(comparison, name)]
-    about = {
-        "xlabel": "Frequency (Hz)",
-        "ylabel": "$\\log_{10}\\, Q_v$",
-        "xlim": (0.0, None),
-    }
-    return figure_of(4.0, Panel(marks, about, key=len(names)))
+    return figure_of(
+        4.0,
+        Panel(
+            marks,
+            {
+                "xlabel": "Frequency (Hz)",
+                "ylabel": "$\\log_{10}\\, Q_v$",
+                "xlim": (0.0, None),
+            },
+            key=len(names),
+        ),
+    )
 
 
 def _viscous(comparison: Mapping[str, Any], name: str) -> list[Mark]:
@@ -395,10 +406,13 @@ def draw_fig09(comparison: Mapping[str, Any]) -> Figure:
     factor = comparison.get("theory_factor")
     known = factor and np.isfinite(number(factor))
     note = f"Drag measured over Eq. 16: {with_error(number(factor), error(factor))}"
-    about = {"ylabel": "Limiting quality factor $Q$", "xlim": (0.0, None), "ylim": (0.0, None)}
     return figure_of(
         4.8,
-        Panel([*limits_measured(comparison), *full, key], about, key=1),
+        Panel(
+            [*limits_measured(comparison), *full, key],
+            {"ylabel": "Limiting quality factor $Q$", "xlim": (0.0, None), "ylim": (0.0, None)},
+            key=1,
+        ),
         Panel(
             [
                 level(1.0),
@@ -526,13 +540,19 @@ def draw_fig10(comparison: Mapping[str, Any]) -> Figure:
         curve([], [], label="Eq. 16 alone: hysteresis left out", **without),
         curve([], [], GREY, width=1.0, label="Eq. 16 and hysteresis together"),
     ]
-    about = {
-        "xlabel": "Frequency (Hz)",
-        "ylabel": "Limiting quality factor $Q$",
-        "xlim": (0.0, None),
-        "ylim": (0.0, None),
-    }
-    return figure_of(4.1, Panel(marks, about, key=1))
+    return figure_of(
+        4.1,
+        Panel(
+            marks,
+            {
+                "xlabel": "Frequency (Hz)",
+                "ylabel": "Limiting quality factor $Q$",
+                "xlim": (0.0, None),
+                "ylim": (0.0, None),
+            },
+            key=1,
+        ),
+    )
 
 
 _UNITS: Final = {"a": "rad⁻¹ s⁻¹", "b": "s⁻¹", "c": "rad/s"}

@@ -244,13 +244,19 @@ def draw_fig08(decay: Decay) -> Figure:
             words(name, (0.02, limit.value), (0.0, 4.0), **place),
             *_maximum(decay, elapsed, quality),
         ]
-    about = {
-        "xlabel": plain_text(f"Time in {decay.record} (s)"),
-        "ylabel": "Quality factor $Q$",
-        "ylim": (0.0, 1.16 * top),
-        "xmargin": 0.01,
-    }
-    return figure_of(3.6, Panel(marks, about, key=2))
+    return figure_of(
+        3.6,
+        Panel(
+            marks,
+            {
+                "xlabel": plain_text(f"Time in {decay.record} (s)"),
+                "ylabel": "Quality factor $Q$",
+                "ylim": (0.0, 1.16 * top),
+                "xmargin": 0.01,
+            },
+            key=2,
+        ),
+    )
 
 
 def _maximum(decay: Decay, elapsed_s: FloatArray, quality: FloatArray) -> list[Mark]:

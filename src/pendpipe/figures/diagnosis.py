@@ -162,12 +162,11 @@ def draw_decay(content: Shown) -> Figure:
         end.append(curve(time[last], factor * fit.at.reading[last], colour, width=1.0))
         rest.append(curve(time, small * residual, colour, "", marker=".", markersize=1.5))
     label = f"{quantity_of(data.unit)} ({unit})"
-    below = {"xlabel": "Time (s)", "ylabel": f"Readings − model ({small_unit})"}
     return figure_of(
         5.4,
         Panel(decay, {"ylabel": label}, key=3),
         Panel(end, {"title": "The last cycles", "xlabel": "Time (s)", "ylabel": label}),
-        Panel(rest, below),
+        Panel(rest, {"xlabel": "Time (s)", "ylabel": f"Readings − model ({small_unit})"}),
         sharex=False,
     )
 
@@ -286,14 +285,20 @@ def draw_residual_spectrum(content: Shown) -> Figure:
         logarithmic("x"),
         logarithmic("y"),
     ]
-    about = {
-        "xlabel": "Frequency (Hz)",
-        "ylabel": f"Residual, density ({unit}/√Hz)",
-        "xlim": ends,
-        "ylim": (0.1 * factor * float(np.min(floor)), 2.0 * factor * highest),
-    }
     return figure_of(
-        3.3, Panel(marks, about, key=2, lift=1.06), margins={"bottom": 0.14, "top": 0.8}
+        3.3,
+        Panel(
+            marks,
+            {
+                "xlabel": "Frequency (Hz)",
+                "ylabel": f"Residual, density ({unit}/√Hz)",
+                "xlim": ends,
+                "ylim": (0.1 * factor * float(np.min(floor)), 2.0 * factor * highest),
+            },
+            key=2,
+            lift=1.06,
+        ),
+        margins={"bottom": 0.14, "top": 0.8},
     )
 
 
@@ -488,9 +493,8 @@ def _scaled(at: object, argument: str) -> tuple[FloatArray, str]:
     """Arguments in a handy unit, and the axis's name."""
     values = np.asarray(at, dtype=np.float64)
     name, _, unit = argument.partition(", ")
-    factor, short = 1.0, unit
-    if unit in ("rad", "m") and not name.startswith("phase"):
-        factor, short = axis_unit(values, unit)
+    has_prefix = unit in ("rad", "m") and not name.startswith("phase")
+    factor, short = axis_unit(values, unit) if has_prefix else (1.0, unit)
     return factor * values, f"{name[:1].upper()}{name[1:]} ({short})"
 
 
@@ -528,13 +532,18 @@ def draw_codes(content: Shown) -> Figure:
     ]
     look = {"color": VERMILION, "linewidth": 0.8, "zorder": 0}
     marks = [methodcaller("axvline", code, **look) for code in marked[:200]]
-    about = {
-        "xlabel": "Code (0: nearest to a reading of zero)",
-        "ylabel": "Readings",
-        "xmargin": 0.0,
-    }
     return figure_of(
-        3.0, Panel([*counted, *marks], about, key=2), margins={"bottom": 0.15, "top": 0.86}
+        3.0,
+        Panel(
+            [*counted, *marks],
+            {
+                "xlabel": "Code (0: nearest to a reading of zero)",
+                "ylabel": "Readings",
+                "xmargin": 0.0,
+            },
+            key=2,
+        ),
+        margins={"bottom": 0.15, "top": 0.86},
     )
 
 

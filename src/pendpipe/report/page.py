@@ -329,10 +329,18 @@ def proof(folder: Path | None, room: Room) -> dict[str, Any] | None:
         if (svg := drawn(name, caption.title, caption.shows)) is not None
     ]
     words = CAPTIONS["residual_map"]
-    cases = [
-        drawn(str(row["figure"]).removesuffix(".svg"), f"{words.title}: {row['item']}", words.shows)
-        if row.get("figure") and row["same_answer"]
-        else None
-        for row in scores["six_cases"]
-    ]
-    return {"scores": scores, "promises": promises, "figures": figures, "cases": cases}
+    return {
+        "scores": scores,
+        "promises": promises,
+        "figures": figures,
+        "cases": [
+            drawn(
+                str(row["figure"]).removesuffix(".svg"),
+                f"{words.title}: {row['item']}",
+                words.shows,
+            )
+            if row.get("figure") and row["same_answer"]
+            else None
+            for row in scores["six_cases"]
+        ],
+    }

@@ -47,18 +47,17 @@ def render_recording(
     unit = result["amplitude"].unit
     period = small_period(result)
     numbers = [("Period", with_error(period.value, period.sd, "s"))]
-    if result.light != "red":
-        titles = {"a": "quadratic", "b": "linear", "c": "Coulomb"}
-        numbers += [
-            (f"{letter} ({titles[letter]})", rate_with_error(result[letter], short=False))
-            for letter in titles
-        ]
     if result.light == "red":
         rows = [
             (compact(amplitude, unit), with_error(seen.value, seen.sd), WITHOUT_LAW)
             for amplitude, seen in seen_qualities(result)
         ]
     else:
+        titles = {"a": "quadratic", "b": "linear", "c": "Coulomb"}
+        numbers += [
+            (f"{letter} ({titles[letter]})", rate_with_error(result[letter], short=False))
+            for letter in titles
+        ]
         rows = [
             (
                 compact(each.amplitude_rad, unit),

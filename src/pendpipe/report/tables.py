@@ -428,8 +428,9 @@ def _typical(comparison: Comparison) -> Iterator[Row | None]:
 
 def _extremes(comparison: Comparison) -> Iterator[Row | None]:
     wet = [entry for entry in used(comparison) if entry.get("a_over_delta")]
-    limits = [number(entry.get("quality_factor_limit")) for entry in wet]
-    limits = [value for value in limits if math.isfinite(value)]
+    limits = [
+        value for entry in wet if math.isfinite(value := number(entry.get("quality_factor_limit")))
+    ]
     if limits:
         yield Row("Smallest limiting Q in water", f"{min(limits):.1f}", NUMBERS["smallest"].text)
     if wet:
