@@ -301,9 +301,11 @@ def _header(place: str, content: bytes) -> tuple[Mapping[str, Any], int]:
         copies = (frame.content for _, frame in _frames(content, 0) if frame.kind == b"H")
         header, end = _description(next(copies, b"")), -1
     if header is None:
-        problem = "this is no raw recording of pendpipe"
-        if content.startswith(_BEGINNING):
-            problem = "the description of the recording is damaged"
+        problem = (
+            "the description of the recording is damaged"
+            if content.startswith(_BEGINNING)
+            else "this is no raw recording of pendpipe"
+        )
         raise InputError(place, problem, "give another copy")
     refuse_if(
         header.get("version") not in (1, 2),

@@ -131,7 +131,6 @@ class SyncBitDecoder:
         before = self._discarded + lead + np.concatenate(([0], np.cumsum(discard)))
         followed = self._suspect if self._discarded else (lead > 0 and self._scans > 0)
         index = np.flatnonzero(good)
-        spent = 0
         thrown = before[index]
         fresh = np.diff(thrown, prepend=0)
         direct = [followed, *(discard[index[:-1]] > 0).tolist()]
@@ -139,11 +138,8 @@ class SyncBitDecoder:
             self._loss(self._scans + n, int(fresh[n]), direct[n])
             for n in np.flatnonzero(fresh).tolist()
         ]
-        if len(index):
-            spent = int(thrown[-1])
-            followed = bool(discard[index[-1]])
-        self._discarded = int(before[-1]) - spent
-        self._suspect = followed
+        self._discarded = int(before[-1] - thrown[-1]) if len(index) else int(before[-1])
+        self._suspect = bool(discard[index[-1]]) if len(index) else followed
         words = np.ascontiguousarray(octets[starts[index][:, None] + np.arange(size)]).view("<u2")
         self._scans += len(index)
         return Scans(self._counts(words), tuple(losses))
