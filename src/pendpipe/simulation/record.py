@@ -2,7 +2,8 @@
 
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -10,41 +11,13 @@ from pendpipe import physics
 from pendpipe.arrays import FloatArray
 from pendpipe.configuration.apparatus import pendulum, quadratic_rate
 from pendpipe.configuration.load import Campaign, Record
-from pendpipe.configuration.models import Device, Sensor
+from pendpipe.configuration.models import Sensor
 from pendpipe.dynamics import Eq8, Release, sample
 
 STEP_V = {"di154": 20.0 / 2**12, "di2108": 20.0 / 2**16}
 """The step of each simulated converter; both span -10 V to +10 V."""
 
 FEWEST_PERIODS = 8.0
-
-
-@dataclass(frozen=True)
-class SimulatedRecord:
-    """What a simulated record hides, and how it is sampled.
-
-    Parameters
-    ----------
-    model
-        Eq. 8 with the apparatus's own numbers.
-    release
-        The turning point before the first sample.
-    sensor, device
-        The measurement chain.
-    rate_hz, duration_s
-        Samples a second, and for how long.
-    """
-
-    model: Eq8
-    release: Release
-    sensor: Sensor
-    device: Device
-    rate_hz: float
-    duration_s: float
-
-    def angle(self, time_s: FloatArray) -> FloatArray:
-        """Return the true angle in rad at ascending times since the record's start."""
-        return sample(self.model, self.release, time_s)
 
 
 def generator(campaign: Campaign, name: str) -> np.random.Generator:
@@ -89,35 +62,6 @@ def equation_of_motion(campaign: Campaign, record: Record) -> Eq8:
     )
 
 
-def simulated_record(campaign: Campaign, record: Record) -> SimulatedRecord:
-    """Describe one simulated record: motion, sampling, measurement chain."""
-    truth = campaign.configuration.simulated
-    assert truth is not None
-    plan = truth.release.get(record.record) or truth.release[record.fluid]
-    model = equation_of_motion(campaign, record)
-    period = 2.0 * np.pi / model.angular_frequency
-    # As long as the amplitude stays above the noise, eight periods at least.
-    noise = float(np.hypot(truth.sensor.noise_volts, STEP_V[truth.device.kind] / np.sqrt(12.0)))
-    lasts = physics.time_at(
-        noise / truth.sensor.volts_per_radian,
-        plan.angle_rad,
-        model.quadratic,
-        model.hysteretic + model.viscous,
-        model.coulomb,
-    )
-    duration = min(max(float(lasts), FEWEST_PERIODS * period), plan.duration_s or np.inf)
-    # The first sample comes at any phase: the release lies up to a period before it.
-    before = float(generator(campaign, record.record + " release").uniform(0.0, period))
-    return SimulatedRecord(
-        model=model,
-        release=Release(time_s=-before, angle_rad=plan.angle_rad),
-        sensor=truth.sensor,
-        device=truth.device,
-        rate_hz=plan.samples / duration,
-        duration_s=duration,
-    )
-
-
 class SensorVolts:
     """The volts at the converter at given times: motion, sensor, noise.
 
@@ -137,3 +81,40 @@ class SensorVolts:
         """Return volts at ascending times since the record's start; shape (n,)."""
         noise = self.sensor.noise_volts * self.random.standard_normal(len(time_s))
         return self.sensor.offset_volts + self.sensor.volts_per_radian * self.angle(time_s) + noise
+
+
+def simulated_record(campaign: Campaign, record: Record) -> tuple[SensorVolts, dict[str, Any]]:
+    """Describe one simulated record: what its sensor gives, and how that is recorded.
+
+    Returns
+    -------
+    signal
+        Times to volts. Its `angle` is Eq. 8 with the apparatus's own numbers, from the turning
+        point before the first sample.
+    setting
+        The device, its clock, rate and length: arguments of `recorder.acquire_simulated`.
+    """
+    truth = campaign.configuration.simulated
+    assert truth is not None
+    plan = truth.release.get(record.record) or truth.release[record.fluid]
+    model = equation_of_motion(campaign, record)
+    period = 2.0 * np.pi / model.angular_frequency
+    # As long as the amplitude stays above the noise, eight periods at least.
+    noise = float(np.hypot(truth.sensor.noise_volts, STEP_V[truth.device.kind] / np.sqrt(12.0)))
+    lasts = physics.time_at(
+        noise / truth.sensor.volts_per_radian,
+        plan.angle_rad,
+        model.quadratic,
+        model.hysteretic + model.viscous,
+        model.coulomb,
+    )
+    duration = min(max(float(lasts), FEWEST_PERIODS * period), plan.duration_s or np.inf)
+    # The first sample comes at any phase: the release lies up to a period before it.
+    before = float(generator(campaign, record.record + " release").uniform(0.0, period))
+    angle = partial(sample, model, Release(time_s=-before, angle_rad=plan.angle_rad))
+    return SensorVolts(angle, truth.sensor, generator(campaign, record.record)), {
+        "device_kind": truth.device.kind,
+        "clock_scale": truth.device.clock_scale,
+        "rate_hz": plan.samples / duration,
+        "duration_s": duration,
+    }

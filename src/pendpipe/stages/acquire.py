@@ -61,19 +61,12 @@ def acquire_record(
 def _simulated(campaign: Campaign, record: Record) -> Recording:
     """Let the simulated instrument record the simulated pendulum over its serial line."""
     from pendpipe.acquisition.recorder import acquire_simulated
-    from pendpipe.simulation.record import SensorVolts, generator, simulated_record
+    from pendpipe.simulation.record import simulated_record
 
-    truth = simulated_record(campaign, record)
-    signal = SensorVolts(truth.angle, truth.sensor, generator(campaign, record.record))
+    signal, setting = simulated_record(campaign, record)
     # The engine is compiled on its first call on a machine; a device must not wait for it.
-    truth.angle(np.zeros(1))
-    recording = acquire_simulated(
-        truth.device.kind,
-        signal,
-        rate_hz=truth.rate_hz,
-        duration_s=truth.duration_s,
-        clock_scale=truth.device.clock_scale,
-    )
+    signal.angle(np.zeros(1))
+    recording = acquire_simulated(signal=signal, **setting)
     # What a laboratory would not know stays out of the recording: no truth in its header. So
     # does what only this run of the simulation could know: the same campaign gives the same bytes.
     metadata = {**recording.metadata, "source": "simulated"}
