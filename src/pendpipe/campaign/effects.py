@@ -14,7 +14,6 @@ from inspect import signature
 from typing import Any, Final, Literal
 
 import numpy as np
-from numpy.polynomial.polynomial import polyvander2d
 
 from pendpipe import physics
 from pendpipe.arrays import FloatArray
@@ -101,7 +100,8 @@ def _closest(tank: Tank) -> float:
 
 def _powers(closeness: FloatArray, depth: FloatArray, nears: int, depths: int) -> FloatArray:
     """The polynomial's terms: every one has the closeness as a factor."""
-    return np.asarray(polyvander2d(closeness, depth, [nears, depths - 1])[..., depths:], float)
+    rows = np.polynomial.polynomial.polyvander2d(closeness, depth, [nears, depths - 1])
+    return np.asarray(rows[..., depths:], dtype=np.float64)
 
 
 @cache

@@ -230,18 +230,14 @@ def _legendre(order: int, x: Any, s: Any) -> tuple[Any, Any, Any]:
 
     P_l^m = s^m d^m P_l/dx^m, for any complex x; the last axis is l.
     """
-    values = [np.ones_like(x), x]
-    first = [np.zeros_like(x), np.ones_like(x)]
-    second = [np.zeros_like(x), np.zeros_like(x)]
-    for n in range(1, order):
-        values.append(((2 * n + 1) * x * values[n] - n * values[n - 1]) / (n + 1))
-        first.append((2 * n + 1) * values[n] + first[n - 1])
-        second.append((2 * n + 1) * first[n] + second[n - 1])
-    return (
-        np.stack(values[1:], axis=-1),
-        np.stack(first[1:], axis=-1) * s[..., None],
-        np.stack(second[1:], axis=-1) * s[..., None] ** 2,
+    legendre = np.polynomial.legendre
+    values = legendre.legvander(x, order)
+    # A derivative is a sum of lower polynomials, all with positive factors.
+    first, second = (
+        values[..., :-m] @ legendre.legder(np.eye(order + 1), m)[:, 1:] * s[..., None] ** m
+        for m in (1, 2)
     )
+    return values[..., 1:], first, second
 
 
 def _bessel(order: int, alpha: complex) -> tuple[ComplexArray, ComplexArray]:
