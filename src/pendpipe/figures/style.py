@@ -6,10 +6,9 @@ dashes. Vermilion is kept for what goes wrong when something is left out.
 
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import wraps
 from operator import methodcaller
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple, ParamSpec
+from typing import Any, Final, Literal, NamedTuple
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -19,8 +18,6 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLoca
 
 from pendpipe.arrays import FloatArray
 from pendpipe.files import replaced
-
-Arguments = ParamSpec("Arguments")
 
 BLUE, VERMILION, GREEN = "#0072B2", "#C8321A", "#007A5A"
 INK, GREY, PALE = "#1A1A1A", "#5F6670", "#9CC4E0"
@@ -90,16 +87,8 @@ def branch(name: str) -> Branch:
     return BRANCHES.get(name, Branch(name or "no branch", GREY, "^"))
 
 
-def styled(draw: Callable[Arguments, Figure]) -> Callable[Arguments, Figure]:
-    """Give a drawing function the common look, and leave matplotlib's settings as they were."""
-
-    @wraps(draw)
-    def inside(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Figure:
-        with mpl.rc_context(_LOOK):
-            return draw(*args, **kwargs)
-
-    return inside
-
+styled = mpl.rc_context(_LOOK)
+"""Gives a drawing function the common look, and leaves matplotlib's settings as they were."""
 
 Mark = Callable[[Axes], Any]
 """One thing that a panel shows: it draws itself on axes."""
