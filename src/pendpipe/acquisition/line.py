@@ -187,10 +187,7 @@ def _permission(port: str, platform: str) -> str:
 def _group(port: str) -> str | None:
     """The group that may use the port (dialout, uucp, ...), if it is a group of that kind."""
     try:
-        import grp
-
-        found = Path(port).stat()
-        name = grp.getgrgid(found.st_gid).gr_name
-    except (ImportError, OSError, KeyError):
+        mode, name = Path(port).stat().st_mode, Path(port).group()
+    except (NotImplementedError, OSError, KeyError):  # no groups on Windows
         return None
-    return name if found.st_mode & stat.S_IWGRP and name != "root" else None
+    return name if mode & stat.S_IWGRP and name != "root" else None

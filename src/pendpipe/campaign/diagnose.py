@@ -116,9 +116,9 @@ def global_p_value(
     trials that they showed is kept.
     """
     smallest = float(np.min(_local_p(scores, tried)))
-    values, vectors = np.linalg.eigh(correlations)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    drawn = np.random.default_rng(_SEED).standard_normal((_DRAWS, len(scores))) @ root.T
+    drawn = np.random.default_rng(_SEED).multivariate_normal(
+        np.zeros(len(scores)), correlations, _DRAWS, check_valid="ignore", method="eigh"
+    )
     least = np.min(_local_p(drawn, tried), axis=-1)
     resolved = np.quantile(least, 0.01)
     if smallest >= resolved:
