@@ -407,14 +407,13 @@ def simulate(model: str | Path | Mapping[str, Any], *, seed: int | None = None) 
     >>> recording
     Recording(1000 samples of angle_rad, 0 to 19.98 s)
     """
-    from pendpipe.simulation.model import read_model
-    from pendpipe.simulation.model import simulate as simulate_model
+    from pendpipe.simulation import model as models
 
-    described = read_model(model)
+    described = models.read_model(model)
     if seed is not None:
         described = described.model_copy(update={"seed": seed})
     place = "model" if isinstance(model, Mapping) else str(model)
-    return simulate_model(described, f"simulated: {Path(place).name}", place=place)
+    return models.simulate(described, f"simulated: {Path(place).name}", place=place)
 
 
 def _options(**given: Any) -> Any:

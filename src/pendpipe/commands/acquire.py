@@ -207,7 +207,12 @@ def _stage(arguments: Arguments) -> None:
 
 def _from_device(arguments: Arguments, raw: Path) -> None:
     """Record into a raw file."""
-    from pendpipe.acquisition.recorder import ProgressLine
+    from pendpipe.acquisition.recorder import (
+        ProgressLine,
+        acquire_simulated,
+        example_signal,
+        record,
+    )
 
     options = {
         "channels": (arguments.channel or 1,),
@@ -219,8 +224,6 @@ def _from_device(arguments: Arguments, raw: Path) -> None:
         "reconnect_s": arguments.reconnect,
     }
     if arguments.device:
-        from pendpipe.acquisition.recorder import acquire_simulated, example_signal
-
         where, _, kind = arguments.device.partition(":")
         refuse_if(
             where != "simulated" or not kind,
@@ -237,8 +240,6 @@ def _from_device(arguments: Arguments, raw: Path) -> None:
             **options,
         )
     elif arguments.port:
-        from pendpipe.acquisition.recorder import record
-
         record(
             arguments.port,
             arguments.model,

@@ -12,11 +12,10 @@ from typing import Final, NamedTuple
 from pendpipe import manifest
 from pendpipe.arguments import SHARED, Arguments, print_answer
 from pendpipe.errors import InputError
-from pendpipe.manifest import FOLDER, SET_ASIDE, Manifest
 
 TEMPORARY: Final = re.compile(r"\..+\.[a-z0-9_]{8}")
 """The name of a file that `pendpipe.files.replaced` had not finished."""
-_NO_RESULTS: Final = (FOLDER, "logs", "raw", "challenge", "challenge-sealed")
+_NO_RESULTS: Final = (manifest.FOLDER, "logs", "raw", "challenge", "challenge-sealed")
 _RUN: Final = "snakemake makes it again"
 
 
@@ -98,7 +97,7 @@ def examine(results: Path) -> list[Finding]:
     return [*found, *_of_files(results, listed)]
 
 
-def _of_manifests(home: Path, known: list[Manifest]) -> Iterator[Finding]:
+def _of_manifests(home: Path, known: list[manifest.Manifest]) -> Iterator[Finding]:
     """Results that are not what their stages wrote, or that were never finished."""
     for stage in known:
         damages = stage.damages(hash_all=True)
@@ -137,7 +136,7 @@ def _of_files(results: Path, listed: set[Path]) -> Iterator[Finding]:
                 "a process was killed while it wrote this",
                 "delete it when no run is alive",
             )
-        elif SET_ASIDE in path.name:
+        elif manifest.SET_ASIDE in path.name:
             yield Finding(
                 "set-aside",
                 str(path),
@@ -146,7 +145,7 @@ def _of_files(results: Path, listed: set[Path]) -> Iterator[Finding]:
             )
         elif path.suffix == ".raw":
             yield from _undecoded(path)
-        elif not set(inside) & set(_NO_RESULTS) and not ours and (home / FOLDER).is_dir():
+        elif not set(inside) & set(_NO_RESULTS) and not ours and (home / manifest.FOLDER).is_dir():
             yield Finding(
                 "orphaned",
                 str(path),

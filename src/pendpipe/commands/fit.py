@@ -17,7 +17,7 @@ from typing import Final
 
 from pendpipe import api
 from pendpipe.analysis.fit.fixed import parse_fixed
-from pendpipe.analysis.fit.result import FitResult
+from pendpipe.analysis.fit.result import FitResult, gravity_line, lines, row, table
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import (
     FILES,
@@ -151,8 +151,6 @@ def _write(arguments: Arguments, result: FitResult) -> None:
 
 def _print(arguments: Arguments, result: FitResult) -> None:
     """Print the summary."""
-    from pendpipe.analysis.fit.result import gravity_line, lines
-
     printed = lines(result, law=result.light != "red" or arguments.accept)
     if arguments.length or arguments.gravity:
         length_m, gravity = arguments.length, arguments.gravity
@@ -166,8 +164,6 @@ def _status(arguments: Arguments, result: FitResult) -> int:
 
 def _table(arguments: Arguments) -> int:
     """Fit several recordings; what can't be fitted gets its reason, and the others go on."""
-    from pendpipe.analysis.fit.result import row, table
-
     for option in ("out", "figure", "turning_points", "record"):
         refuse_if(
             getattr(arguments, option),
