@@ -61,8 +61,7 @@ def acquisition(campaign: Campaign, record: str) -> str:
         "row": asdict(row),
         "source_sha256": row.file and source_sha256(home, "acquire", row.file),
     }
-    if row.source == "simulated":
-        assert settings.simulated is not None
+    if row.source == "simulated" and settings.simulated is not None:
         truth = settings.simulated.model_dump()
         releases = truth.pop("release")
         content |= {

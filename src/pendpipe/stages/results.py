@@ -15,7 +15,7 @@ from pendpipe.campaign.design import Design, design_of
 from pendpipe.campaign.fit import Measured, measured
 from pendpipe.configuration.apparatus import fluid_at, pendulum, pendulum_parts
 from pendpipe.configuration.load import Campaign, Record
-from pendpipe.configuration.models import Geometry
+from pendpipe.configuration.models import Apparatus, Geometry
 from pendpipe.estimate import Estimate
 from pendpipe.files import read_json
 
@@ -112,7 +112,8 @@ def record_theory(campaign: Campaign, record: Record) -> dict[str, Any] | None:
         of any pendulum; with a sphere in the fluid also Eq. 16's Q_v, the steady Stokes
         law's, a/delta and the lengthening of the period.
     """
-    if campaign.configuration.apparatus is None or campaign.geometry(record) is None:
+    apparatus = campaign.configuration.apparatus
+    if apparatus is None or campaign.geometry(record) is None:
         return None
     built = pendulum(campaign, record)
     content: dict[str, Any] = {
@@ -120,7 +121,7 @@ def record_theory(campaign: Campaign, record: Record) -> dict[str, Any] | None:
         "moment_of_inertia_kg_m2": float(built.swing.moment_of_inertia_kg_m2),
         "restoring_torque_n_m_per_rad": float(built.swing.restoring_torque_n_m_per_rad),
     }
-    curve = _theory(campaign, built.parts, built.fluid)
+    curve = _theory(apparatus, built.parts, built.fluid)
     if curve is None:
         return content
     numbers = {name: float(values[0]) for name, values in curve.items()}
@@ -141,17 +142,15 @@ def branch_curves(campaign: Campaign, branch: str) -> dict[str, list[float]] | N
         return None
     parts = pendulum_parts(apparatus, _moved(geometries), sphere=True)
     fluid = fluid_at(campaign.configuration.fluids[records[0].fluid], records[0].temperature_c)
-    curve = _theory(campaign, parts, fluid)
+    curve = _theory(apparatus, parts, fluid)
     assert curve is not None
     order = np.argsort(curve["frequency_hz"])
     return {name: values[order].tolist() for name, values in curve.items()}
 
 
 def _theory(
-    campaign: Campaign, parts: Sequence[physics.Part], fluid: physics.Fluid
+    apparatus: Apparatus, parts: Sequence[physics.Part], fluid: physics.Fluid
 ) -> dict[str, FloatArray] | None:
-    apparatus = campaign.configuration.apparatus
-    assert apparatus is not None
     return theory_curve(
         parts, fluid, apparatus.gravity_m_per_s2, plain_added_mass=apparatus.added_mass == "plain"
     )

@@ -81,11 +81,6 @@ class SimulatedDI245(Dialect, model="DI-245", bits=14):
         self._rate_word = 1871
 
     @property
-    def channels(self) -> tuple[int, ...]:
-        """The enabled channels, from 1, in the order of the scan."""
-        return tuple((word & 0x0F) + 1 for word in self._list)
-
-    @property
     def range_volts(self) -> float:
         """Full scale, by the range code of the first word of the list."""
         return float(_FULL_SCALES[self._list[0] >> 8])

@@ -46,6 +46,7 @@ class Dialect(ABC):
     def __init__(self) -> None:
         self.starts = 0
         self.streaming = False
+        self._list = [0]  # of what is scanned: channels less 1 in the low bits, ranges above
 
     @property
     @abstractmethod
@@ -53,9 +54,9 @@ class Dialect(ABC):
         """Full scale, as the host has chosen it."""
 
     @property
-    @abstractmethod
     def channels(self) -> tuple[int, ...]:
         """The enabled channels as printed on the box (from 1), in the order of the scan."""
+        return tuple((word & 0x0F) + 1 for word in self._list)
 
     @property
     @abstractmethod

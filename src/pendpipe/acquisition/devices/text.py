@@ -22,12 +22,6 @@ class TextDialect(Dialect):
     def __init__(self) -> None:
         super().__init__()
         self._line = b""
-        self._list = [0]
-
-    @property
-    def channels(self) -> tuple[int, ...]:
-        """The enabled channels, from 1, in the order of the scan."""
-        return tuple((word & 0x0F) + 1 for word in self._list)
 
     @property
     def range_volts(self) -> float:
