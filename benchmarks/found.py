@@ -1,6 +1,6 @@
 """How often what docs/found.md tells of public recordings is claimed where it is not so.
 
-    python -m benchmarks.found [--decoys N] [--recordings]
+    python -m benchmarks.found [--decoys N] [--effect ID] [--recordings]
 
 Facts of four kinds: an encoder loses counts, a clock loses time or slips by whole samples, a
 tracked mark wanders. Decoys look alike: steps of the time that are no whole samples, several knocks
@@ -375,12 +375,12 @@ def is_claimed(kind: Kind, name: str, number: int) -> bool:
     )
 
 
-def table(number: int) -> Iterator[str]:
+def table(number: int, effect: str) -> Iterator[str]:
     """A row for each family, and the decoys of each kind together; what is done is kept."""
     done: dict[str, int] = journal.read("found", {}, SOURCES)
     yield "| effect | made | claimed |"
     yield "|---|---|---|"
-    for kind in KINDS:
+    for kind in [kind for kind in KINDS if effect in ("", kind.effect)]:
         false, made = 0, 0
         for name in kind.makers:
             decoy = name.startswith("decoy")
@@ -400,15 +400,18 @@ def main() -> None:
     """Print the rates, and the tests of the public recordings if asked for."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--decoys", type=int, default=75, help="of each family")
+    parser.add_argument("--effect", default="", help="only this one, and no page")
     parser.add_argument("--recordings", action="store_true")
     asked = parser.parse_args()
     if asked.recordings:
         print_recordings()
         return
     lines = []
-    for line in table(asked.decoys):
+    for line in table(asked.decoys, asked.effect):
         print(line, flush=True)
         lines.append(line)
+    if asked.effect:
+        return
     made = f"\n\nMade by commit {journal.commit()}."
     journal.put("found.md", "decoys", "\n".join(lines) + made)
 
