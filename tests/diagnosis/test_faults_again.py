@@ -11,10 +11,11 @@ from pendpipe.analysis.turning_points.samples import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import diagnose_recording, silent
 from pendpipe.diagnosis.faults import Forensics
+from pendpipe.diagnosis.forensics import TESTS
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
-from pendpipe.diagnosis.result import Finding
+from pendpipe.diagnosis.result import Finding, nothing
 from pendpipe.diagnosis.state import Fault, State
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
@@ -65,6 +66,17 @@ def test_a_reading_that_nothing_explains_stays_out_and_is_measured_anew(error: f
     assert forensics.p_value(state.faults) == fault.p_value
     largest = fault.finding.parameters["largest"].value
     assert largest == pytest.approx(error * NOISE_RAD, abs=2.0 * NOISE_RAD)
+
+
+@pytest.mark.parametrize(("error", "stays"), [(60.0, True), (3.0, False)])
+def test_a_far_reading_stays_out_where_its_test_cannot_judge(
+    error: float, stays: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At the ends of coloured noise no test can tell; the model's own error can."""
+    forensics, state = blamed(error)
+    monkeypatch.setitem(TESTS, "glitches", lambda *_: nothing("glitches"))
+    assert forensics.again(state, silent) is not stays
+    assert (state.data.weight[ODD] == 0.0) is np.bool_(stays)
 
 
 @functools.cache

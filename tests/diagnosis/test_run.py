@@ -297,3 +297,13 @@ def test_red_noise_beside_sin_x_is_noise(seed: int) -> None:
     assert found.search.noise.coloured
     b = found.diagnosis.improved.parameters["b"]
     assert abs(b.value - TRUTH[B]) < 4.0 * b.sd
+
+
+def test_four_swings_at_uneven_times_are_answered() -> None:
+    """A wheel with a strong brake, read by an instrument that skips rows."""
+    random = np.random.default_rng(8)
+    time_s = np.cumsum(random.choice([0.01, 0.02, 0.11], 200, p=[0.6, 0.3, 0.1]))
+    angle_rad = 0.15 * np.exp(-0.48 * time_s) * np.cos(3.14 * time_s)
+    reading = angle_rad + 5e-4 * random.standard_normal(len(time_s))
+    found = diagnose_recording(Recording(time_s, reading, "angle_rad"))
+    assert found.verdict == "consistent"
