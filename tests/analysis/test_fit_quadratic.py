@@ -97,6 +97,16 @@ def test_intervals_cover_the_truth_on_the_bound() -> None:
     assert np.all(held > 1000 * 0.95 - 3.0 * math.sqrt(1000 * 0.95 * 0.05))
 
 
+def test_what_readings_do_not_tell_apart_stays_within_its_bounds() -> None:
+    """Rounding makes such a matrix indefinite by a little: it is no error of the user."""
+    column = np.array([1.0, 2.0, 3.0])
+    normal = np.outer(column, column) - 1e-9 * np.diag([1.0, -1.0, 1.0])
+    bounds = Bounds(np.array([-0.1, -np.inf, -0.1]), np.array([0.1, np.inf, 0.1]))
+    step = bounded_step(normal, 5.0 * column, bounds)
+    assert np.all((step >= bounds.lower) & (step <= bounds.upper))
+    assert column @ step == pytest.approx(5.0, rel=1e-4)
+
+
 @given(
     root=hnp.arrays(np.float64, (3, 3), elements=ENTRY),
     score=hnp.arrays(np.float64, 3, elements=st.floats(-5.0, 5.0)),

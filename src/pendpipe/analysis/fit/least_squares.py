@@ -59,10 +59,12 @@ def bounded_step(
     if bool(((step >= bounds.lower) & (step <= bounds.upper)).all()):
         return step
     # A hair for what the readings do not tell apart.
-    root = np.asarray(np.linalg.cholesky(scaled + 1e-13 * np.eye(len(free))), dtype=np.float64)
+    squares, axes = np.linalg.eigh(scaled)
+    root = np.sqrt(np.maximum(squares, 1e-13))[:, None] * axes.T
     within = Bounds(bounds.lower[free] / scale, bounds.upper[free] / scale)
-    white = np.asarray(np.linalg.solve(root, right), dtype=np.float64)
-    best = bounded_least_squares(root.T, white, *within)
+    best = bounded_least_squares(
+        root, axes.T @ right / np.sqrt(np.maximum(squares, 1e-13)), *within
+    )
     step[free] = best * scale
     return bounds.clip(step)
 
