@@ -26,13 +26,13 @@ from .records import INTERVAL_S, NOISE_RAD, TIME_S, TRUTH, other_engine, prepare
 LEVEL, ODD = 0.01, 812
 
 
-def blamed(error: float) -> tuple[Forensics, State]:
+def blamed(error: float, odd: int = ODD) -> tuple[Forensics, State]:
     """A search with the right model, and one reading that was masked as a glitch."""
     readings = other_engine(TRUTH) + white(21)
     # Its own noise taken off: it is wrong by just so much.
-    readings[ODD] = other_engine(TRUTH)[ODD] + error * NOISE_RAD
+    readings[odd] = other_engine(TRUTH)[odd] + error * NOISE_RAD
     data, _ = prepared(readings)
-    mask = np.arange(len(readings)) == ODD
+    mask = np.arange(len(readings)) == odd
     data = data.masked(mask)
     noise = white_noise(data, NOISE_RAD)
     fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
@@ -68,15 +68,17 @@ def test_a_reading_that_nothing_explains_stays_out_and_is_measured_anew(error: f
     assert largest == pytest.approx(error * NOISE_RAD, abs=2.0 * NOISE_RAD)
 
 
-@pytest.mark.parametrize(("error", "stays"), [(60.0, True), (3.0, False)])
+@pytest.mark.parametrize(
+    ("error", "odd", "stays"), [(60.0, 1, True), (3.0, 1, False), (60.0, ODD, False)]
+)
 def test_a_far_reading_stays_out_where_its_test_cannot_judge(
-    error: float, stays: bool, monkeypatch: pytest.MonkeyPatch
+    error: float, odd: int, stays: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """At the ends of coloured noise no test can tell; the model's own error can."""
-    forensics, state = blamed(error)
+    forensics, state = blamed(error, odd)
     monkeypatch.setitem(TESTS, "glitches", lambda *_: nothing("glitches"))
     assert forensics.again(state, silent) is not stays
-    assert (state.data.weight[ODD] == 0.0) is np.bool_(stays)
+    assert (state.data.weight[odd] == 0.0) is np.bool_(stays)
 
 
 @functools.cache

@@ -18,7 +18,7 @@ from pendpipe.diagnosis.detect import TESTS_SHARE
 from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.forensics import TESTS, Test, corrections
 from pendpipe.diagnosis.forensics.glitches import find_in_misfit
-from pendpipe.diagnosis.noise import white_noise
+from pendpipe.diagnosis.noise import TAPS, white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import COLOURED_NOISE, Finding, Location
@@ -37,7 +37,7 @@ _TESTED_AFTER: Final = (
 _SHARE_OF_EACH: Final = TESTS_SHARE / (len(_TESTED_BEFORE) + len(_TESTED_AFTER))
 _ROUNDS: Final = 3
 _FAR: Final = 8.0
-"""Usual errors from which a reading is wrong, even at an end, where the tests can't tell."""
+"""Usual errors from which a reading at an end is wrong, where the tests can't tell."""
 _CLEAN_CHI2: Final = 1.3
 """Largest chi^2 per degree of freedom at which the fine tests are made."""
 _IN_PHASE: Final = 0.3
@@ -152,7 +152,9 @@ class Forensics:
         error = np.abs(masked.residual(state.fit.at.reading))
         usual = float(np.sqrt(np.mean(error[masked.weight > 0.0] ** 2)))
         if p_value > self.level or finding.mask is None:
-            if np.all(error[fault.mask[: len(masked)]] > _FAR * usual):
+            rows = np.flatnonzero(fault.mask[: len(masked)])
+            at_end = np.minimum(rows, len(masked) - 1 - rows) < TAPS
+            if np.all(at_end & (error[rows] > _FAR * usual)):
                 return
             progress(f"{name}: no longer needed with the final model")
             del state.faults[number]
