@@ -149,12 +149,8 @@ class Forensics:
         noise = replace(state.noise, weight=whole.weight)
         finding = TESTS[name](whole, state.fit, noise, self.samples)
         p_value = _global(finding)
-        error = np.abs(masked.residual(state.fit.at.reading))
-        usual = float(np.sqrt(np.mean(error[masked.weight > 0.0] ** 2)))
         if p_value > self.level or finding.mask is None:
-            rows = np.flatnonzero(fault.mask[: len(masked)])
-            at_end = np.minimum(rows, len(masked) - 1 - rows) < TAPS
-            if np.all(at_end & (error[rows] > _FAR * usual)):
+            if _wrong_at_an_end(fault.mask[: len(masked)], state):
                 return
             progress(f"{name}: no longer needed with the final model")
             del state.faults[number]
@@ -279,6 +275,15 @@ class Forensics:
 def _global(finding: Finding) -> float:
     """Return a global p-value, by the test's share of the level."""
     return min(finding.p_value / _SHARE_OF_EACH, 1.0)
+
+
+def _wrong_at_an_end(mask: BoolArray, state: State) -> bool:
+    """Whether masked readings lie near an end, and far from the model that was fitted without."""
+    rows, count = np.flatnonzero(mask), len(mask)
+    error = np.abs(state.data.residual(state.fit.at.reading))
+    usual = float(np.sqrt(np.mean(error[state.data.weight > 0.0] ** 2)))
+    near = np.minimum(rows, count - 1 - rows) < TAPS
+    return bool(np.all(near & (error[rows] > _FAR * usual)))
 
 
 def _refit(state: State, out: BoolArray) -> None:

@@ -60,11 +60,9 @@ def bounded_step(
         return step
     # A hair for what the readings do not tell apart.
     squares, axes = np.linalg.eigh(scaled)
-    root = np.sqrt(np.maximum(squares, 1e-13))[:, None] * axes.T
+    root = np.sqrt(np.maximum(squares, 1e-13))
     within = Bounds(bounds.lower[free] / scale, bounds.upper[free] / scale)
-    best = bounded_least_squares(
-        root, axes.T @ right / np.sqrt(np.maximum(squares, 1e-13)), *within
-    )
+    best = bounded_least_squares(root[:, None] * axes.T, axes.T @ right / root, *within)
     step[free] = best * scale
     return bounds.clip(step)
 

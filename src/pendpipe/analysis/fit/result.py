@@ -595,9 +595,11 @@ def rate_with_error(rate: Estimate, *, short: bool = True) -> str:
 def quotable(result: FitResult) -> str:
     """Advise which of the numbers to quote."""
     if result.light == "green":
-        told = all(each.share.sd < _TOLD for each in qualities(result))
-        rest = "" if told else " This decay does not tell a, b and c apart: quote period and Q."
-        return "Quote these numbers with their errors." + rest
+        if all(each.share.sd < _TOLD for each in qualities(result)):
+            return "Quote these numbers with their errors."
+        return (
+            "Quote the period and Q with their errors: this decay does not tell a, b and c apart."
+        )
     if result.light_reason.startswith(BEAT):
         return "Quote the frequency and the loss of each mode; pendpipe diagnose fits both."
     if result.light == "red":

@@ -400,9 +400,7 @@ def find_slips(name: str, data: Data, fit: Fit, samples: Samples) -> tuple[Data,
     if slips is None or len(slips.rows) < _FEWEST:
         return data, nothing(name)
     when = data.time_s[slips.rows] - 0.5 * data.interval_s
-    seen = (
-        steps_of_the_time(samples, when, data.interval_s, fit.at.span.period_s) if clock else None
-    )
+    seen = steps_of_the_time(samples, when, data.fold, fit.at.span.period_s) if clock else None
     stairs = unit * slips.staircase(len(data))
     if clock:
         corrected = replace(data, time_s=data.time_s + stairs, uniform=False)
@@ -465,55 +463,53 @@ def steps_of_the_level(samples: Samples, count: float) -> Confirmation | None:
 
 
 def steps_of_the_time(
-    samples: Samples, when_s: FloatArray, within_s: float, period_s: float
+    samples: Samples, when_s: FloatArray, within: int, period_s: float
 ) -> Confirmation | None:
     """Test whether the time steps by whole samples at instants, without any model.
 
-    Near each instant one polynomial in time is fitted, with a step of the time: from there on it
-    changes the readings as the velocity does. The row where it is most significant counts.
+    About each instant, known to `within` samples, a polynomial in time with a step of the time is
+    fitted to the raw readings: after the step it changes them as the velocity does. The row where
+    the step is most significant counts.
     """
-    interval = within_s / round(within_s / float(np.median(np.diff(samples.time_s))))
+    interval, floor = np.median(np.diff(samples.time_s)), (samples.step or 0.0) / math.sqrt(12.0)
     side = max(int(_BESIDE * period_s / interval), _FEWEST_BESIDE)
-    about, floor = side + round(within_s / interval), (samples.step or 0.0) / math.sqrt(12.0)
     found: list[float] = []
     for row in np.searchsorted(samples.time_s, when_s).tolist():
-        near = samples.values[max(row - about, 0) : row + about]
+        near = samples.values[max(row - side - within, 0) : row + side + within]
         if len(near) < 2 * side:
             continue
         windows = np.lib.stride_tricks.sliding_window_view(near, 2 * side).T
-        size, sd = _step_of_time(windows, np.zeros(windows.shape[1]), floor)
-        best = np.argmax(np.abs(size) / sd, keepdims=True)
-        size = size[best]
+        sizes, sd = _step_of_time(windows, 0.0, floor)
+        best = int(np.argmax(np.abs(sizes) / sd))
+        size = float(sizes[best])
         for _ in range(_ROUNDS):
-            more, sd = _step_of_time(windows[:, best], size, floor)
-            size = size + more
-        if abs(size[0]) > max(_SIGNIFICANT_SD * sd[0], 0.5):
-            found.append(float(size[0]))
+            more, sd = _step_of_time(windows[:, [best]], size, floor)
+            size += float(more[0])
+        if abs(size) > max(_SIGNIFICANT_SD * sd[0], 0.5):
+            found.append(size)
     seen = Slips(np.arange(len(found)), np.array(found))
     if len(found) < _FEWEST:
         return None
     return Confirmation(
-        f"{len(found)} steps of the time in the readings as they are are whole within"
-        f" {seen.scatter:.2f} samples (by chance 0.29)",
+        f"{len(found)} steps of the time, each from a polynomial through the raw readings, are"
+        f" whole within {seen.scatter:.2f} samples (by chance 0.29)",
         seen.p_value,
     )
 
 
-def _step_of_time(
-    values: FloatArray, size: FloatArray, floor: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return how much larger the step of the time in the middle of each window is, and its sd.
+def _step_of_time(windows: FloatArray, size: float, floor: float) -> tuple[FloatArray, FloatArray]:
+    """Fit what a step of the time in the middle of each window lacks, and its sd; shape (windows,).
 
-    In sampling intervals; values have the shape (rows, windows), a size and an sd each.
+    In sampling intervals. Windows have the shape (rows, windows); of the step, `size` is known.
     """
-    side = len(values) // 2
+    side = len(windows) // 2
     later = np.arange(2 * side) >= side
-    at = (np.arange(2 * side) - side + 0.5 + size[0] * later) / side
+    at = (np.arange(2 * side) - side + 0.5 + size * later) / side
     powers = np.vander(at, _OF_A_STEP + 1, increasing=True)
     basis = np.linalg.qr(powers)[0]
     slopes = powers[:, :-1] * np.arange(1, _OF_A_STEP + 1) @ np.linalg.pinv(powers)[1:]
-    steps = slopes @ values * later[:, None] / side
-    left, steps = (each - basis @ (basis.T @ each) for each in (values, steps))
+    steps = slopes @ windows * later[:, None] / side
+    left, steps = (each - basis @ (basis.T @ each) for each in (windows, steps))
     square = np.maximum(np.sum(steps**2, axis=0), 1e-300)
     more = np.sum(steps * left, axis=0) / square
     rest = (np.sum(left**2, axis=0) - more**2 * square) / (2 * side - _OF_A_STEP - 2)
