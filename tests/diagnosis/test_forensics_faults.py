@@ -350,3 +350,21 @@ def test_lost_samples_that_no_motion_could_follow_are_not_corrected(
     Forensics(samples, 0.01).before(state, silent)
     assert np.array_equal(state.data.time_s, data.time_s)
     assert "dropped-samples" not in [fault.finding.identifier for fault in state.faults]
+
+
+@pytest.mark.parametrize("late", [-1, 0, 1])
+def test_a_loss_that_is_placed_a_reading_off_makes_no_glitch(
+    late: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    longer, place = Pendulum(count=AIR.count + 10), 1234
+    row = np.arange(AIR.count)
+    motion = longer.model().reading(longer.values())[row + 2 * (row >= place)]
+    record = fitted(AIR, motion + white(generator(), AIR.count))
+    (lost,) = find_lost_samples(record.data, record.fit)
+    placed = lost._replace(time_s=float(AIR.times()[place + late]))
+    monkeypatch.setattr(
+        "pendpipe.diagnosis.faults.corrections.find_lost_samples", lambda *_: [placed]
+    )
+    state = State(record.fit, record.data, record.noise, [], record.fit.value)
+    Forensics(record.samples, 0.01).before(state, silent)
+    assert [fault.finding.identifier for fault in state.faults] == ["dropped-samples"]

@@ -200,7 +200,9 @@ class Forensics:
             summary="samples were lost at "
             + ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6]),
         )
-        corrected = replace(data, time_s=time, uniform=False)
+        rows = np.searchsorted(data.time_s, [each.time_s - 1e-9 for each in lost])
+        weight = corrections.weight_beside(data, rows)
+        corrected = replace(data, time_s=time, uniform=False, weight=weight)
         if self._correct(state, corrected, found, least=0.1 * state.fit.chi2):
             progress(f"{number} samples were lost without a gap")
 
@@ -241,8 +243,9 @@ class Forensics:
             return False
         if corrected.time_s is not state.data.time_s:
             model = model.at_times(corrected.time_s)
+        noise = replace(state.noise, weight=corrected.weight)
         try:
-            fit = refine(model, corrected, state.noise, state.fit.value, held=state.held)
+            fit = refine(model, corrected, noise, state.fit.value, held=state.held)
         except NoMotionError:
             return False  # the model comes to rest before the corrected times
         gain = state.fit.chi2 - fit.chi2
@@ -254,7 +257,7 @@ class Forensics:
         row = np.searchsorted(state.data.time_s, self.samples.time_s, side="right") - 1
         lost = (state.data.values - corrected.values)[np.maximum(row, 0)]
         self.samples = replace(self.samples, values=self.samples.values - lost)
-        state.settle(fit, corrected)
+        state.settle(fit, corrected, noise)
         return True
 
     def kicked_at_random(self, state: State, rival: Rival, progress: Progress) -> bool:

@@ -62,6 +62,8 @@ _BESIDE: Final = 0.055
 """Length of a side about a step of the time, in periods: what a polynomial of the fourth degree
 leaves of a swing there, 1e-6 of it, is less than the noise."""
 _OF_A_STEP: Final = 4
+_BESIDE_A_STEP: Final = 2
+"""Readings left out on each side: a step is placed within one reading or two."""
 _FEWEST_BESIDE: Final = 8
 _ROUNDS: Final = 3
 TRACKING_NOISE: Final = "tracking-noise"
@@ -402,10 +404,11 @@ def find_slips(name: str, data: Data, fit: Fit, samples: Samples) -> tuple[Data,
     when = data.time_s[slips.rows] - 0.5 * data.interval_s
     seen = steps_of_the_time(samples, when, data.fold, fit.at.span.period_s) if clock else None
     stairs = unit * slips.staircase(len(data))
+    corrected = replace(data, weight=weight_beside(data, slips.rows))
     if clock:
-        corrected = replace(data, time_s=data.time_s + stairs, uniform=False)
+        corrected = replace(corrected, time_s=data.time_s + stairs, uniform=False)
     else:
-        corrected = replace(data, values=data.values - stairs)
+        corrected = replace(corrected, values=data.values - stairs)
     squares = float(np.sum(slips.whole**2))
     size = float(slips.sizes @ slips.whole) / squares
     words = "the clock slips by whole samples" if clock else "whole counts are lost, or gained,"
@@ -424,6 +427,14 @@ def find_slips(name: str, data: Data, fit: Fit, samples: Samples) -> tuple[Data,
         confirmed=seen if clock else steps_of_the_level(samples, unit),
     )
     return corrected, finding
+
+
+def weight_beside(data: Data, rows: IntArray) -> FloatArray:
+    """Return the weights without the readings about each step, which may have come a few off."""
+    weight = data.weight.copy()
+    near = rows[:, None] + np.arange(-_BESIDE_A_STEP, _BESIDE_A_STEP)
+    weight[np.clip(near, 0, len(data) - 1)] = 0.0
+    return weight
 
 
 def count_of(samples: Samples) -> float:
