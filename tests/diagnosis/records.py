@@ -104,6 +104,12 @@ def null_fit(seed: int = 3) -> tuple[Fit, Data, Noise]:
     return refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH), data, noise
 
 
+def _pivot_misplaced() -> FloatArray:
+    """A camera's pivot lies a twenty-fifth of the length beside the pendulum's."""
+    angle = other_engine(TRUTH)
+    return angle - 0.04 * (np.cos(angle) - 1.0)
+
+
 def _dropped() -> FloatArray:
     """Three readings are missing at 46.7 s, without a gap in the times."""
     whole = other_engine(TRUTH)
@@ -121,6 +127,7 @@ def _two_steps() -> FloatArray:
 _READINGS: dict[str, Callable[[], FloatArray]] = {
     "null": lambda: other_engine(TRUTH),
     "dropped-samples": _dropped,
+    "camera-geometry": _pivot_misplaced,
     "two steps": _two_steps,
     "two": lambda: with_effects("equilibrium-step", "tone-pickup"),
     "linear": lambda: other_engine(LINEAR),

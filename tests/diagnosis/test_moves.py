@@ -277,7 +277,14 @@ def test_a_torque_with_the_square_of_the_swing_is_no_second_plane() -> None:
     assert abs(found.value - kappa) < 4.0 * found.sd
 
 
-def test_a_rare_name_is_not_asked_where_another_leads() -> None:
-    outcome = diagnosed("sensor-quadratic")
+def test_a_misplaced_pivot_is_a_rival_of_the_quadratic_sensor_that_it_looks_like() -> None:
+    """At 0.3 rad cos x - 1 is -x^2/2 but for 3e-4 rad of x^4: either may be the name."""
+    for hidden in ("sensor-quadratic", "camera-geometry"):
+        (found,) = classes_found(diagnosed(hidden))
+        assert {"sensor-quadratic", "camera-geometry"} <= found
+
+
+def test_a_rare_name_that_looks_like_nothing_that_was_found_is_no_rival() -> None:
+    outcome = diagnosed("equilibrium-step")
     rare = {effect.identifier for effect in CATALOGUE if effect.rare}
     assert not rare & set.union(*classes_found(outcome))

@@ -222,7 +222,9 @@ def prefer_rare(state: State, rivals: Sequence[Rival], task: Task) -> list[Rival
         return list(rivals)
     lowest = min((leader.fit, *fits), key=lambda fit: fit.chi2)
     scale = Scale.of(lowest, state.data, state.noise)
-    others = [each.again(each.fit, before.chi2, scale) for each in rivals]
+    others = [
+        each.again(each.fit, before.chi2, scale) for each in rivals if not each.lead.effect.rare
+    ]
     named = ranked([_rival(before, fit, scale) for fit in fits])
     names = sum(map(is_further, state.steps))
     price = _chosen(names + 1) - _chosen(names) if leader.drawn else 0.0

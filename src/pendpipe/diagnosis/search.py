@@ -237,7 +237,9 @@ def _add_one(state: State, task: Task) -> bool:
         return False
     p_value = state.now.p_value / CATALOGUE_SHARE
     progress(f"chance does not explain the residual ({printed(p_value)}): refitting leads")
-    closer = more_leads(state.fit, state.noise, undrawn(FOLLOW_UP_CURVES, state.fit))
+    rare = [effect for effect in task.rare(state) if effect.rare]
+    unscanned = [*undrawn(FOLLOW_UP_CURVES, state.fit), *rare]
+    closer = more_leads(state.fit, state.noise, unscanned)
     found = replace(state.now, leads=(*state.now.leads, *closer))
     rivals = refit_leads(
         state.fit,
@@ -247,6 +249,8 @@ def _add_one(state: State, task: Task) -> bool:
         held=state.held,
         phase_lost=loses_phase(state.fit),
     )
+    # A rare name is a rival of what it looks like, and leads where `prefer_rare` says so.
+    rivals.sort(key=lambda rival: rival.lead.effect.rare)
     if rivals:
         rivals = prefer_parameters(state, rivals)
     if rivals:

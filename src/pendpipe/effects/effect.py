@@ -159,8 +159,8 @@ class Effect:
     expected: ClassVar[bool] = False
     """Whether every pendulum has some of it, so that it is to be doubted last."""
     rare: ClassVar[bool] = False
-    """Whether the scan leaves it out, since it looks much like others and would be in many a class;
-    it is asked where a curve, or a tone at a harmonic, would be added."""
+    """Whether the scan leaves it out, since it looks much like others. It is a rival of what it
+    looks like, and leads where a curve, or a tone at a harmonic, would be added otherwise."""
     prior: ClassVar[float] = 0.0
     """Twice the logarithm of how much likelier it is beforehand than others."""
     has_signature: ClassVar[bool] = True
