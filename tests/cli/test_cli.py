@@ -56,3 +56,10 @@ def test_the_entry_point_imports_no_heavy_library() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert not heavy & set(loaded.stdout.split())
+
+
+def test_the_package_itself_can_be_run() -> None:
+    command = [sys.executable, "-m", "pendpipe", "inspekt"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "did you mean 'pendpipe inspect'?" in done.stderr
