@@ -138,9 +138,6 @@ def test_exponents_of_the_two_branches_are_near_the_papers() -> None:
     high = found["high"]
     assert min(high.local_slopes) < -9.0 < -4.5 < max(high.local_slopes)
     assert high.curvature.value < 0.0
-    whole = [part for part in high.ranges if (part.first, part.last) == ("high-0", "high-7")]
-    assert whole[0].exponent == pytest.approx(high.exponent.value, rel=1e-13)
-    assert max(part.exponent for part in high.ranges) > high.exponent.value + 0.3
 
 
 def test_two_records_of_one_frequency_have_no_slope_between_them() -> None:

@@ -15,7 +15,6 @@ from pendpipe.figures.campaign import (
     draw_fig06,
     draw_fig09,
     draw_fig10,
-    draw_tail,
 )
 from pendpipe.figures.data import NothingToDrawError
 
@@ -97,23 +96,6 @@ def test_figure_10_leaves_hysteresis_out_in_red_and_overestimates(example: Any) 
         red, green, blue = to_rgb(viscous.get_color())
         assert red > 2 * max(green, blue)
     assert len(points(axes)) == WATER
-
-
-def test_tail_figure_shows_the_whole_record_and_every_later_start(example: Any) -> None:
-    fits = example.content["tail"]
-    for panel, name in zip(draw_tail(fits).axes, "abc", strict=False):
-        drawn = points(panel)
-        assert drawn[:, 0] == pytest.approx([fit["start_s"] for fit in fits[1:]])
-        factor = drawn[0, 1] / fits[1][name]["value"]
-        low, high = panel.get_ylim()
-        assert low < factor * fits[0][name]["value"] < high
-
-
-def test_a_hopeless_tail_does_not_squeeze_the_others(example: Any) -> None:
-    fits = [*example.content["tail"]]
-    last = {name: {**fits[-1][name], "sd": 1e4} for name in "abc"}
-    low, high = draw_tail([*fits, {**fits[-1], **last, "start_s": 200.0}]).axes[0].get_ylim()
-    assert high - low < 4 * fits[0]["a"]["value"]
 
 
 @pytest.mark.parametrize("draw", [draw_fig05, draw_fig06, draw_fig09, draw_fig10])

@@ -34,7 +34,7 @@ def test_every_figure_is_there_as_svg_and_png(small: tuple[dict[str, Any], Path]
     content, folder = small
     drawn = draw_all(content, folder, folder / "figures")
     assert drawn.left_out == {"causes": "the records were not diagnosed together"}
-    for name in [*PAPER, "tail"]:
+    for name in PAPER:
         assert ET.parse(folder / f"figures/{name}.svg").getroot().tag.endswith("svg")
         assert (folder / f"figures/{name}.png").read_bytes().startswith(b"\x89PNG")
     for entry in content["records"]:
@@ -88,7 +88,6 @@ def test_recordings_of_others_have_their_decays_only(small: tuple[dict[str, Any]
         "has_theory": False,
         "typical_record": None,
         "calibration": None,
-        "tail": [],
     }
     drawn = draw_all(bare, folder, folder / "figures")
     assert not (folder / "figures").exists()
@@ -103,12 +102,11 @@ def test_the_command_draws_and_says_what_it_left_out(
 
     content, folder = small
     write_json(folder / "c.json", {"results": folder.as_posix()})
-    write_json(folder / "comparison.json", {**content, "tail": [], "calibration": None})
+    write_json(folder / "comparison.json", {**content, "calibration": None})
     out = folder / "figures"
     words = ["--campaign", str(folder / "c.json"), "--comparison"]
     assert main(["figures", *words, str(folder / "comparison.json"), "--out", str(out)]) == 0
     said = capsys.readouterr().err
-    assert "tail is not drawn" in said
     assert "fig03 is not drawn" in said
     # The workflow counts on figures 3 to 10: the reason stands in the place of figure 3.
     assert {path.stem for path in out.glob("*.svg")} == set(PAPER)

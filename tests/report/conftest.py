@@ -29,14 +29,13 @@ def load_example() -> ModuleType:
 
 @pytest.fixture(scope="session")
 def example(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """A finished campaign of 27 records with two figures drawn, and one record's decay."""
-    from pendpipe.figures.campaign import draw_fig09, draw_tail
+    """A finished campaign of 27 records with a figure drawn, and one record's decay."""
+    from pendpipe.figures.campaign import draw_fig09
     from pendpipe.figures.decays import draw_decay, read_decay
     from pendpipe.figures.style import save
 
     made = load_example().make_example(tmp_path_factory.mktemp("campaign"))
     save(draw_fig09(made.content), made.folder / "figures" / "fig09")
-    save(draw_tail(made.content["tail"]), made.folder / "figures" / "tail")
     for entry in made.content["records"][:2]:
         found = read_decay(made.folder, entry)
         save(draw_decay(found), made.folder / entry["record"] / "figures" / "decay", dpi=80)

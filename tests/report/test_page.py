@@ -205,7 +205,7 @@ def test_without_theory_only_the_records_are_told(example: Any, tmp_path: Path) 
 
 def test_svgs_speak(page: str) -> None:
     drawings = [values for tag, values in Outline(page).tags if tag == "svg"]
-    assert len(drawings) == 4
+    assert len(drawings) == 3
     ids = set(Outline(page).ids)
     for values in drawings:
         assert values["role"] == "img"

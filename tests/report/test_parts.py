@@ -154,6 +154,6 @@ def test_findings_follow_the_numbers() -> None:
 
 def test_two_records_of_one_frequency_have_no_local_exponent() -> None:
     """Between them comparison.json has null."""
-    found = {"value": 0.5, "sd": 0.1, "local_slopes": [0.53, None, -0.2], "ranges": []}
+    found = {"value": 0.5, "sd": 0.1, "local_slopes": [0.53, None, -0.2]}
     text = part_of_the_page("exponents.html", {"viscous_exponents": {"low": found}})
     assert "0.53, –, −0.20" in text

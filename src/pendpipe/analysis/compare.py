@@ -266,21 +266,6 @@ def chi_square(
     return float(white @ white)
 
 
-FEWEST_IN_A_RANGE = 4
-MOST_LEFT_OUT = 2
-"""At either end of the branch, when the dependence on the range is looked at."""
-
-
-@dataclass(frozen=True)
-class RangeSlope:
-    """The exponent over a part of the branch, and the records where it begins and ends."""
-
-    first: str
-    last: str
-    exponent: float
-    sd: float
-
-
 @dataclass(frozen=True)
 class Exponent:
     """A branch as a power law, and how far it is one.
@@ -296,8 +281,6 @@ class Exponent:
         than three records. Zero for a power law.
     local_slopes
         Between neighbours in frequency, from the lowest up; NaN between equal frequencies.
-    ranges
-        The slope over parts of the branch, with up to two records left out at each end.
     records
         The branch in the order of its frequencies.
     """
@@ -307,7 +290,6 @@ class Exponent:
     sd_common: float
     curvature: Estimate
     local_slopes: tuple[float, ...]
-    ranges: tuple[RangeSlope, ...]
     records: tuple[str, ...]
 
 
@@ -331,20 +313,12 @@ def fit_exponent(branch: Columns, inverse_k_sd: float) -> Exponent | None:
         bend_sd = math.hypot(*sds)
     steps = np.diff(np.log(frequency))
     local = np.diff(_log_quality(branch)) / np.where(steps > 0.0, steps, np.nan)
-    ranges = []
-    for low in range(MOST_LEFT_OUT + 1):
-        for high in range(count - MOST_LEFT_OUT, count + 1):
-            enough = high - low >= min(FEWEST_IN_A_RANGE, count)
-            if enough and np.ptp(frequency[low:high]) > 0.0:
-                part, *sds = _derivative(_chosen(branch, slice(low, high)), inverse_k_sd, 1)
-                ranges.append(RangeSlope(names[low], names[high - 1], part, math.hypot(*sds)))
     return Exponent(
         exponent=Estimate(slope, math.hypot(own, common), ""),
         sd_own=own,
         sd_common=common,
         curvature=Estimate(bend, bend_sd, ""),
         local_slopes=tuple(local.tolist()),
-        ranges=tuple(ranges),
         records=tuple(names),
     )
 

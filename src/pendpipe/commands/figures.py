@@ -1,4 +1,4 @@
-"""Draw figures 3 to 10 of a campaign, the tail figure, and the decay of each record.
+"""Draw figures 3 to 10 of a campaign, and the decay of each record.
 
 What has no data is left out, and said on standard error; in a campaign with an apparatus
 each of figures 3 to 10 is written all the same, with the reason in its place.

@@ -10,7 +10,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.figures.data import (
     Entry,
@@ -49,7 +48,7 @@ from pendpipe.figures.style import (
     words,
 )
 from pendpipe.files import read_json
-from pendpipe.quantities import axis_unit, prefixed, with_error
+from pendpipe.quantities import axis_unit, with_error
 from pendpipe.recording import read_plain
 
 Comparison = Mapping[str, Any]
@@ -63,7 +62,7 @@ class Drawn(NamedTuple):
 
 
 def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int = 1) -> Drawn:
-    """Draw figures 3 to 10, the tail figure and each record's decay.
+    """Draw figures 3 to 10 and each record's decay.
 
     Parameters
     ----------
@@ -87,7 +86,6 @@ def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int 
         "fig04": partial(draw_fig04, comparison),
         "fig07": partial(_typical_decay, comparison, folder),
         "fig08": partial(_typical_quality, comparison, folder),
-        "tail": partial(draw_tail, comparison.get("tail")),
     }
     has_theory = bool(comparison.get("has_theory"))
     if has_theory:
@@ -552,74 +550,4 @@ def draw_fig10(comparison: Mapping[str, Any]) -> Figure:
             },
             key=1,
         ),
-    )
-
-
-_UNITS: Final = {"a": "rad⁻¹ s⁻¹", "b": "s⁻¹", "c": "rad/s"}
-
-
-@styled
-def draw_tail(tail: Sequence[Mapping[str, Any]] | None) -> Figure:
-    """Draw the three rates with error bars, and the whole record's as a line.
-
-    Parameters
-    ----------
-    tail
-        The entry ``tail`` of comparison.json; its first fit is that of the whole record.
-    """
-    if not tail or len(tail) < 2:
-        raise NothingToDrawError("there are no fits to tails")
-    start = np.array([fit["start_s"] for fit in tail], dtype=np.float64)
-    first, second, third = (_rate(tail, name, start) for name in "abc")
-    return figure_of(
-        5.0,
-        first._replace(marks=[*first.marks, _amplitudes_on_top(tail, start)], key=2, lift=1.28),
-        second,
-        third._replace(about=third.about | {"xlabel": "Start of the fitted part (s)"}),
-    )
-
-
-def _rate(tail: Sequence[Mapping[str, Any]], name: str, start: FloatArray) -> Panel:
-    """A rate of the whole record with its 95 % band, against the tails' error bars."""
-    values = np.array([number(fit[name]) for fit in tail])
-    errors = np.array([error(fit[name]) for fit in tail])
-    factor, unit = axis_unit(values, _UNITS[name])
-    values, errors = factor * values, factor * errors
-    whole, reach = values[0], 1.96 * errors[0]
-    tails = {"fmt": "o", "label": "fit to the tail from here on"}
-    return Panel(
-        [
-            strip(whole - reach, whole + reach, BLUE, 0.22),
-            level(whole, BLUE, 1.4, label="whole record, 95 % band"),
-            measured(start[1:], values[1:], errors[1:], None, VERMILION, **tails),
-        ],
-        {"ylabel": f"${name}$ ({unit})", "ylim": _window(values, errors)},
-    )
-
-
-def _window(values: FloatArray, errors: FloatArray) -> tuple[float, float]:
-    """Limits about the whole record's value: the tails' errors, but no more than themselves.
-
-    The shortest tails know nothing any more (errors of ten thousand times the value); their
-    bars leave the panel, or no other fit could be distinguished from the line.
-    """
-    whole = values[0]
-    reach = np.abs(values - whole) + errors
-    near = reach[reach <= abs(whole)]
-    half = 1.15 * max(float(np.max(near, initial=0.0)), 3.0 * errors[0], 1e-3 * abs(whole))
-    return whole - half, whole + half
-
-
-def _amplitudes_on_top(tail: Sequence[Mapping[str, Any]], start: FloatArray) -> Mark:
-    """Mark round amplitudes where the decay passes them."""
-    amplitude = np.array([number(fit["amplitude_rad"]) for fit in tail])
-    factor, unit = prefixed(float(np.nanmax(amplitude)), "rad")
-    decades = 10.0 ** np.arange(-6, 4)
-    marks = np.sort(np.outer(decades, [1.0, 2.0, 5.0]).ravel())
-    shown = factor * amplitude
-    marks = marks[(marks >= np.min(shown)) & (marks <= np.max(shown))]
-    order = np.argsort(shown)
-    moments = np.interp(np.log(marks), np.log(shown[order]), start[order])
-    return second_scale(
-        "top", moments, [f"{mark:g}" for mark in marks], f"Amplitude there ({unit})"
     )

@@ -70,13 +70,6 @@ CAPTIONS: Final = {
         "The shaded gap is the error of ignoring internal friction: large in the low branch,"
         " small in the high one.",
     ),
-    "tail": Caption(
-        "The trap of tail fits",
-        "a, b and c of the typical record, fitted to ever shorter tails of it; the blue line and"
-        " band are the fit to the whole record.",
-        "The later a fit begins, the less it knows: bars of one standard deviation grow until"
-        " they leave the panel, first in a, then in b and c. Fit whole records.",
-    ),
     "causes": Caption(
         "What each cause predicts",
         "The viscous loss of every record in the fluid above that of Eq. 16, inputs as configured"

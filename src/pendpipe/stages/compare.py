@@ -1,6 +1,5 @@
 """Compare a campaign's losses with Eq. 16, and sum the campaign up in numbers."""
 
-from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
@@ -264,7 +263,6 @@ def _campaign_numbers(found: Comparison | None) -> dict[str, Any]:
                 "sd_common": fitted.sd_common,
                 "curvature": fitted.curvature.as_json(),
                 "local_slopes": list(fitted.local_slopes),
-                "ranges": [asdict(part) for part in fitted.ranges],
                 "records": list(fitted.records),
             }
             for branch, fitted in found.exponents.items()

@@ -139,15 +139,6 @@ def comparison(
     settings: dict[str, Any], entries: list[dict[str, Any]], tail: list[dict[str, Any]]
 ) -> dict[str, Any]:
     """The content of comparison.json."""
-    ranges = [
-        {
-            "first": "water-high-1",
-            "last": f"water-high-{last}",
-            "exponent": -4.9 - 0.1 * last,
-            "sd": 0.05,
-        }
-        for last in (5, 6, 7, 8)
-    ]
     return {
         "schema_version": 1,
         "title": settings["title"],
@@ -162,13 +153,11 @@ def comparison(
             | {
                 "local_slopes": [-4.1, -4.4, -4.9, -5.4, -6.1, -7.2, -9.4],
                 "curvature": estimate(-3.1, 0.2, ""),
-                "ranges": ranges,
             },
             "low": estimate(0.506, 0.006, "")
             | {
                 "local_slopes": [0.48, 0.5, 0.52, 0.5, 0.49, 0.51],
                 "curvature": estimate(0.01, 0.02, ""),
-                "ranges": [],
             },
         },
         "theory_factor": estimate(1.1165, 0.0062, "")
