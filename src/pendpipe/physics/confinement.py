@@ -16,7 +16,7 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pendpipe.physics._floats import FloatArray
+from pendpipe.arrays import FloatArray
 
 ComplexArray = npt.NDArray[np.complex128]
 Surface = Literal["film", "slip"]

@@ -26,8 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pendpipe.arrays import AnyArray
-from pendpipe.physics._floats import FloatArray, Numbers, equation, floats, plain
+from pendpipe.arrays import AnyArray, FloatArray, Numbers, equation
 
 _TINY = 1e-290
 """Where r t is smaller, (1 - exp(-r t))/r is t to the last digit (and r t has few left)."""
@@ -115,6 +114,7 @@ def amplitude(
         return parts_of(time_s, amplitude0_rad, a, b, c).quotient(amplitude0_rad)
 
 
+@equation
 def time_at(
     amplitude_rad: Numbers, amplitude0_rad: Numbers, a: Numbers, b: Numbers, c: Numbers
 ) -> FloatArray:
@@ -135,18 +135,16 @@ def time_at(
     FloatArray
         t in s; infinite where the amplitude is never reached, negative for y > y0.
     """
-    y, y0, quadratic, linear, coulomb = np.broadcast_arrays(
-        *floats(amplitude_rad, amplitude0_rad, a, b, c)
-    )
-    r = root(quadratic, linear, coulomb)
-    half = smaller_half(quadratic, linear, coulomb, r)
-    divisor = quadratic * y0 * y + half * y0 + (linear - half) * y + coulomb
+    y, y0, a, b, c = np.broadcast_arrays(amplitude_rad, amplitude0_rad, a, b, c)
+    r = root(a, b, c)
+    half = smaller_half(a, b, c, r)
+    divisor = a * y0 * y + half * y0 + (b - half) * y + c
     with np.errstate(divide="ignore", invalid="ignore"):
         reduced = np.where(y == y0, 0.0, (y0 - y) / divisor)
         scaled = r * reduced
         straight = ~(np.abs(scaled) > _TINY)
         grown = np.where(straight, reduced, np.log1p(scaled) / np.where(straight, 1.0, r))
-    return plain(grown.real)
+    return grown.real
 
 
 def stopping_time(amplitude0_rad: Numbers, a: Numbers, b: Numbers, c: Numbers) -> FloatArray:
@@ -182,6 +180,7 @@ def _moments(t: FloatArray, r: AnyArray) -> tuple[AnyArray, AnyArray, AnyArray]:
     return saturation(r, t) * fading, t**2 * ramp * fading, t**3 * bulge
 
 
+@equation
 def amplitude_and_gradient(
     time_s: Numbers, amplitude0_rad: Numbers, a: Numbers, b: Numbers, c: Numbers
 ) -> tuple[FloatArray, FloatArray]:
@@ -200,12 +199,12 @@ def amplitude_and_gradient(
         dy/d(y0, a, b, c), shape s + (4,). Zero from the stopping time on, where it jumps
         (the last of it is what moves the stopping time).
     """
-    t, y0, quadratic, linear, coulomb = floats(time_s, amplitude0_rad, a, b, c)
+    y0 = amplitude0_rad
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        parts = parts_of(t, y0, quadratic, linear, coulomb)
+        parts = parts_of(time_s, y0, a, b, c)
         y, r, t = parts.quotient(y0), parts.r, parts.t
-        half = smaller_half(quadratic, linear, coulomb, r)
-        loss, gain = coulomb + half * y0, quadratic * y0 + linear - half
+        half = smaller_half(a, b, c, r)
+        loss, gain = c + half * y0, a * y0 + b - half
         first, mixed, second = _moments(t, r)
         # Of u = y0 A - loss B and v = A + gain B, with the moments of A and B.
         gradient = np.stack(
@@ -218,4 +217,4 @@ def amplitude_and_gradient(
         )
         gradient = -(gradient / parts.v**2).real
     gradient = np.where((y > 0.0) & np.isfinite(y), gradient, np.where(y == 0.0, 0.0, np.nan))
-    return plain(y), np.moveaxis(gradient, 0, -1)
+    return y, np.moveaxis(gradient, 0, -1)

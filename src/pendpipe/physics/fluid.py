@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from pendpipe.physics._floats import FloatArray, Numbers, equation, floats
+from pendpipe.arrays import FloatArray, Numbers, equation
 
 # IAPWS SR6-08 (2011), after J. Patek et al., J. Phys. Chem. Ref. Data 38 (2009) 21:
 # amplitudes in uPa s and exponents of T / 300 K; valid from -20 to 110 C, within 1 %.
@@ -236,6 +236,7 @@ POTENTIAL_FLOW_ADDED_MASS = 0.5
 _ROUNDS: Final = 50
 
 
+@equation
 def free_decay_root(
     inertia_kg_m2: Numbers, steady: Numbers, history: Numbers, torque_n_m_per_rad: Numbers
 ) -> npt.NDArray[np.complex128]:
@@ -268,16 +269,16 @@ def free_decay_root(
     >>> round(float(-s.real), 12), round(float(abs(s)), 12)
     (0.01, 2.0)
     """
-    inertia, linear, memory, torque = floats(inertia_kg_m2, steady, history, torque_n_m_per_rad)
-    root = 1j * np.sqrt(torque / (inertia + 0.0 * (linear + memory)))
+    inertia, torque = inertia_kg_m2, torque_n_m_per_rad
+    root = 1j * np.sqrt(torque / (inertia + 0.0 * (steady + history)))
     for _ in range(_ROUNDS):
         half = np.sqrt(root)
-        value = inertia * root**2 + linear * root + memory * root * half + torque
-        step = value / (2.0 * inertia * root + linear + 1.5 * memory * half)
+        value = inertia * root**2 + steady * root + history * root * half + torque
+        step = value / (2.0 * inertia * root + steady + 1.5 * history * half)
         root = root - step
         if np.all(np.abs(step) <= 1e-15 * np.abs(root)):
             break
-    return np.asarray(root, dtype=np.complex128)[()]
+    return root
 
 
 @equation

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from pendpipe.physics._floats import FloatArray, Numbers, equation, floats, plain
+from pendpipe.arrays import FloatArray, Numbers, equation
 from pendpipe.physics.fluid import POTENTIAL_FLOW_ADDED_MASS, added_mass_coefficient
 
 STANDARD_GRAVITY_M_PER_S2 = 9.80665
@@ -89,17 +89,17 @@ def sphere_volume(radius_m: Numbers) -> FloatArray:
 
 def moment_of_inertia(parts: Sequence[Part]) -> FloatArray:
     """Moment of inertia of the parts about the axis in kg m^2, without any fluid."""
-    return plain(sum(map(_inertia, parts)))
+    return sum(map(_inertia, parts), start=np.zeros(()))
 
 
 def static_moment(parts: Sequence[Part]) -> FloatArray:
     """Return the sum of mass times position, M Delta of Eq. 7, in kg m."""
-    return plain(sum(np.multiply(part.mass_kg, _position(part)) for part in parts))
+    return sum(np.multiply(part.mass_kg, _position(part)) for part in parts)
 
 
 def displaced_moment(parts: Sequence[Part]) -> FloatArray:
     """Return the sum of displaced volume times position in m^4."""
-    return plain(sum(np.multiply(_displaced(part), _position(part)) for part in parts))
+    return sum(np.multiply(_displaced(part), _position(part)) for part in parts)
 
 
 def restoring_torque(
@@ -115,7 +115,7 @@ def restoring_torque(
     moment = static_moment(parts)
     if fluid is not None:
         moment = moment - np.multiply(fluid.density_kg_per_m3, displaced_moment(parts))
-    return plain(np.multiply(gravity_m_per_s2, moment))
+    return np.multiply(gravity_m_per_s2, moment)
 
 
 def added_inertia(
@@ -138,10 +138,10 @@ def added_inertia(
     plain_added_mass
         Leave the part with delta out (a fluid without viscosity).
     """
-    total: FloatArray = np.zeros(())
+    total: Numbers = np.float64(0.0)
     if fluid is None:
-        return plain(total)
-    density, viscosity = floats(*fluid)
+        return total
+    density, viscosity = fluid
     for part in parts:
         if isinstance(part, Sphere) and part.submerged:
             coefficient = (
@@ -153,7 +153,7 @@ def added_inertia(
             )
             displaced = density * sphere_volume(part.radius_m)
             total = total + coefficient * displaced * np.square(part.centre_m)
-    return plain(total)
+    return total
 
 
 def _inertia(part: Part) -> FloatArray:
@@ -195,7 +195,7 @@ class Swing(NamedTuple):
     @property
     def frequency_hz(self) -> FloatArray:
         """Return omega/(2 pi)."""
-        return plain(self.angular_frequency_per_s / (2.0 * np.pi))
+        return self.angular_frequency_per_s / (2.0 * np.pi)
 
 
 class Lengthening(NamedTuple):
@@ -240,13 +240,13 @@ def swing(
     omega = np.sqrt(stable / dry)
     inertia = dry + 0.0 * omega
     if fluid is None or not added_mass:
-        return Swing(plain(omega), plain(inertia), torque)
+        return Swing(omega, inertia, torque)
     for _ in range(_ROUNDS):
         inertia = dry + added_inertia(parts, fluid, omega, plain_added_mass=plain_added_mass)
         previous, omega = omega, np.sqrt(stable / inertia)
         if np.all((np.abs(omega - previous) <= 1e-15 * omega) | np.isnan(omega)):
             break
-    return Swing(plain(omega), plain(inertia), torque)
+    return Swing(omega, inertia, torque)
 
 
 @equation
@@ -295,7 +295,7 @@ def period_lengthening(
         )
         for buoyancy, added_mass in ((True, False), (False, True), (True, True))
     )
-    return Lengthening(*(plain(bare / each.angular_frequency_per_s - 1.0) for each in wet))
+    return Lengthening(*(bare / each.angular_frequency_per_s - 1.0 for each in wet))
 
 
 @equation

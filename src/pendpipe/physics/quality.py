@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pendpipe.physics._floats import FloatArray, Numbers, equation, floats, plain
+from pendpipe.arrays import FloatArray, Numbers, equation
 
 
 @equation
@@ -173,6 +173,7 @@ def amplitude_rate(amplitude_rad: Numbers, a: Numbers, b: Numbers, c: Numbers) -
     return np.where(amplitude_rad > 0.0, -((a * amplitude_rad + b) * amplitude_rad + c), 0.0)
 
 
+@equation
 def rates_from_energy_constants(
     c1: Numbers, c2: Numbers, c3: Numbers, energy_per_squared_amplitude: Numbers
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -193,9 +194,8 @@ def rates_from_energy_constants(
     tuple of FloatArray
         a in 1/(rad s), b in 1/s, c in rad/s.
     """
-    first, second, third, scale = floats(c1, c2, c3, energy_per_squared_amplitude)
-    root = np.sqrt(scale)
-    return plain(0.5 * third * root), plain(0.5 * second), plain(0.5 * first / root)
+    root = np.sqrt(energy_per_squared_amplitude)
+    return 0.5 * c3 * root, 0.5 * c2, 0.5 * c1 / root
 
 
 @equation
@@ -252,6 +252,7 @@ class QualityFactors(NamedTuple):
     viscous: FloatArray
 
 
+@equation
 def decay_rates(
     quality_factors: QualityFactors | tuple[Numbers, Numbers, Numbers, Numbers],
     amplitude0_rad: Numbers,
@@ -272,17 +273,12 @@ def decay_rates(
         a in 1/(rad s), the hysteretic and the viscous part of b in 1/s, and c in rad/s: the order
         of `pendpipe.Eq8`.
     """
-    coulomb, hysteretic, fluid, viscous = floats(*quality_factors)
-    y0, omega = floats(amplitude0_rad, angular_frequency_per_s)
-    half = 0.5 * omega
-    return (
-        plain(half / (y0 * fluid)),
-        plain(half / hysteretic),
-        plain(half / viscous),
-        plain(half * y0 / coulomb),
-    )
+    coulomb, hysteretic, fluid, viscous = quality_factors
+    y0, half = amplitude0_rad, 0.5 * angular_frequency_per_s
+    return half / (y0 * fluid), half / hysteretic, half / viscous, half * y0 / coulomb
 
 
+@equation
 def quality_factors(
     a: Numbers,
     b: Numbers,
@@ -305,18 +301,16 @@ def quality_factors(
     hysteretic_share
         The hysteretic part of b, between 0 and 1.
     """
-    quadratic, linear, coulomb, y0, omega, share = floats(
-        a, b, c, amplitude0_rad, angular_frequency_per_s, hysteretic_share
-    )
-    half = 0.5 * omega
+    half = 0.5 * angular_frequency_per_s
     return QualityFactors(
-        plain(half * y0 * inverse(coulomb)),
-        plain(half * inverse(share * linear)),
-        plain(half / y0 * inverse(quadratic)),
-        plain(half * inverse((1.0 - share) * linear)),
+        half * amplitude0_rad * inverse(c),
+        half * inverse(hysteretic_share * b),
+        half / amplitude0_rad * inverse(a),
+        half * inverse((1.0 - hysteretic_share) * b),
     )
 
 
+@equation
 def universal_acceleration(
     angle_rad: Numbers,
     angular_velocity_rad_per_s: Numbers,
@@ -346,15 +340,15 @@ def universal_acceleration(
         x'' in rad/s^2. At rest (x' = 0) the bracket is left out: whether Coulomb
         friction then holds the pendulum is for the integrator to decide.
     """
-    coulomb, hysteretic, fluid, viscous = floats(*quality_factors)
-    x, v, omega, y0 = floats(
-        angle_rad, angular_velocity_rad_per_s, angular_frequency_per_s, amplitude0_rad
-    )
+    coulomb, hysteretic, fluid, viscous = quality_factors
+    x, v, omega = angle_rad, angular_velocity_rad_per_s, angular_frequency_per_s
     speed = np.hypot(omega * x, v)
     bracket = (np.pi / 4.0) * (
-        omega**2 * y0 / coulomb + omega * speed / hysteretic + speed**2 / (y0 * fluid)
+        omega**2 * amplitude0_rad / coulomb
+        + omega * speed / hysteretic
+        + speed**2 / (amplitude0_rad * fluid)
     )
-    return plain(-bracket * np.sign(v) - omega / viscous * v - omega**2 * x)
+    return -bracket * np.sign(v) - omega / viscous * v - omega**2 * x
 
 
 @equation
@@ -395,6 +389,7 @@ def energy_power_quality_factor(
     return (np.pi / 4.0) * angular_frequency_per_s**2 * amplitude_rad / friction
 
 
+@equation
 def net_quality_factor(
     quality_factors: QualityFactors | tuple[Numbers, Numbers, Numbers, Numbers],
     amplitude_rad: Numbers,
@@ -411,9 +406,9 @@ def net_quality_factor(
     amplitude_rad, amplitude0_rad
         y and y0 in rad; broadcast.
     """
-    coulomb, hysteretic, fluid, viscous = floats(*quality_factors)
-    y, y0 = floats(amplitude_rad, amplitude0_rad)
-    loss = y0 / (y * coulomb) + 1.0 / hysteretic + y / (y0 * fluid) + 1.0 / viscous
+    coulomb, hysteretic, fluid, viscous = quality_factors
+    relative = amplitude_rad / amplitude0_rad
+    loss = 1.0 / (relative * coulomb) + 1.0 / hysteretic + relative / fluid + 1.0 / viscous
     return inverse(loss)
 
 
