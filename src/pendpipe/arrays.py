@@ -27,8 +27,8 @@ def equation(function: Callable[_Arguments, _Result]) -> Callable[_Arguments, _R
     @wraps(function)
     def of_numbers(*given: _Arguments.args, **named: _Arguments.kwargs) -> _Result:
         others = {name: _arrays(value) for name, value in named.items()}
-        found: Any = function(*map(_arrays, given), **others)  # type: ignore[arg-type]
-        return _plain(found)
+        found: Any = function(*map(_arrays, given), **others)
+        return _plain(found)  # type: ignore[no-any-return]
 
     return of_numbers
 

@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf, isfinite, nan, pi
 from typing import Any, Self
 
 
 def number(value: float | None) -> float:
     """A number of a result file; NaN where it holds null."""
-    return float("nan") if value is None else float(value)
+    return nan if value is None else float(value)
 
 
 @dataclass(frozen=True)
@@ -82,4 +83,23 @@ def chi_square_p_value(chi2: float, degrees_of_freedom: int) -> float:
     """
     from scipy.special import chdtrc
 
-    return float(chdtrc(degrees_of_freedom, chi2)) if degrees_of_freedom > 0 else float("nan")
+    return float(chdtrc(degrees_of_freedom, chi2)) if degrees_of_freedom > 0 else nan
+
+
+def quality_of_rate(frequency_hz: float, rate: Estimate) -> Estimate:
+    """Quality factor ``pi f/rate`` with the interval that the rate's interval gives.
+
+    The rate's errors are the symmetric ones; its inverse's are not, and where the rate
+    may be zero the quality factor has no upper bound.
+    """
+    if not rate.value > 0.0:
+        return Estimate(nan, nan, "", (nan, nan))
+    return over(pi * frequency_hz, rate)
+
+
+def over(number: float, estimate: Estimate, unit: str = "") -> Estimate:
+    """Divide a number by a positive estimate, with the interval that the estimate's gives."""
+    value = number / estimate.value
+    low, high = estimate.bounds95
+    ends = number / high if isfinite(high) else 0.0, number / low if low > 0.0 else inf
+    return Estimate(value, value * estimate.sd / estimate.value, unit, ends)

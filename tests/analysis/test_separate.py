@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pendpipe.analysis.separate import MeasuredRecord, fit_benchmark, quality_of_rate, separate
+from pendpipe.analysis.separate import MeasuredRecord, fit_benchmark, separate
 from pendpipe.errors import InputError
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Estimate, quality_of_rate
 from pendpipe.physics import without_hysteresis
 
 from .benchmark import known_benchmark

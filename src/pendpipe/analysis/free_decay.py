@@ -20,8 +20,7 @@ import numpy as np
 from pendpipe.analysis.half_cycles import HalfCycles, half_cycles, usual_half_period
 from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.find import find_turning_points
-from pendpipe.analysis.turning_points.table import Cut, TurningPoints
-from pendpipe.analysis.two_modes import BEAT, slow_amplitude, two_modes
+from pendpipe.analysis.turning_points.table import BEAT, Cut, TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.quantities import with_error
@@ -508,6 +507,8 @@ def _beating(
     if not np.max(smooth - np.minimum.accumulate(smooth)) > 0.2 * np.max(smooth):
         return None
     start, stop = float(cycles.turn_time_s[first]), float(cycles.turn_time_s[last + 1])
+    from pendpipe.analysis.two_modes import two_modes
+
     inside = (time >= start) & (time <= stop)
     usual = float(np.median(half))
     modes = two_modes(time[inside], values[inside], usual, may_be_one=not driven)
@@ -586,6 +587,8 @@ def _fall_of_all(time: FloatArray, values: FloatArray, middle: FloatArray) -> tu
 
     That of a straight line through the amplitudes of `_BLOCKS` parts, over the first.
     """
+    from pendpipe.analysis.two_modes import slow_amplitude
+
     phase = np.pi * np.interp(time, middle, np.arange(len(middle)))
     parts = np.searchsorted(time, np.linspace(middle[0], middle[-1], _BLOCKS + 1))
     amplitude = np.abs(slow_amplitude(phase, values, parts.tolist()))

@@ -7,13 +7,12 @@ through Q against f^2 would weigh the records by errors that grow with Q itself.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite, nan, pi
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.estimate import Estimate, chi_square_p_value
+from pendpipe.estimate import Estimate, chi_square_p_value, over, quality_of_rate
 from pendpipe.physics import hysteretic_quality_factor
 
 
@@ -78,25 +77,6 @@ class SeparatedRecord:
     viscous_rate_sd_own: float
     viscous_rate_per_inverse_k: float
     quality_factor_viscous: Estimate
-
-
-def quality_of_rate(frequency_hz: float, rate: Estimate) -> Estimate:
-    """Quality factor ``pi f/rate`` with the interval that the rate's interval gives.
-
-    The rate's errors are the symmetric ones; its inverse's are not, and where the rate
-    may be zero the quality factor has no upper bound.
-    """
-    if not rate.value > 0.0:
-        return Estimate(nan, nan, "", (nan, nan))
-    return over(pi * frequency_hz, rate)
-
-
-def over(number: float, estimate: Estimate, unit: str = "") -> Estimate:
-    """Divide a number by a positive estimate, with the interval that the estimate's gives."""
-    value = number / estimate.value
-    low, high = estimate.bounds95
-    ends = number / high if isfinite(high) else 0.0, number / low if low > 0.0 else inf
-    return Estimate(value, value * estimate.sd / estimate.value, unit, ends)
 
 
 @dataclass(frozen=True)

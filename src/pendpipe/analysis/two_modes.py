@@ -9,8 +9,6 @@ import numpy as np
 from pendpipe.arrays import AnyArray, FloatArray
 from pendpipe.estimate import Estimate
 
-BEAT: Final = "two modes beat"
-"""How a note begins that tells of them."""
 _WINDOWS: Final = 120
 _FEWEST: Final = 10
 """Windows, each of a period or more, that two modes need: they have eight numbers."""

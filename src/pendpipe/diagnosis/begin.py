@@ -10,9 +10,9 @@ import numpy as np
 from pendpipe.analysis.fit.by_points import held_values, start_of, swing_phase
 from pendpipe.analysis.fit.by_waveform import start_values, usable_span
 from pendpipe.analysis.fit.result import Baseline
-from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples
-from pendpipe.analysis.two_modes import BEAT, two_modes
+from pendpipe.analysis.two_modes import two_modes
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data, gather
 from pendpipe.diagnosis.unwrapped import anchored

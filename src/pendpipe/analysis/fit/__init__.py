@@ -12,10 +12,9 @@ from pendpipe.analysis.fit.by_points import fit_points, may_be_sine, restoring_o
 from pendpipe.analysis.fit.by_waveform import fit_waveform
 from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring, read_fit
-from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.find import turning_points_of
 from pendpipe.analysis.turning_points.samples import prepare
-from pendpipe.analysis.two_modes import BEAT
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.quantities import pretty_unit
 from pendpipe.recording import Recording

@@ -12,13 +12,11 @@ import numpy as np
 
 from pendpipe.analysis.fit.decrement import Decrement, Light, check_decrement, light_of, loss_of
 from pendpipe.analysis.fit.least_squares import CHI2_95
-from pendpipe.analysis.separate import quality_of_rate
-from pendpipe.analysis.turning_points import TurningPoints, write_turning_points
-from pendpipe.analysis.two_modes import BEAT
+from pendpipe.analysis.turning_points import BEAT, TurningPoints, write_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.estimate import Estimate, number
+from pendpipe.estimate import Estimate, number, quality_of_rate
 from pendpipe.files import make_folder, read_json, write_json
 from pendpipe.quantities import compact, with_error
 

@@ -2,9 +2,16 @@
 
 from pendpipe.analysis.turning_points.find import find_turning_points
 from pendpipe.analysis.turning_points.table import (
+    BEAT,
     TurningPoints,
     read_turning_points,
     write_turning_points,
 )
 
-__all__ = ["TurningPoints", "find_turning_points", "read_turning_points", "write_turning_points"]
+__all__ = [
+    "BEAT",
+    "TurningPoints",
+    "find_turning_points",
+    "read_turning_points",
+    "write_turning_points",
+]

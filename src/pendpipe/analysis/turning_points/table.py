@@ -34,6 +34,10 @@ _NUMBERS: Final = (
 )
 
 
+BEAT: Final = "two modes beat"
+"""How a note begins that tells of two modes."""
+
+
 class Cut(NamedTuple):
     """A span of the recording that was left out."""
 
