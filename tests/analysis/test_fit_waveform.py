@@ -11,8 +11,8 @@ import pytest
 
 from pendpipe import cli
 from pendpipe.analysis.fit import FitResult, fit_recording
+from pendpipe.analysis.fit.by_points import parse_fixed
 from pendpipe.analysis.fit.by_waveform import BOUNDS, Waveform, rounded, start_values
-from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.analysis.fit.least_squares import minimise
 from pendpipe.analysis.turning_points.find import turning_points_of
 from pendpipe.analysis.turning_points.samples import prepare

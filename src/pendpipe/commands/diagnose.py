@@ -12,7 +12,7 @@ Several FILEs are recordings of one pendulum: physics shared, start and noise ea
 from pathlib import Path
 from typing import Any, Final
 
-from pendpipe.analysis.fit.fixed import parse_fixed
+from pendpipe.analysis.fit.by_points import parse_fixed
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import (
     FILES,

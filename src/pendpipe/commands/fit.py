@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from pendpipe import api
-from pendpipe.analysis.fit.fixed import parse_fixed
+from pendpipe.analysis.fit.by_points import parse_fixed
 from pendpipe.analysis.fit.result import FitResult, gravity_line, lines, row, table
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import (

@@ -24,7 +24,7 @@ def run(arguments: Arguments) -> None:
 
     from pendpipe import api
     from pendpipe.files import write_whole
-    from pendpipe.report.recording import render_recording
+    from pendpipe.report.page import render_recording
 
     recording, provenance = read_motion(arguments)
     name = "standard input" if arguments.file == "-" else Path(arguments.file).name

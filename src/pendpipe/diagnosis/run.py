@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.fixed import check_fixed
+from pendpipe.analysis.fit.by_points import check_fixed
 from pendpipe.analysis.fit.result import Baseline, Restoring
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.samples import Samples, prepare

@@ -8,9 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import fit_points, may_be_sine, restoring_of
+from pendpipe.analysis.fit.by_points import check_fixed, fit_points, may_be_sine, restoring_of
 from pendpipe.analysis.fit.by_waveform import fit_waveform
-from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring, read_fit
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.find import turning_points_of
@@ -54,7 +53,7 @@ def fit_recording(
     baseline
         ``"eq8"``, or ``"viscous"`` for Eq. 3.
     fixed
-        Parameters that are held, by name (see `fixed.NAMES`).
+        Parameters that are held, by name (see `by_points.NAMES`).
     points
         Turning points found before; they are found here when they are not given.
     place

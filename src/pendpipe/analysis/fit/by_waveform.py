@@ -24,10 +24,10 @@ from pendpipe.analysis.fit.by_points import (
     clear,
     envelope_and_period,
     held_values,
+    loss_rates_of,
     period_excess,
     share_of,
 )
-from pendpipe.analysis.fit.fixed import loss_rates_of
 from pendpipe.analysis.fit.least_squares import (
     Bounds,
     Minimum,
