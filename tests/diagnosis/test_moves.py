@@ -17,11 +17,13 @@ from pendpipe.diagnosis import diagnose_recording, silent
 from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, lines
 from pendpipe.diagnosis.faults import Forensics
+from pendpipe.diagnosis.forensics import TESTS
 from pendpipe.diagnosis.location import off_harmonics
-from pendpipe.diagnosis.moves import FURTHER, describe, improve, price
+from pendpipe.diagnosis.moves import describe, improve
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import remainder_of
-from pendpipe.diagnosis.state import State, Step
+from pendpipe.diagnosis.result import Finding
+from pendpipe.diagnosis.state import CHOICE, FURTHER, State, Step, price
 from pendpipe.diagnosis.task import Task
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model
@@ -288,3 +290,21 @@ def test_a_rare_name_that_looks_like_nothing_that_was_found_is_no_rival() -> Non
     outcome = diagnosed("equilibrium-step")
     rare = {effect.identifier for effect in CATALOGUE if effect.rare}
     assert not rare & set.union(*classes_found(outcome))
+
+
+@pytest.mark.parametrize("names", [(), ("sensor-quadratic",)])
+@pytest.mark.parametrize("name", ["jitter", "broadband-drive", "clipping"])
+def test_a_random_cause_pays_the_price_of_a_name(
+    name: str, names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside one name more than beside none; a fault that shows by itself pays nothing."""
+    readings = with_effects(*names) + white(5)
+    state = state_with(readings, *names)
+    least = {"clipping": 0.0}.get(name, FURTHER if names else CHOICE)
+    forensics = task_for(recording(readings, 6)).forensics
+    for gain, told in ((least - 1.0, least == 0.0), (least + 1.0, True)):
+        finding = Finding(name, 1e-9, gain)
+        monkeypatch.setitem(TESTS, name, lambda *_, finding=finding: finding)
+        state.faults.clear()
+        forensics._examine(name, state, silent)
+        assert [fault.finding.identifier for fault in state.faults] == [name] * told

@@ -13,11 +13,10 @@ from itertools import combinations
 from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.detect import CATALOGUE_SHARE, RED_NOISE_SHARE, Trials, detect, prepare
 from pendpipe.diagnosis.evidence import SIZE_CHARGE, Rival
-from pendpipe.diagnosis.moves import FURTHER
 from pendpipe.diagnosis.refine import Fit, best_fit, refine
 from pendpipe.diagnosis.refits import refit_leads
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.state import State, settled
+from pendpipe.diagnosis.state import FURTHER, State, settled
 from pendpipe.effects import Effect
 
 

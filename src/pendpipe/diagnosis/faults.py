@@ -22,7 +22,14 @@ from pendpipe.diagnosis.noise import TAPS, white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import COLOURED_NOISE, Finding, Location
-from pendpipe.diagnosis.state import Fault, State, is_gross, loses_phase
+from pendpipe.diagnosis.state import (
+    Fault,
+    State,
+    is_further,
+    is_gross,
+    loses_phase,
+    price_of_another,
+)
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.estimate import Estimate
 
@@ -34,6 +41,8 @@ _TESTED_AFTER: Final = (
     "coloured-noise",
     "broadband-drive",
 )
+RANDOM: Final = ("jitter", "broadband-drive")
+"""Faults that count as names: a random cause can take what a wrong name leaves."""
 _SHARE_OF_EACH: Final = TESTS_SHARE / (len(_TESTED_BEFORE) + len(_TESTED_AFTER))
 _ROUNDS: Final = 3
 _FAR: Final = 8.0
@@ -110,7 +119,7 @@ class Forensics:
         """Make one test and keep its finding; return whether to repeat it."""
         finding, p_value = self._tested(name, state, test)
         known = next((each for each in state.faults if each.finding.identifier == name), None)
-        if finding.kind != "fault":
+        if finding.kind != "fault" or not _pays(finding, state):
             return False
         if p_value > self.level:
             if known is None:
@@ -273,6 +282,15 @@ class Forensics:
         progress(f"{name}: {finding.summary}")
         state.faults.append(Fault(finding, p_value, len(state.steps)))
         return True
+
+
+def _pays(finding: Finding, state: State) -> bool:
+    """Whether a random cause gains the price of a further name; other faults have none."""
+    if finding.identifier not in RANDOM:
+        return True
+    names = sum(map(is_further, state.steps))
+    names += sum(fault.finding.identifier in RANDOM for fault in state.faults)
+    return finding.delta_chi2 > price_of_another(names)
 
 
 def _global(finding: Finding) -> float:

@@ -22,17 +22,12 @@ from pendpipe.diagnosis.location import off_harmonics
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.scores import build_bank
-from pendpipe.diagnosis.state import State, Step
+from pendpipe.diagnosis.state import CHOICE, State, Step, is_further, price, price_of_another
 from pendpipe.diagnosis.task import Task, undrawn
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
 
-CHOICE: Final = 7.4
-"""Price of a name or curve beside a remaining misfit: it is one of some forty (2 ln 40)."""
-FURTHER: Final = 22.0
-"""Price of each further name: a choice, in a recording that needs two at once, which is as rare
-again as two choices."""
 _LOST_AT_KNOTS: Final = 0.012
 """Part of a curve's gain lost between its knots, where it is straight: h^2 F''/12 at the knots of
 `effects.curves`; it is credited, as far as the names leave as much, where only noise is left."""
@@ -48,22 +43,6 @@ class Proposed(NamedTuple):
     steps: tuple[Step, ...]
     words: str = ""
     credit: float = 0.0
-
-
-def price(steps: Sequence[Step]) -> float:
-    """Return the charges of a set of effects, with the price of each further name."""
-    return _chosen(sum(map(is_further, steps))) + sum(step.winner.charge for step in steps)
-
-
-def _chosen(names: int) -> float:
-    return CHOICE * min(names, 1) + FURTHER * max(names - 1, 0)
-
-
-def is_further(step: Step) -> bool:
-    """Whether it is a name with a price: no curve, and nothing that is there anyway."""
-    effect = step.winner.lead.effect
-    known = effect.expected or effect.parameter_free or isinstance(effect, ReleasedParameter)
-    return not (known or effect.kind == "unnamed")
 
 
 def improve(state: State, progress: Progress, rare: Sequence[Effect] = ()) -> None:
@@ -226,9 +205,8 @@ def prefer_rare(state: State, rivals: Sequence[Rival], task: Task) -> list[Rival
         each.again(each.fit, before.chi2, scale) for each in rivals if not each.lead.effect.rare
     ]
     named = ranked([_rival(before, fit, scale) for fit in fits])
-    names = sum(map(is_further, state.steps))
-    price = _chosen(names + 1) - _chosen(names) if leader.drawn else 0.0
-    if named[0].evidence - price <= others[0].evidence:
+    added = price_of_another(sum(map(is_further, state.steps))) if leader.drawn else 0.0
+    if named[0].evidence - added <= others[0].evidence:
         return list(rivals)
     return [named[0], *others, *named[1:]]
 

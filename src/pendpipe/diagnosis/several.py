@@ -23,7 +23,6 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.evidence import Scale
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.held_out import held_out
-from pendpipe.diagnosis.moves import price
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
@@ -38,7 +37,7 @@ from pendpipe.diagnosis.result import (
 from pendpipe.diagnosis.run import LEVEL, Outcome, diagnose_recording
 from pendpipe.diagnosis.search import LESS_FRICTION, Search, grown
 from pendpipe.diagnosis.stacked import StackedData, StackedNoise
-from pendpipe.diagnosis.state import State, Step, loses_phase
+from pendpipe.diagnosis.state import State, Step, loses_phase, price
 from pendpipe.diagnosis.statement import DOUBTFUL, listed, statement
 from pendpipe.diagnosis.task import Task
 from pendpipe.diagnosis.values import constants_of

@@ -14,10 +14,16 @@ from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise
 from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import INCOMPLETE
 from pendpipe.diagnosis.result import Finding
 from pendpipe.effects.baseline import OMEGA
 
+CHOICE: Final = 7.4
+"""Price of a name or curve beside a remaining misfit: it is one of some forty (2 ln 40)."""
+FURTHER: Final = 22.0
+"""Price of each further name: a choice, in a recording that needs two at once, which is as rare
+again as two choices."""
 GROSS: Final = 2.0
 """chi^2 per degree of freedom above which first-order scores are meaningless."""
 _ESTIMATE_AGAIN: Final = 0.95
@@ -49,6 +55,24 @@ class Step:
     def winner(self) -> Rival:
         """The effect that was added."""
         return self.rivals[0]
+
+
+def price(steps: Sequence[Step]) -> float:
+    """Return the charges of a set of effects, with the price of each name."""
+    names = sum(map(is_further, steps))
+    return sum(map(price_of_another, range(names))) + sum(step.winner.charge for step in steps)
+
+
+def price_of_another(names: int) -> float:
+    """Return the price of a name beside others."""
+    return FURTHER if names else CHOICE
+
+
+def is_further(step: Step) -> bool:
+    """Whether it is a name with a price: no curve, and nothing that is there anyway."""
+    effect = step.winner.lead.effect
+    known = effect.expected or effect.parameter_free or isinstance(effect, ReleasedParameter)
+    return not (known or effect.kind == "unnamed")
 
 
 @dataclass(frozen=True)

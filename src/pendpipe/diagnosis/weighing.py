@@ -12,17 +12,17 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.evidence import Rival, Scale, class_width, of_one_class, probabilities
+from pendpipe.diagnosis.faults import RANDOM
 from pendpipe.diagnosis.gauss_newton import SETTLED
 from pendpipe.diagnosis.instants import with_instants
 from pendpipe.diagnosis.location import locate, near_harmonic_by_chance, off_harmonics
-from pendpipe.diagnosis.moves import is_further
 from pendpipe.diagnosis.refine import Fit, best_fit, misfit
 from pendpipe.diagnosis.refits import NEAR, useful_chi2
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
 from pendpipe.diagnosis.result import FoundEffect
 from pendpipe.diagnosis.search import Search
-from pendpipe.diagnosis.state import Fault, Step, is_gross
+from pendpipe.diagnosis.state import Fault, Step, is_further, is_gross
 from pendpipe.diagnosis.values import curve_values, effect_parameters
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
@@ -36,9 +36,7 @@ _OF_A_FURTHER_NAME: Final = 2.2
 names were right, 76 % of those beside another, 45 % of those beside two."""
 _LISTED_FROM: Final = 0.05
 """Probability from which an unnamed curve is listed among the rivals."""
-_RANDOM: Final = ("jitter", "broadband-drive")
-"""Faults that count as names: a random cause can take what a wrong name leaves."""
-_SEEN_IN_RESIDUAL: Final = (*_RANDOM, "coloured-noise")
+_SEEN_IN_RESIDUAL: Final = (*RANDOM, "coloured-noise")
 """Faults detected in a residual: the misfit of a curve can look like any of them."""
 _LIKELIER: Final = 1.5
 """Ratio of probabilities from which another effect replaces the one that was added."""
@@ -209,7 +207,7 @@ def fault_named(found: Search, fault: Fault, weighed: Sequence[Weighed]) -> Foun
     each = 1.0 / (1.0 + len(finding.also) + doubt)
     if finding.identifier in _SEEN_IN_RESIDUAL:
         each *= _explained(found, effect, finding.delta_chi2)
-    if finding.identifier in _RANDOM:
+    if finding.identifier in RANDOM:
         names = zip(found.steps, weighed, strict=True)
         none = [float(name.weights[-1]) for step, name in names if not step.winner.drawn]
         each *= 1.0 - max(none, default=0.0)
@@ -240,7 +238,7 @@ def _charge_for_several(found: Search) -> float:
     Together they leave only noise more easily than one does by itself.
     """
     names = sum(map(is_further, found.steps))
-    names += sum(fault.finding.identifier in _RANDOM for fault in found.faults)
+    names += sum(fault.finding.identifier in RANDOM for fault in found.faults)
     alone = 1 if found.unexplained > 0.01 else 2
     return _OF_A_FURTHER_NAME * max(names - alone, 0)
 
