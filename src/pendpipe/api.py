@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from pendpipe.errors import refuse_if
 from pendpipe.recording import Recording
@@ -301,6 +301,7 @@ def diagnose(
     *,
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
+    restoring: Literal["linear"] | None = None,
     level: float = 0.01,
     seed: int = 0,
     volts_per_radian: float | None = None,
@@ -323,6 +324,8 @@ def diagnose(
         The null model: ``"eq8"``, or ``"viscous"`` for Eq. 3.
     fixed
         Parameters to hold, by name, so that a prediction is compared with the recording.
+    restoring
+        ``"linear"`` for a torsion wheel or a mass on a spring: sin x is no candidate.
     level
         Significance level: how often a recording that lacks nothing may be reported.
     seed
@@ -359,6 +362,7 @@ def diagnose(
         from pendpipe.files import distinct_names
 
         refuse_if(fixed, "fixed", "nothing is held in several recordings", "leave it out")
+        refuse_if(restoring, "restoring", "it is for one recording", "leave it out")
         if not isinstance(recording, Mapping):
             files = [
                 f"recording {number}" if isinstance(each, Recording) else each
@@ -381,6 +385,7 @@ def diagnose(
         baseline=baseline,
         fixed=fixed or {},
         level=level,
+        linear=restoring == "linear",
         seed=seed,
         place=name or _place(recording),
     )

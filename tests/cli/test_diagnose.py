@@ -147,6 +147,20 @@ def test_a_recording_that_equation_8_describes_is_consistent(
     assert "scanning" in said.err
 
 
+def test_sin_x_is_no_candidate_for_what_gravity_does_not_restore(
+    sine: Path, tmp_path: Path
+) -> None:
+    """A torsion wheel may soften as much; its torque is then cubic, or has no name."""
+    words = ["--out", str(tmp_path), "--no-figures", "--restoring", "linear"]
+    assert cli.main(["diagnose", str(sine), *words]) == 0
+    content = diagnosis(tmp_path)
+    assert content["provenance"]["restoring"] == "linear"
+    names = {effect["id"] for effect in content["effects"]}
+    rivals = {rival["id"] for e in content["effects"] for rival in e["indistinguishable_from"]}
+    assert names
+    assert "circular-error" not in names | rivals
+
+
 def test_circular_error_is_named_and_the_fit_improves_to_the_noise(
     sine: Path, tmp_path: Path
 ) -> None:

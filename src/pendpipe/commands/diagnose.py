@@ -67,6 +67,11 @@ _OWN: Final[Flags] = {
         "const": "none",
         "help": "as --figures none",
     },
+    "--restoring": {
+        "choices": ("auto", "linear"),
+        "default": "auto",
+        "help": "linear: a torsion wheel or a spring, for which sin x is no candidate",
+    },
     "--own": {
         "action": "append",
         "default": [],
@@ -131,6 +136,7 @@ def _diagnose(arguments: Arguments, fixed: dict[str, float]) -> int:
     if earlier:
         return _not_analysable(arguments, earlier, {})
     provenance: dict[str, Any] = {"seed": arguments.seed, "fixed": list(arguments.fix)}
+    provenance["restoring"] = arguments.restoring
     try:
         recording, made = read_motion(arguments)
         provenance = made | provenance | {"level": arguments.level}
@@ -150,9 +156,14 @@ def _diagnose_several(arguments: Arguments) -> int:
     """Diagnose recordings of one pendulum together."""
     from pendpipe.diagnosis.several import diagnose_several
 
-    for single in ("fix", "turning_points", "record"):
+    for single in ("fix", "turning_points", "record", "restoring"):
         option, given = f"--{single.replace('_', '-')}", getattr(arguments, single)
-        refuse_if(given, option, "it is for one recording", "give one FILE, or leave it out")
+        refuse_if(
+            given not in (None, [], "auto"),
+            option,
+            "it is for one recording",
+            "give one FILE, or leave it out",
+        )
     recordings, made, given = {}, [], arguments.calibration
     refuse_if(
         len(given) not in (0, 1, len(arguments.files)),
@@ -194,6 +205,7 @@ def _outcome(arguments: Arguments, recording: Recording, **more: Any) -> Outcome
         "baseline": arguments.baseline,
         "seed": arguments.seed,
         "level": arguments.level,
+        "linear": arguments.restoring == "linear",
         "place": arguments.file,
         "progress": _print_progress,
     }

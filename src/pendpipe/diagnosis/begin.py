@@ -75,10 +75,11 @@ def begin(
     baseline: Baseline,
     fixed: Mapping[str, float],
     stated: bool = True,
+    linear: bool = False,
 ) -> Beginning:
     """Choose the readings that are compared, and the start values of the search.
 
-    `stated` is whether it is known that the readings are angles.
+    `stated` is whether it is known that the readings are angles; `linear`, that there is no sin x.
     """
     held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
     start = start_values(points, held_rates, fixed, baseline)
@@ -92,7 +93,7 @@ def begin(
         span = slice(None)
         value, second = _modes_start(samples, value)
         known = BEATING_MODE, np.append(value, second)
-    elif not fixed and samples.unit in ("rad", "rad/s"):
+    elif not (fixed or linear) and samples.unit in ("rad", "rad/s"):
         laws = start_of(points if samples.unit == "rad" else _of_the_angle(points), stated=stated)
         if laws.sine and laws.favoured == "sine" and laws.linear.slip_rad > LARGE_PHASE_ERROR:
             # Both laws begin at the first turning point, so that they count the same half cycles.

@@ -151,6 +151,7 @@ def diagnose_recording(
     fixed: Mapping[str, float] | None = None,
     seed: int = 0,
     level: float = LEVEL,
+    linear: bool = False,
     place: str | Path = "recording",
     provenance: Mapping[str, Any] | None = None,
     progress: Progress = silent,
@@ -169,6 +170,9 @@ def diagnose_recording(
         Of the random draws that count the trials of the scans.
     level
         The false-alarm probability: an effect is reported where the global p-value is below it.
+    linear
+        Whether it is known that gravity does not restore it (a torsion wheel, a mass on a spring):
+        then sin x is no candidate.
     place
         Named in error messages.
     provenance
@@ -195,6 +199,7 @@ def diagnose_recording(
         fixed=fixed,
         seed=seed,
         level=level,
+        linear=linear,
         place=place,
         provenance=provenance,
         progress=progress,
@@ -212,6 +217,7 @@ def diagnose_decay(
     fixed: Mapping[str, float] | None = None,
     seed: int = 0,
     level: float = LEVEL,
+    linear: bool = False,
     place: str | Path = "recording",
     provenance: Mapping[str, Any] | None = None,
     progress: Progress = silent,
@@ -223,7 +229,7 @@ def diagnose_decay(
     ----------
     part, points
         The free decay, and its turning points.
-    baseline, fixed, seed, level, place, provenance, progress
+    baseline, fixed, seed, level, linear, place, provenance, progress
         As for `diagnose_recording`.
     whole
         The recording that the decay was cut from; only its time stamps are used.
@@ -233,13 +239,31 @@ def diagnose_decay(
     InputError
         If a parameter can't be held, or the decay can't be analysed.
     """
+    from pendpipe.effects.catalogue import CATALOGUE
+
     fixed = fixed or {}
     check_fixed(fixed, baseline)
     samples = with_true_step(prepare(part, place))
     try:
-        found, weighed, beginning = _searched(
-            samples, points, baseline, fixed, part.unit_is_stated, level, seed, progress
+        beginning = begin(
+            samples,
+            points,
+            baseline=baseline,
+            fixed=fixed,
+            stated=part.unit_is_stated,
+            linear=linear,
         )
+        found = search(
+            beginning,
+            samples,
+            [effect for effect in CATALOGUE if not (linear and effect.identifier == SINE)],
+            baseline=baseline,
+            level=level,
+            seed=seed,
+            released=[ReleasedParameter(name) for name in fixed],
+            progress=progress,
+        )
+        found, weighed = swap_in_likelier(found, beginning, progress)
     except NoMotionError as error:
         remedy = "cut it with --start and --stop, or change what is held with --fix"
         raise NotAnalysableError(place, f"the model can't follow it ({error})", remedy) from error
@@ -295,32 +319,6 @@ def diagnose_decay(
         provenance=dict(provenance or {}),
     )
     return Outcome(diagnosis, found, beginning)
-
-
-def _searched(
-    samples: Samples,
-    points: TurningPoints,
-    baseline: Baseline,
-    fixed: Mapping[str, float],
-    stated: bool,
-    level: float,
-    seed: int,
-    progress: Progress,
-) -> tuple[Search, tuple[Weighed, ...], Beginning]:
-    from pendpipe.effects.catalogue import CATALOGUE
-
-    beginning = begin(samples, points, baseline=baseline, fixed=fixed, stated=stated)
-    found = search(
-        beginning,
-        samples,
-        CATALOGUE,
-        baseline=baseline,
-        level=level,
-        seed=seed,
-        released=[ReleasedParameter(name) for name in fixed],
-        progress=progress,
-    )
-    return *swap_in_likelier(found, beginning, progress), beginning
 
 
 def _in_order(

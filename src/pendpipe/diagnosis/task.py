@@ -11,7 +11,7 @@ from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.state import State
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.reading import SoftClipping
-from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN
+from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN, circular_error
 from pendpipe.effects.curves import CURVES, Curve
 
 
@@ -42,7 +42,9 @@ def applicable(
     if rare:
         return list(fit.model.admitted(named))
     keys = {effect.key for effect in fit.model.effects}
-    forms = SoftClipping(), CIRCULAR_ERROR_IN.get(unit)
+    forms: list[Effect | None] = [SoftClipping()]
+    if any(effect.identifier == circular_error.identifier for effect in catalogue):
+        forms.append(CIRCULAR_ERROR_IN.get(unit))
     named += [form for form in forms if form and form.key not in keys]
     return [*fit.model.admitted(named), *undrawn(CURVES, fit)]
 
