@@ -151,7 +151,11 @@ def table(folder: Path, *rows: str, header: str = "\t".join(COLUMNS)) -> Path:
         (["x\tsimulated\t1"], "record\tsource\tfuid", "did you mean 'fluid'?"),
         (["a b\tsimulated"], "record\tsource", "no name for a folder"),
         (["x\tsimulated", "X\tsimulated"], "record\tsource", "stands twice"),
-        (["x\tfile.csv\tnine"], "record\tsource\tstart_s", "start_s 'nine' is no number"),
+        (
+            ["x\tfile.csv\tnine"],
+            "record\tsource\tstart_s",
+            "line 2, start_s: input should be a valid number",
+        ),
         (["figures\tsimulated"], "record\tsource", "of its own"),
         (["campaign.json\tsimulated"], "record\tsource", "of its own"),
         (["CON\tsimulated"], "record\tsource", "Windows keeps the name"),

@@ -7,7 +7,6 @@ name.
 import csv
 import difflib
 import json
-import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -15,9 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic.dataclasses import dataclass as checked
 
-from pendpipe.configuration.models import Configuration, Geometry
+from pendpipe.configuration.models import Configuration, Geometry, Section
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import read_json
 
@@ -35,7 +35,6 @@ COLUMNS: Final = (
     "order",
     "pendulum",
 )
-_NUMBERS: Final = ("start_s", "stop_s", "volts_per_radian", "temperature_c", "order")
 REQUIRED: Final = ("record", "source")
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 LONGEST_NAME: Final = 100
@@ -49,7 +48,7 @@ _OF_THE_CAMPAIGN: Final = (
 """What stands beside the records' folders."""
 
 
-@dataclass(frozen=True)
+@checked(frozen=True, config=ConfigDict(allow_inf_nan=False))
 class Record:
     """A row of the table; what is blank is ``None`` (or ``""`` for the words).
 
@@ -148,9 +147,11 @@ def _record(where: str, row: dict[str, str]) -> Record:
     )
     if row.get("pendulum"):
         _check_name(where, row["pendulum"])
-    cells: dict[str, Any] = {name: row.get(name, "") for name in COLUMNS if name not in _NUMBERS}
-    cells |= {name: _number(where, row, name) for name in _NUMBERS}
-    return Record(**cells)
+    cells: dict[str, Any] = {name: text for name, text in row.items() if text}
+    try:
+        return Record(**cells)
+    except ValidationError as fault:
+        raise as_input_error(where, fault) from None
 
 
 def _check_name(where: str, name: str) -> None:
@@ -178,22 +179,6 @@ def _check_name(where: str, name: str) -> None:
         ),
     ):
         refuse_if(wrong, where, problem, remedy)
-
-
-def _number(where: str, row: dict[str, str], name: str) -> float | None:
-    """Read a cell that holds a number or nothing."""
-    text = row.get(name, "")
-    try:
-        value = float(text) if text else None
-    except ValueError:
-        raise InputError(where, f"{name} '{text}' is no number", "fix or blank the cell") from None
-    refuse_if(
-        value is not None and not math.isfinite(value),
-        where,
-        f"{name} is not finite",
-        "fix or blank the cell",
-    )
-    return value
 
 
 _NOT_IN_A_FOLDER: Final = frozenset("{}*?[]\"'`$;&|<>!#%^\x7f")
@@ -390,7 +375,9 @@ def nearest(name: str, known: Iterable[str]) -> str:
     return f"did you mean '{close[0]}'?" if close else f"known are {', '.join(names) or 'none'}"
 
 
-def as_input_error(place: str | Path, fault: ValidationError, model: type[BaseModel]) -> InputError:
+def as_input_error(
+    place: str | Path, fault: ValidationError, model: type[BaseModel] = Section
+) -> InputError:
     """Turn what pydantic found into one line: a misspelt key before the one it leaves missing."""
     first = min(fault.errors(), key=lambda entry: entry["type"] != "extra_forbidden")
     path = [str(part) for part in first["loc"]]
