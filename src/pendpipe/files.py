@@ -133,7 +133,7 @@ def read_json(path: str | Path) -> Any:
     """
     place = Path(path)
     try:
-        return json.loads(place.read_text(encoding="utf-8"))
+        return json.loads(place.read_bytes())
     except FileNotFoundError:
         raise InputError(place, "there is no such file", "run the stage that makes it") from None
     except OSError as fault:
@@ -141,6 +141,23 @@ def read_json(path: str | Path) -> Any:
     except (ValueError, RecursionError) as fault:
         problem = f"this is no JSON ({fault})" if place.stat().st_size else "it is empty"
         raise DamagedError(place, problem, "delete it and run again") from None
+
+
+def read_text(path: str | Path, remedy: str, *, absent: str = "file", form: str = "a table") -> str:
+    """Read a text file: UTF-8, with a byte-order mark or without.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it is no text.
+    """
+    try:
+        return Path(path).read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(path, f"there is no such {absent}", remedy) from None
+    except (OSError, UnicodeDecodeError) as fault:
+        reason = getattr(fault, "strerror", fault)
+        raise InputError(path, f"it can't be read ({reason})", f"give {form} in UTF-8") from None
 
 
 def digest(content: Any) -> str:

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from pendpipe.arrays import BoolArray, ByteArray, FloatArray
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.files import replaced
+from pendpipe.files import read_text, replaced
 
 Quantity = Literal["angle_rad", "volts", "displacement_m", "reading"]
 QUANTITIES: Final = ("angle_rad", "volts", "displacement_m", "reading")
@@ -346,9 +346,7 @@ def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
     """
     place = Path(path)
     try:
-        text = (place.read_bytes() if data is None else data).decode("utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(place, "there is no such file", "check the path") from None
+        text = read_text(place, "check the path") if data is None else data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(place, "this is no UTF-8 text", "run pendpipe convert first") from None
     lines, notes = whole_lines(text)

@@ -17,6 +17,7 @@ from scipy.special import fdtrc, stdtrit
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Estimate, chi_square_p_value
+from pendpipe.files import read_text
 
 ANGLES: Final = ("angle_rad", "angle_deg", "displacement_m")
 _LARGEST: Final = 1e6
@@ -81,12 +82,7 @@ def read_caliper_table(
 
 def _columns(place: Path, delimiter: str | None, decimal: str | None) -> dict[str, FloatArray]:
     """Read the named columns of numbers; columns that this module does not use may be text."""
-    try:
-        text = place.read_text(encoding="utf-8-sig")
-    except OSError:
-        raise InputError(place, "the table can't be read", "check the path") from None
-    except UnicodeDecodeError:
-        raise InputError(place, "this is no UTF-8 text", "save the table as CSV") from None
+    text = read_text(place, "check the path", absent="table")
     lines = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)

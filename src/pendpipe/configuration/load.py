@@ -19,7 +19,7 @@ from pydantic.dataclasses import dataclass as checked
 
 from pendpipe.configuration.models import Configuration, Geometry, Section
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.files import read_json
+from pendpipe.files import read_json, read_text
 
 COLUMNS: Final = (
     "record",
@@ -104,7 +104,7 @@ def read_records(path: str | Path) -> list[Record]:
         where a number belongs: file, line, what, remedy.
     """
     place = Path(path)
-    text = read_text(place, "table", "see config/README.md", "a table")
+    text = read_text(place, "see config/README.md", absent="table")
     rows = [
         (number, line)
         for number, line in enumerate(text.splitlines(), start=1)
@@ -211,7 +211,7 @@ class Campaign:
 def read_configuration(path: str | Path) -> dict[str, Any]:
     """Read a configuration file, YAML or JSON, unchecked."""
     place = Path(path)
-    text = read_text(place, "configuration", "see config/README.md", "YAML")
+    text = read_text(place, "see config/README.md", absent="configuration", form="YAML")
     content = read_json(place) if place.suffix == ".json" else _yaml(place, text)
     refuse_if(
         not isinstance(content, dict),
@@ -348,23 +348,6 @@ def _check_geometries(configuration: Configuration, place: str | Path) -> None:
             "the apparatus has no sphere",
             "add it, or set sphere: false",
         )
-
-
-def read_text(path: Path, absent: str, remedy: str, form: str) -> str:
-    """Read a file that the user has written.
-
-    Raises
-    ------
-    InputError
-        If there is none, or it is no text.
-    """
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(path, f"there is no such {absent}", remedy) from None
-    except (OSError, UnicodeDecodeError) as fault:
-        reason = getattr(fault, "strerror", fault)
-        raise InputError(path, f"it can't be read ({reason})", f"give {form} in UTF-8") from None
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from pendpipe.arrays import FloatArray
-from pendpipe.configuration.load import as_input_error, nearest, read_text
+from pendpipe.configuration.load import as_input_error, nearest
 from pendpipe.configuration.models import NotNegative, Positive, Section, Sensor
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.any_law import Motion, NoMotionError
@@ -25,6 +25,7 @@ from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.effect import Effect, Parameter
 from pendpipe.effects.model import Model as EffectsModel
 from pendpipe.errors import InputError, refuse_if
+from pendpipe.files import read_text
 from pendpipe.recording import Recording
 
 
@@ -109,7 +110,7 @@ def read_model(source: str | Path | Mapping[str, Any]) -> Model:
     place = "model" if isinstance(source, Mapping) else Path(source)
     try:
         content = (
-            tomllib.loads(read_text(place, "file", "check the path", "TOML"))
+            tomllib.loads(read_text(place, "check the path", form="TOML"))
             if isinstance(place, Path)
             else source
         )

@@ -163,14 +163,9 @@ class Waveform:
     def model(self, value: FloatArray) -> tuple[Eq8, Release]:
         """What moves, and from where, for a set of parameters."""
         a, b, c, share, omega, angle, time, offset = value.tolist()
-        hysteretic, viscous = share * b, (1.0 - share) * b
-        if "hysteretic" in self.split:
-            hysteretic = min(self.split["hysteretic"], b)
-            viscous = b - hysteretic
-        elif "viscous" in self.split:
-            viscous = min(self.split["viscous"], b)
-            hysteretic = b - viscous
-        law = Eq8(omega, a, hysteretic, viscous, c, self.restoring)
+        told = share_of(self.split, b, "eq8")
+        share = share if told is None else told
+        law = Eq8(omega, a, share * b, (1.0 - share) * b, c, self.restoring)
         return law, Release(time, angle, offset)
 
     def residual(self, value: FloatArray) -> FloatArray:

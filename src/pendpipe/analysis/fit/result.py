@@ -218,8 +218,7 @@ class FitResult:
             "decrement_check": [check._asdict() for check in self.decrement_check],
             "parameters": {name: self.parameters[name].as_json() for name in PARAMETERS},
             "quality_factor_limit": limit.as_json(),
-            "quality_factor_hysteretic": _optional(self.quality_factor_hysteretic),
-            "quality_factor_viscous": _optional(self.quality_factor_viscous),
+            **{name: getattr(self, name) and getattr(self, name).as_json() for name in PARTS},
             "covariance": {
                 "order": list(self.covariance_order),
                 "matrix": self.covariance.tolist(),
@@ -239,6 +238,9 @@ class FitResult:
         """Rebuild a result from the content of ``fit.json``."""
         limit = content["quality_factor_limit"]
         covariance = content["covariance"]
+        held: dict[str, Any] = {
+            name: content[name] and Estimate.from_json(content[name]) for name in PARTS
+        }
         return cls(
             method=content["method"],
             baseline=content["baseline"],
@@ -253,8 +255,6 @@ class FitResult:
             chi2_per_dof=number(content["chi2_per_dof"]),
             samples=content["samples"],
             turning_points=content["turning_points"],
-            quality_factor_hysteretic=_maybe(content["quality_factor_hysteretic"]),
-            quality_factor_viscous=_maybe(content["quality_factor_viscous"]),
             cuts=tuple(content["cuts"]),
             provenance=content["provenance"],
             warnings=tuple(content["warnings"]),
@@ -262,6 +262,7 @@ class FitResult:
             light=content["light"],
             light_reason=content["light_reason"],
             decrement_check=tuple(Decrement(**check) for check in content["decrement_check"]),
+            **held,
         )
 
 
@@ -386,14 +387,6 @@ def read_fit(path: str | Path) -> FitResult:
         return FitResult.from_json(content)
     except (KeyError, TypeError) as fault:
         raise InputError(path, f"this is no fit ({fault})", "run pendpipe fit") from None
-
-
-def _optional(estimate: Estimate | None) -> dict[str, Any] | None:
-    return None if estimate is None else estimate.as_json()
-
-
-def _maybe(entry: Mapping[str, Any] | None) -> Estimate | None:
-    return None if entry is None else Estimate.from_json(entry)
 
 
 LOSSES: Final = {

@@ -13,7 +13,7 @@ import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.files import replaced
+from pendpipe.files import read_text, replaced
 from pendpipe.recording import whole_lines
 
 COLUMNS: Final = (
@@ -169,10 +169,7 @@ def read_turning_points(path: str | Path) -> TurningPoints:
         If the file is absent, is no table of turning points, or was refused.
     """
     place = Path(path)
-    try:
-        lines, cut_short = whole_lines(place.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(place, "there is no such file", "run pendpipe turning-points") from None
+    lines, cut_short = whole_lines(read_text(place, "run pendpipe turning-points"))
     start = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
     head = [tuple(line.lstrip("# ").split(": ", 1)) for line in lines[:start] if ": " in line]
     metadata = {key: value for key, value in head if key not in ("cut", "note")}
