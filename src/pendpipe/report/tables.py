@@ -392,37 +392,22 @@ def _typical(comparison: Comparison) -> Iterator[Row | None]:
     entry = typical_record(comparison)
     if entry is None:
         return
-    frequency = number(entry["frequency"])
-    name = f"{entry['record']} ({frequency:.3f} Hz)"
-    estimates = {
-        "Limit of Q for a = c = 0": ("quality_factor_limit", "limit"),
-        "Hysteretic Q = k f²": ("quality_factor_hysteretic", "hysteretic"),
-        "Viscous Q measured, Eq. 17": ("quality_factor_viscous", "viscous"),
-        "Viscous Q of Eq. 16": ("quality_factor_viscous_theory", "viscous_theory"),
-        "Moment of inertia, from distances": ("moment_of_inertia", "inertia"),
+    frequency, rates = number(entry["frequency"]), [number(entry.get(key)) for key in "abc"]
+    first = physics.quality_factor(number(entry.get("amplitude")), frequency, *rates)
+    found = {
+        "Limit of Q for a = c = 0": (entry.get("quality_factor_limit"), "limit"),
+        "Hysteretic Q = k f²": (entry.get("quality_factor_hysteretic"), "hysteretic"),
+        "Viscous Q measured, Eq. 17": (entry.get("quality_factor_viscous"), "viscous"),
+        "Viscous Q of Eq. 16": (entry.get("quality_factor_viscous_theory"), "viscous_theory"),
+        "Moment of inertia, from distances": (entry.get("moment_of_inertia"), "inertia"),
+        "1 + a/δ of Eq. 2": (1.0 + number(entry.get("a_over_delta")), ""),
+        "Largest Q in the decay": (physics.largest_quality_factor(frequency, *rates), "largest"),
+        "Q at the first turning point": (first, "first"),
     }
-    rows = [
-        _row(f"{name}: {text}", entry.get(quantity), key)
-        for text, (quantity, key) in estimates.items()
-    ]
-    if entry.get("a_over_delta"):
-        ratio = number(entry["a_over_delta"])
-        rows.append(Row(f"{name}: 1 + a/δ of Eq. 2", f"{1.0 + ratio:.1f}"))
-    rates = [number(entry.get(key)) for key in "abc"]
-    if all(map(math.isfinite, rates)):
-        largest = float(physics.largest_quality_factor(frequency, *rates))
-        first = float(physics.quality_factor(number(entry["amplitude"]), frequency, *rates))
-        found = {
-            "Largest Q in the decay": (largest, "largest"),
-            "Q at the first turning point": (first, "first"),
-        }
-        rows += [
-            Row(f"{name}: {text}", f"{value:.1f}", NUMBERS[key].text, _percent(value, NUMBERS[key]))
-            for text, (value, key) in found.items()
-        ]
     # The paper's numbers are those of one frequency; they say nothing about another.
     same = abs(frequency / TYPICAL_FREQUENCY_HZ - 1.0) < 0.01
-    for row in rows:
+    for text, (value, key) in found.items():
+        row = _row(f"{entry['record']} ({frequency:.3f} Hz): {text}", value, key)
         yield row if row is None or same else row._replace(paper="", difference="")
 
 
@@ -432,7 +417,7 @@ def _extremes(comparison: Comparison) -> Iterator[Row | None]:
         value for entry in wet if math.isfinite(value := number(entry.get("quality_factor_limit")))
     ]
     if limits:
-        yield Row("Smallest limiting Q in water", f"{min(limits):.1f}", NUMBERS["smallest"].text)
+        yield _row("Smallest limiting Q in water", min(limits), "smallest")
     if wet:
         ratios = [number(entry["a_over_delta"]) for entry in wet]
         yield Row(
