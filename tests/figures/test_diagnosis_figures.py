@@ -145,9 +145,8 @@ def test_the_spectrum_of_a_tone_stands_at_its_frequency(content: Shown) -> None:
 
 def test_what_has_nothing_to_show_is_not_drawn(outcome: Any, tmp_path: Path) -> None:
     content = shown(outcome)
-    for draw in (diagnosis.draw_curve, diagnosis.draw_codes):
-        with pytest.raises(NothingToDrawError):
-            draw(content)
+    with pytest.raises(NothingToDrawError):
+        diagnosis.draw_curve(content)
     drawn = draw_diagnosis(outcome, tmp_path)
     assert [path.stem for path in drawn] == [
         "decay",
@@ -193,45 +192,6 @@ def test_a_loss_has_its_local_exponent_below(outcome: Any) -> None:
     _, lower = diagnosis.draw_curve(named(outcome, found)).axes
     assert lower.lines[0].get_ydata() == pytest.approx(1.5)
     assert "exponent" in lower.get_ylabel()
-
-
-def test_codes_are_counted_where_they_matter(outcome: Any) -> None:
-    content = shown(outcome)
-    step = 5e-3
-    values = step * np.round(content.data.values / step)
-    clipped = np.minimum(values, 20 * step)
-    effect = replace(content.diagnosis.effects[0], identifier="clipping")
-    content = replace(
-        content,
-        data=replace(content.data, values=clipped, step=step, lattice=None),
-        diagnosis=replace(content.diagnosis, effects=(effect,)),
-    )
-    (axes,) = diagnosis.draw_codes(content).axes
-    heights = [bar.get_height() for bar in axes.patches]
-    assert sum(heights) == len(clipped)
-    top = round((20 * step - clipped.min()) / step)
-    assert heights[top] == np.count_nonzero(clipped == 20 * step)
-    expected = axes.lines[0].get_ydata()
-    assert max(heights) > 2 * max(expected)
-
-
-def test_a_code_is_marked_where_its_readings_are(outcome: Any) -> None:
-    """The diagnosis numbers codes from a reading of zero, and so does the figure."""
-    content = shown(outcome)
-    step, code = 5e-3, 20
-    values = np.minimum(step * np.round(content.data.values / step), code * step)
-    effect = content.diagnosis.effects[0]
-    where = replace(effect.location, adc_codes=(code,))
-    content = replace(
-        content,
-        data=replace(content.data, values=values, step=step, lattice=None),
-        diagnosis=replace(content.diagnosis, effects=(replace(effect, location=where),)),
-    )
-    (axes,) = diagnosis.draw_codes(content).axes
-    mark = axes.lines[-1].get_xdata()[0]
-    (bar,) = [bar for bar in axes.patches if bar.get_x() < mark < bar.get_x() + bar.get_width()]
-    assert bar.get_height() == np.count_nonzero(values == code * step)
-    assert axes.get_xlim()[0] == pytest.approx(round(values.min() / step) - 0.5)
 
 
 def test_each_figure_has_a_name_that_the_workflow_knows() -> None:

@@ -9,5 +9,5 @@ from typing import Final
 
 OF_EVERY_DIAGNOSIS: Final = ("residual_map", "residual_spectrum", "damping", "frequency")
 """The figures that the diagnosis of every record has."""
-OF_SOME_DIAGNOSES: Final = ("decay", "codes", "curve")
+OF_SOME_DIAGNOSES: Final = ("decay", "curve")
 """The figures that are drawn where they have something to show."""

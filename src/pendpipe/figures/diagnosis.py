@@ -19,7 +19,6 @@ from scipy.interpolate import make_interp_spline
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.cycles import Cycles, Spans, between, cycles, span_ends
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.codes import find_lattice
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Diagnosis
@@ -498,55 +497,6 @@ def _scaled(at: object, argument: str) -> tuple[FloatArray, str]:
     return factor * values, f"{name[:1].upper()}{name[1:]} ({short})"
 
 
-CONCERNED: Final = ("clipping", "missing-codes", "coarse-quantisation")
-_BARS: Final = 400
-
-
-@styled
-def draw_codes(content: Shown) -> Figure:
-    """Draw the histogram of codes beside that which the fitted motion with its noise expects."""
-    effects = content.diagnosis.effects
-    marked = sorted({code for effect in effects for code in effect.location.adc_codes})
-    if not marked and not any(effect.identifier in CONCERNED for effect in effects):
-        raise NothingToDrawError("no code is concerned")
-    step = content.data.step
-    if not step > 0.0:
-        raise NothingToDrawError("the readings have no steps")
-    values = content.data.values
-    # The codes of the diagnosis: 0 is the one nearest to a reading of zero.
-    lattice = find_lattice(values, step)
-    origin, step = (0.0, step) if lattice is None else (lattice.origin, lattice.step)
-    codes = np.rint((values - origin) / step).astype(np.int64)
-    model = (content.extended or content.baseline).at.reading
-    expected = np.rint((model - origin) / step).astype(np.int64)
-    low, high = int(codes.min()), int(codes.max())
-    group = -(-(high - low + 1) // _BARS)
-    edges = np.arange(low - 0.5, high + group + 0.5, group)
-    given, _ = np.histogram(codes, edges)
-    wanted, _ = np.histogram(expected, edges)
-    middle = 0.5 * (edges[1:] + edges[:-1])
-    bars = {"width": group, "color": BLUE, "linewidth": 0.0, "label": "readings"}
-    counted: list[Mark] = [
-        methodcaller("bar", middle, given, **bars),
-        curve(middle, wanted, width=0.9, drawstyle="steps-mid", label="expected"),
-    ]
-    look = {"color": VERMILION, "linewidth": 0.8, "zorder": 0}
-    marks = [methodcaller("axvline", code, **look) for code in marked[:200]]
-    return figure_of(
-        3.0,
-        Panel(
-            [*counted, *marks],
-            {
-                "xlabel": "Code (0: nearest to a reading of zero)",
-                "ylabel": "Readings",
-                "xmargin": 0.0,
-            },
-            key=2,
-        ),
-        margins={"bottom": 0.15, "top": 0.86},
-    )
-
-
 DRAWINGS: Final[dict[str, Callable[[Shown], Figure]]] = {
     "decay": draw_decay,
     "residual_map": draw_residual_map,
@@ -554,7 +504,6 @@ DRAWINGS: Final[dict[str, Callable[[Shown], Figure]]] = {
     "damping": draw_damping,
     "frequency": draw_frequency,
     "curve": draw_curve,
-    "codes": draw_codes,
 }
 """By name, in the order in which they are read."""
 

@@ -1,7 +1,6 @@
 """The pages themselves: everything prepared, handed to the templates."""
 
 import base64
-import csv
 import hashlib
 import io
 import json
@@ -20,7 +19,6 @@ from pendpipe.analysis.fit.result import (
     qualities,
     quotable,
     rate_with_error,
-    read_fit,
     seen_qualities,
     small_period,
 )
@@ -32,7 +30,6 @@ from pendpipe.report.captions import CAPTIONS, GLOSSARY, PROOF_CAPTIONS
 from pendpipe.report.tables import (
     CHI2_RANGE,
     STATES,
-    Column,
     Health,
     findings,
     grouped_warnings,
@@ -135,7 +132,7 @@ def render(
     """
     entries = list(comparison["records"])
     has_theory = bool(comparison.get("has_theory"))
-    columns, lines = table_of_records(entries, _hashes(folder, entries), has_theory=has_theory)
+    columns, lines = table_of_records(entries, has_theory=has_theory)
     room = Room(BUDGET_BYTES)
     drawn = {
         name: svg
@@ -176,7 +173,7 @@ def render(
         compact=compact,
         without_folders=without_folders,
         provenance=comparison.get("provenance") or {},
-        downloads=_downloads(columns, lines, summary),
+        numbers=base64.b64encode(json.dumps(summary, indent=1).encode()).decode(),
         **own_files(),
         findings=findings(comparison),
         warned=grouped_warnings(entries),
@@ -200,7 +197,6 @@ def page_files(comparison: Content, folder: Path, figures: Path) -> list[Path]:
         folder / str(entry["record"]) / name
         for entry in comparison["records"]
         for name in (
-            "fit.json",
             "figures/decay.svg",
             "diagnosis/diagnosis.json",
             "diagnosis/residual_map.svg",
@@ -224,43 +220,6 @@ def _decays(
     }
     decays = {name: svg for name, svg in drawn.items() if svg is not None}
     return decays, [name for name in drawn if name not in decays]
-
-
-def _hashes(folder: Path, entries: list[Content]) -> dict[str, str]:
-    """SHA-256 of each record's input, from its fit."""
-    return {
-        str(entry["record"]): str(read_fit(path).provenance.get("input_sha256", ""))
-        for entry in entries
-        if not entry.get("refused")
-        and (path := folder / str(entry["record"]) / "fit.json").is_file()
-    }
-
-
-def _downloads(
-    columns: list[Column], lines: list[dict[str, Any]], summary: Content
-) -> dict[str, str]:
-    """Files inside the page, as data addresses: they can be saved without a script."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    names = [f"{c.head} ({c.unit})" if c.unit else c.head for c in columns]
-    pairs = [name for head in names for name in (head, f"sd of {head}")]
-    writer.writerow(["record", "fit", "fluid", "branch", *pairs])
-    for line in lines:
-        numbers = [text for cell in line["cells"] for text in (cell.value, cell.sd)]
-        words = [line["name"], line["health"].word, line["fluid"], line["branch"]]
-        writer.writerow([*map(_no_formula, words), *numbers])
-    return {
-        name: f"data:{kind};base64,{base64.b64encode(text.encode()).decode()}"
-        for name, kind, text in (
-            ("records.csv", "text/csv", stream.getvalue()),
-            ("campaign.json", "application/json", json.dumps(summary, indent=1)),
-        )
-    }
-
-
-def _no_formula(text: str) -> str:
-    """A word that a spreadsheet would take for a formula, with the apostrophe that stops it."""
-    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text
 
 
 VERDICTS: Final = {

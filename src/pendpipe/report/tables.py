@@ -48,7 +48,7 @@ class Cell(NamedTuple):
 
 
 def table_of_records(
-    entries: list[Entry], hashes: Mapping[str, str], *, has_theory: bool
+    entries: list[Entry], *, has_theory: bool
 ) -> tuple[list[Column], list[dict[str, Any]]]:
     """Prepare every record, refused ones included, in the order of the table of records.
 
@@ -86,7 +86,7 @@ def table_of_records(
             ],
             "warnings": [str(warning) for warning in entry.get("warnings") or []],
             "refused": without_folders(str(entry.get("refused") or "")),
-            "sha256": hashes.get(str(entry["record"]), ""),
+            "sha256": entry.get("input_sha256") or "",
         }
         for index, entry in enumerate(entries, start=1)
     ]

@@ -172,6 +172,7 @@ def _record(
     content |= {
         **fit["parameters"],
         **{name: fit[name] for name in _OF_A_FIT},
+        "input_sha256": fit["provenance"].get("input_sha256"),
         "warnings": [*excluded, *fit["warnings"], *result.calibration["warnings"]],
         "volts_per_radian": result.calibration["volts_per_radian"],
         "start_s": float(points.time_s[0]),

@@ -116,7 +116,6 @@ def write_record(folder: Path, name: str, truth: Truth, seed: int) -> dict[str, 
     index = points["half_cycle"].astype(np.int64)
     table = TurningPoints(**points | {"half_cycle": index}, level_coupling=1.0, samples=16384)  # type: ignore[arg-type]
     write_turning_points(folder / name / "turning_points.csv", table)
-    fit["provenance"] = {}
     return fit
 
 

@@ -29,6 +29,7 @@ def record_entry(
         "refused": None,
         **{key: parameters[key] for key in ("frequency", "a", "b", "c", "amplitude", "offset")},
         "quality_factor_limit": limit,
+        "input_sha256": fit["provenance"]["input_sha256"],
         "quality_factor_hysteretic": estimate(hysteretic, 0.002 * hysteretic, ""),
         "quality_factor_viscous": estimate(viscous, 0.006 * viscous, "") if viscous else None,
         "quality_factor_viscous_theory": estimate(truth.viscous, 0.004 * truth.viscous, "")
