@@ -79,7 +79,7 @@ def test_folders_are_left_out_and_units_are_not(text: str, kept: str) -> None:
 
 def test_a_rate_at_its_bound_is_shown_as_a_limit() -> None:
     bound = {"value": 0.0, "sd": 0.1, "unit": "rad/s", "at_bound": True, "interval95": [0.0, 0.196]}
-    columns, lines = table_of_records([entry(c=bound)], {}, has_theory=True)
+    columns, lines = table_of_records([entry(c=bound)], has_theory=True)
     column = [c.quantity for c in columns].index("c")
     assert lines[0]["cells"][column].text == "< 0.2"
 
@@ -87,7 +87,7 @@ def test_a_rate_at_its_bound_is_shown_as_a_limit() -> None:
 def test_angles_and_lengths_in_one_table_carry_their_own_units() -> None:
     lengths = {"value": 1.0, "sd": 0.1, "unit": "m/s"}
     angles = {"value": 2.0, "sd": 0.1, "unit": "rad/s"}
-    columns, lines = table_of_records([entry(c=lengths), entry(c=angles)], {}, has_theory=True)
+    columns, lines = table_of_records([entry(c=lengths), entry(c=angles)], has_theory=True)
     column = [c.quantity for c in columns].index("c")
     assert columns[column].unit == ""
     assert [line["cells"][column].text for line in lines] == ["1.00(10) m/s", "2.00(10) rad/s"]
@@ -95,7 +95,7 @@ def test_angles_and_lengths_in_one_table_carry_their_own_units() -> None:
 
 def test_what_eq_17_leaves_of_nothing_is_not_printed() -> None:
     noise = {"value": 1e6, "sd": 9e5, "unit": ""}
-    columns, _ = table_of_records([entry(quality_factor_viscous=noise)], {}, has_theory=True)
+    columns, _ = table_of_records([entry(quality_factor_viscous=noise)], has_theory=True)
     assert "quality_factor_viscous" not in [column.quantity for column in columns]
 
 
