@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+import pytest
 from scipy.fft import idct
 from scipy.stats import binom
 
@@ -44,3 +47,23 @@ def test_red_noise_is_not_reported_as_a_drift() -> None:
         found = diagnose_recording(Recording(TIME_S, CLEAN + noise, "angle_rad")).diagnosis
         reported += any(effect.identifier in SLOW for effect in found.effects)
     assert binom.sf(reported - 1, 24, 0.01) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "motion"),
+    [("offset-drift", lambda t: 4e-5 * (t - 16.0)), ("offset-step", lambda t: 5e-4 * (t > 15.0))],
+)
+def test_in_few_readings_a_large_slow_error_of_the_zero_is_no_noise(
+    name: str, motion: Callable[[FloatArray], FloatArray]
+) -> None:
+    """Five and more times the noise in 700 readings: a filter of some readings could make it."""
+    start = TIME_S[:700]
+    readings = CLEAN[:700] + motion(start - start[0])
+    assert name in named(readings, 3)
+
+
+def test_what_wanders_more_slowly_than_the_motion_is_told_beside_what_is_faster() -> None:
+    """A zero that comes and goes has no name; the sentence does not call all of it noise."""
+    wander = 5e-3 * np.exp(-(((TIME_S - 30.0) / 8.0) ** 2))
+    found = diagnose_recording(recording(CLEAN + wander, 3)).diagnosis
+    assert found.effects or "the zero wanders" in found.statement

@@ -60,6 +60,7 @@ MEASUREMENT = [
     "clock-slips",
     "sensor-backlash",
     "offset-drift",
+    "offset-step",
     "gain-drift",
     "ac-coupling",
     "tone-pickup",

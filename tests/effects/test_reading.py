@@ -159,3 +159,11 @@ def test_dropped_samples_are_the_readings_that_follow() -> None:
     found = reading("dropped-samples", (7 * 0.02, instant), BASE, TIME)
     np.testing.assert_allclose(found[:101], OWN[:101], 0.0, 1e-9)
     np.testing.assert_allclose(found[101:-7], OWN[108:], 0.0, 1e-7)
+
+
+def test_a_jump_of_the_reading_leaves_the_motion_as_it_is() -> None:
+    """A jump of the equilibrium changes amplitude and phase as well."""
+    instant = float(0.5 * (TIME[100] + TIME[101]))
+    found = reading("offset-step", (1e-3, instant), BASE, TIME)
+    np.testing.assert_allclose(found[:101], OWN[:101], 0.0, 1e-12)
+    np.testing.assert_allclose(found[101:], OWN[101:] + 1e-3, 0.0, 1e-12)

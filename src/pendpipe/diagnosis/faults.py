@@ -18,6 +18,7 @@ from pendpipe.diagnosis.detect import TESTS_SHARE
 from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.forensics import TESTS, Test, corrections
 from pendpipe.diagnosis.forensics.glitches import find_in_misfit
+from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import TAPS, white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.remainder import remainder_of
@@ -156,7 +157,12 @@ class Forensics:
         others = (masked.weight == 0.0) & ~fault.mask[: len(masked)]
         whole = replace(masked, weight=np.where(others, 0.0, 1.0))
         noise = replace(state.noise, weight=whole.weight)
-        finding = TESTS[name](whole, state.fit, noise, self.samples)
+        fit = state.fit
+        if any(effect.local for effect in fit.model.effects):
+            # Without the readings about it an instant is known less well.
+            fit = refine(fit.model, whole, noise, fit.value, held=state.held)
+            fit = with_better_instants(fit, whole, noise, state.held)
+        finding = TESTS[name](whole, fit, noise, self.samples)
         p_value = _global(finding)
         if p_value > self.level or finding.mask is None:
             if _wrong_at_an_end(fault.mask[: len(masked)], state):

@@ -14,7 +14,7 @@ from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit, better
 from pendpipe.diagnosis.scores import scores_and_lengths
 from pendpipe.effects import Effect
-from pendpipe.effects.catalogue.reading import DroppedSamples
+from pendpipe.effects.catalogue.reading import DroppedSamples, OffsetStep
 from pendpipe.estimate import Estimate
 
 _TAILS: Final = (0.025, 0.975)
@@ -115,7 +115,7 @@ _SHIFTS: Final = np.linspace(-1.0, 1.0, 33)
 
 
 def with_better_instants(fit: Fit, data: Data, noise: Noise, held: Iterable[int]) -> Fit:
-    """Try instants about each loss of samples, and refine from the best.
+    """Try instants about each loss of samples and jump of the reading, and refine from the best.
 
     After lost samples a reading may lie beyond the turning point. How far the jump reaches into
     the neighbouring interval then has several solutions; Gauss-Newton finds the nearest only.
@@ -131,7 +131,7 @@ def with_better_instants(fit: Fit, data: Data, noise: Noise, held: Iterable[int]
     """
     fixed = tuple(held)
     for effect, position in fit.model.places():
-        if not isinstance(effect, DroppedSamples):
+        if not isinstance(effect, DroppedSamples | OffsetStep):
             continue  # other effects change little from one reading to the next
         for width in _SEARCH_WIDTHS:
             instant = np.arange(len(fit.value)) == position.stop - 1

@@ -18,7 +18,7 @@ from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import SINE, Beginning, begin
 from pendpipe.diagnosis.cycles import SmallSwings, small_swings
 from pendpipe.diagnosis.forensics.codes import with_true_step
-from pendpipe.diagnosis.forensics.colour import level_note
+from pendpipe.diagnosis.forensics.colour import level_note, wander_note
 from pendpipe.diagnosis.forensics.corrections import loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.held_out import HeldOut, held_out
@@ -270,7 +270,8 @@ def diagnose_decay(
     effects = _in_order(found, weighed, samples)
     gap = gap_note((whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
     changing = None if found.data.time_noise else level_note(found.noise)
-    stamps = (*([gap] if gap else []), *found.clock_notes, *([changing] if changing else []))
+    wander = wander_note(found.noise, found.data, found.improved)
+    stamps = tuple(note for note in (gap, *found.clock_notes, changing, wander) if note)
     before = _fitted_model(found.baseline, found)
     if not fixed:
         # A part of b that is held bounds b here, and not in the fit.

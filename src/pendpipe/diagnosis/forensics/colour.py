@@ -8,6 +8,7 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.fft import dct
 
 from pendpipe.analysis.turning_points.samples import Samples
 from pendpipe.arrays import FloatArray
@@ -19,6 +20,7 @@ from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import COLOURED_NOISE, Finding, Location, nothing
 from pendpipe.diagnosis.scores import tangent_basis
 from pendpipe.estimate import Estimate
+from pendpipe.quantities import compact
 
 _HARMLESS_RATIO: Final = 1.5
 """Ratio of densities below which the colour changes no conclusion."""
@@ -53,6 +55,21 @@ def level_note(noise: Noise) -> str | None:
         return None
     how = "larger" if first > last else "smaller"
     return f"the noise changes in time, by a factor of {ratio:.2g}; it is {how} in the first half"
+
+
+def wander_note(noise: Noise, data: Data, fit: Fit) -> str | None:
+    """Say how far the zero wanders if most of what is left is noise slower than the motion."""
+    count, omega = len(data), fit.at.sampled.motion.angular_frequency
+    slower = max(int(omega / math.pi * count * data.interval_s), 1)
+    power = dct(data.residual(fit.at.reading) * data.weight, norm="ortho") ** 2 / count
+    slow, fast = float(power[:slower].sum()), float(power[slower:].sum())
+    if not (data.uniform and noise.coloured) or slow < fast:
+        return None
+    wander, rest = (compact(math.sqrt(part), data.unit) for part in (slow, fast))
+    return (
+        f"most of what is left is slower than the motion: the zero wanders by {wander} rms,"
+        f" and what is faster is {rest} rms"
+    )
 
 
 def find_coloured_noise(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:

@@ -348,6 +348,24 @@ def _part_of_a_sample(values: FloatArray, span: Span) -> float:
 
 
 @enters(
+    "reading",
+    Sudden,
+    identifier="offset-step",
+    name="jump of the reading",
+    equation=r"y = x + J\, H(t - t_k)",
+    parameters=(Parameter("J", "rad", -10.0, 10.0), INSTANT),
+    tried=64,
+    example=(1e-3, 21.03),
+    discriminating_test=(
+        "look at amplitude and phase about the jump: they stay if the sensor or the camera moved"
+    ),
+)
+def offset_step(sampled: Sampled, pendulum: Pendulum, jump: float, instant_s: float) -> FloatArray:
+    """The zero of the reading jumps by J, since the sensor or the camera was moved."""
+    return np.asarray(jump * reading_step(sampled.time_s, instant_s))
+
+
+@enters(
     "delay",
     Sudden,
     identifier="dropped-samples",
@@ -388,6 +406,7 @@ def rolling_shutter(sampled: Sampled, pendulum: Pendulum, kappa: float) -> Float
 
 
 DroppedSamples = type(dropped_samples)
+OffsetStep = type(offset_step)
 
 
 GLITCHES: Final[Effect] = without_template(
