@@ -851,3 +851,24 @@ def test_headers_of_more_instruments(tmp_path: Path) -> None:
         same(recording, volts[: len(recording)], TIME[: len(recording)])
     head = "channel names:\nDev1_ai0\nstart times:\n12.03.2024 10:23:11\ndt:\n0,033333333\ndata:\n"
     same(read_text(tmp_path, head + text(ANGLE).replace(".", ","), "SignalExpress.txt"))
+
+
+# --- positions, brackets, clocks ------------------------------------------------------------
+
+
+def test_a_swing_beside_the_pictures_corner_is_about_its_own_circle(tmp_path: Path) -> None:
+    angle = 0.3 * ANGLE
+    x, y = np.rint(206 + 536 * np.sin(angle)), np.rint(113 + 536 * np.cos(angle))
+    recording = read_text(tmp_path, text(TIME, x, y, digits=3, head="t,x,y\n"))
+    assert recording.unit == "rad"
+    np.testing.assert_allclose(recording.values, angle, atol=0.01)
+    assert not any("(0, 0)" in note for note in recording.notes)
+
+
+def test_rows_of_a_hand_draw_no_circle(tmp_path: Path) -> None:
+    x, y = 400 + 300 * np.sin(ANGLE), 100 + 300 * np.cos(ANGLE)
+    hand = np.linspace(0.0, 1.0, 20)
+    x[:20], y[:20] = 900 - 700 * hand, 700 * hand
+    recording = read_text(tmp_path, text(TIME, x, y, digits=3, head="t,x,y\n"))
+    assert recording.unit == "rad"
+    np.testing.assert_allclose(recording.values[20:], ANGLE[20:], atol=1e-3)

@@ -45,7 +45,9 @@ def noise_rms(values: FloatArray, step: float | None = None, *, quieter: float =
     floor = quantisation_rms(step)
     if len(values) < 2 * _ORDER:
         return floor
-    length = _BLOCK + _ORDER if len(values) >= 4 * _BLOCK else len(values)
+    short = len(values) // (4 if quieter < 0.5 else 1)
+    length = _BLOCK + _ORDER if len(values) >= 4 * _BLOCK else max(short, 4 * _ORDER)
+    length = min(length, len(values))
     number = min(_BLOCKS, len(values) // length)
     starts = (len(values) - length) * np.arange(number) // max(number - 1, 1)
     blocks = values[starts[:, None] + np.arange(length)]

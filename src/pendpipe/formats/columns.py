@@ -455,20 +455,20 @@ def _bob_from_pivot(columns: Sequence[Column]) -> list[tuple[Column, Column]]:
 
 
 def _on_a_circle(x: FloatArray, y: FloatArray, *, named: bool) -> bool:
-    """Say whether x, y go to and fro on a circle about the origin, level with its centre line.
+    """Say whether x, y go to and fro on a circle about the origin, and hang above or below it.
 
     Pixels counted from an image's corner keep much the same distance from it as well: but
-    there the distance follows x, and the swing is not about a vertical through the origin.
+    there the distance follows x, and the vertical through the origin lies outside the swing.
     """
     good = np.isfinite(x) & np.isfinite(y)
     x, y, sides = x[good], np.abs(y[good]), np.sign(y[good])
     if len(x) < 8 or max(np.abs(x).max(), y.max()) > 1e100:
         return False
-    radius = np.hypot(x, y)
+    radius, angle = np.hypot(x, y), np.arctan2(x, y)
     if (
         not 0.0 < np.std(radius) <= min(0.08 * np.mean(radius), 0.3 * np.std(x))
         or abs(np.mean(sides)) <= 0.95
-        or abs(np.median(np.arctan2(x, y))) > 0.4
+        or abs(np.median(angle)) > min(0.4, 0.5 * np.ptp(angle))
         or not swing_of(x).clear
     ):
         return False
@@ -1109,7 +1109,7 @@ def _position(x: Column, y: Column) -> Readings:
 
     Positions that are not on a circle about (0, 0) are on one about the pivot.
     """
-    left, up, seen = x.values, y.values, "the position seen from the pivot"
+    left, up, seen = x.values, y.values, "the position seen from (0, 0)"
     pivot = _pivot(left, up)
     if pivot is not None:
         left, up = left - pivot[0], up - pivot[1]
@@ -1123,23 +1123,31 @@ def _position(x: Column, y: Column) -> Readings:
 
 
 def _pivot(x: FloatArray, y: FloatArray) -> FloatArray | None:
-    """Find the centre of the circle on which positions lie: x^2 + y^2 = 2 (a x + b y) + c.
+    """Find the centre of the circle from which positions have the least rms distance.
 
-    None where they lie on none, its centre is uncertain by 3 % of its radius, or within a tenth
-    of it of (0, 0), and where the swing is below a tenth of a radian.
+    It starts from x^2 + y^2 = 2 (a x + b y) + c, which alone is biased by noise, and leaves out
+    positions far from it (a hand, a lost marker). None where they lie on none, its centre is
+    uncertain by 3 % of its radius, or within a tenth of it of (0, 0), and where the swing is
+    below a tenth of a radian.
     """
     good = np.isfinite(x) & np.isfinite(y)
     points = np.column_stack([x[good], y[good]])
     if len(points) < 8 or np.abs(points).max() > 1e100:
         return None
-    middle = points.mean(axis=0)
-    design = np.column_stack([2.0 * (points - middle), np.ones(len(points))])
-    inverse = np.linalg.pinv(design)
+    one, middle = np.ones((len(points), 1)), points.mean(axis=0)
+    inverse = np.linalg.pinv(np.hstack([2.0 * (points - middle), one]))
     centre = (inverse @ np.sum((points - middle) ** 2, axis=1))[:2] + middle
-    radius = np.hypot(*(points - centre).T)
-    mean, (wide, high) = float(radius.mean()), np.abs(points - centre).T
-    known = 2.0 * float(np.std(radius)) * float(np.linalg.norm(inverse[:2])) < 0.03
+    for _ in range(6):
+        arm = points - centre
+        radius = np.hypot(*arm.T)
+        off = np.abs(radius - np.median(radius))
+        near = (off <= 6.0 * np.median(off)) & (radius > 0.0)
+        inverse = np.linalg.pinv(np.hstack([arm / radius[:, None], one])[near])
+        centre = centre + (inverse @ radius[near])[:2]
+    mean, (wide, high) = float(radius[near].mean()), np.abs(arm[near]).T
+    known = float(np.std(radius[near])) * float(np.linalg.norm(inverse[:2])) < 0.03 * mean
     hangs = high.min() > 0.05 * mean and wide.max() > 0.1 * mean
-    elsewhere = math.hypot(*centre) > 0.1 * mean
-    clear = np.std(radius) < 0.3 * np.std(points[:, 1])
-    return centre if known and hangs and clear and elsewhere else None
+    away = math.hypot(*centre) / mean
+    # The farther from (0, 0), the less the circle need show.
+    clear = np.std(radius[near]) < min(max(0.3, 1.5 * away), 0.5) * np.std(points[near, 1])
+    return centre if known and hangs and clear and away > 0.1 else None
