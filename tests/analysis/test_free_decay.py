@@ -396,3 +396,12 @@ def test_two_modes_that_beat_are_a_decay_with_two_frequencies_and_losses(rest: b
 def test_a_mode_that_does_not_decay_is_a_drive() -> None:
     with pytest.raises(NotAnalysableError, match="a drive holds the amplitude up"):
         find_free_decay(beat((0.03, 0.0), rest=True))
+
+
+@pytest.mark.parametrize("quality", [2.0, 3.0, 4.0, 10.0])
+def test_a_strongly_damped_decay_is_found(quality: float) -> None:
+    time = np.arange(800) / RATE
+    values = np.exp(-OMEGA / (2.0 * quality) * time) * np.cos(OMEGA * time)
+    found = find_free_decay(recording([values], noise=1e-4))
+    assert found.start_s == 0.0
+    assert found.half_cycles >= min(3.0 * quality, 11.0) - 1.0

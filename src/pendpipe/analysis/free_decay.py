@@ -163,7 +163,8 @@ def _regular(run: Run) -> bool:
     # Where the sides differ, half cycles two apart are alike; of a few that says too little.
     apart = 2 if len(half) > 6 else 1
     waver = float(np.median(np.abs(half[apart:] - half[:-apart]))) / float(np.median(half))
-    kinks = float(np.median(np.abs(np.diff(run.swing, 2)))) / usual
+    # Viscous loss takes the same share of each half cycle, and so a strong one bends the amplitude.
+    kinks = float(np.median(np.abs(np.diff(np.log(run.swing), 2))))
     return waver < _WAVER + 0.5 * blur and kinks < _WAVER + 2.0 * blur
 
 
