@@ -60,6 +60,15 @@ def pretty_unit(unit: str) -> str:
     return "" if unit == "1" else unit.replace("^2", "²")
 
 
+def after_number(unit: str) -> str:
+    """What follows a number in a sentence: a space and the unit, or nothing.
+
+    >>> after_number("rad"), after_number("1")
+    (' rad', '')
+    """
+    return f" {pretty_unit(unit)}".rstrip()
+
+
 def with_error(value: float, sd: float | None, unit: str = "", *, short: bool = False) -> str:
     """Value and standard deviation to two digits of the latter.
 

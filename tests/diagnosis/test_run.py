@@ -307,3 +307,23 @@ def test_four_swings_at_uneven_times_are_answered() -> None:
     reading = angle_rad + 5e-4 * random.standard_normal(len(time_s))
     found = diagnose_recording(Recording(time_s, reading, "angle_rad"))
     assert found.verdict == "consistent"
+
+
+def test_the_answer_does_not_depend_on_the_unit() -> None:
+    """Two modes, in radians and in counts of a thousandth: the bounds of sizes go with it."""
+    time_s = np.arange(0.0, 35.0, 0.05)
+    pairs = ((0.131, 0.7073, 80.0, 0.3), (0.11, 0.7353, 60.0, 2.0))
+    modes = [
+        size * np.exp(-time_s / tau) * np.cos(2.0 * np.pi * f * time_s + phase)
+        for size, f, tau, phase in pairs
+    ]
+    readings = sum(modes) + 5e-4 * np.random.default_rng(4).standard_normal(len(time_s))
+    answers = [
+        diagnose_recording(Recording(time_s, scale * readings, quantity, metadata={"unit": unit}))
+        for scale, quantity, unit in ((1.0, "angle_rad", "rad"), (1000.0, "reading", "counts"))
+    ]
+    names = [[each.identifier for each in answer.effects] for answer in answers]
+    assert names[0] == names[1]
+    assert names[0][0] == "second-mode"
+    sizes = [answer.effects[0].parameters["q_cosine"].value for answer in answers]
+    assert sizes[1] == pytest.approx(1000.0 * sizes[0], rel=1e-2)

@@ -124,6 +124,7 @@ def begin(
         fold=data.fold,
         first_s=float(data.time_s[0]),
         parts=parts,
+        scale=1.0 if samples.unit in ("rad", "rad/s") else abs(angle),
     )
     data, model, at = _before_the_stop(data, model, value)
     if sine is not None:

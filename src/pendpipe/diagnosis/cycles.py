@@ -15,7 +15,7 @@ from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.unwrapped import lock_in
 from pendpipe.effects.model import Evaluated
-from pendpipe.quantities import with_error
+from pendpipe.quantities import after_number, with_error
 
 _CYCLE_SHARE: Final = 0.85
 """Part of a cycle's readings that must be present."""
@@ -179,8 +179,8 @@ class SmallSwings:
         """Return it as a sentence."""
         way, torque = ("above", "stiffer") if self.excess > 0.0 else ("below", "softer")
         return (
-            f"At the smallest amplitudes ({self.amplitude:.3g} {unit}) the frequency is"
-            f" {with_error(100.0 * abs(self.excess), 100.0 * self.excess_sd, '%')} {way} the"
+            f"At the smallest amplitudes ({self.amplitude:.3g}{after_number(unit)}) the frequency"
+            f" is {with_error(100.0 * abs(self.excess), 100.0 * self.excess_sd, '%')} {way} the"
             f" model's: the restoring torque is {torque} there."
         )
 

@@ -16,7 +16,7 @@ from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
 from pendpipe.estimate import Estimate
-from pendpipe.quantities import with_error
+from pendpipe.quantities import after_number, with_error
 
 _INTERVAL_SHARE: Final = 0.9
 """Part of what an effect explains that its intervals hold."""
@@ -182,7 +182,7 @@ def _summary(found: Location, data: Data, amplitude: FloatArray, opposite: str) 
             clauses.append("throughout the record")
     low, high = found.amplitude_rad or (-math.inf, math.inf)
     if high - low < 0.8 * float(np.ptp(amplitude)):
-        clauses.append(f"at amplitudes from {low:.3g} to {high:.3g} {data.unit}")
+        clauses.append(f"at amplitudes from {low:.3g} to {high:.3g}{after_number(data.unit)}")
     if found.phase_rad is not None:
         low, high = found.phase_rad
         clauses.append(f"at phases from {low:.2f} to {high:.2f} rad of the cycle")

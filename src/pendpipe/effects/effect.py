@@ -5,6 +5,7 @@ Behind it stands what the scans and the shapes of several effects have in common
 
 import itertools
 import math
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from inspect import get_annotations
@@ -36,6 +37,13 @@ class Parameter(NamedTuple):
     def unit_in(self, unit: str) -> str:
         """Return its unit where displacements are in `unit` ("rad" or "m"); "" for a number."""
         return "" if self.unit == "1" else self.unit.replace("rad", unit)
+
+    @property
+    def power(self) -> int:
+        """The power of the displacement in it: 1 of rad/s, -2 of 1/rad^2."""
+        found = re.match(r"(\w/\(?)?rad(?:\^(\d))?", self.unit)
+        size = int(found[2] or 1) if found else 0
+        return -size if found and found[1] else size
 
 
 class Kick(NamedTuple):
@@ -195,6 +203,14 @@ class Effect:
         """Return lowest and highest values in a record of some length, a pair each."""
         limits = [(parameter.low, parameter.high) for parameter in self.parameters]
         return [(0.0, 1.0), *limits] if self.parameter_free else limits
+
+    def limits(self, duration_s: float, scale: float) -> FloatArray:
+        """Return its bounds where amplitudes are `scale` and not about 1; shape (values, 2)."""
+        found = np.array(self.bounds(duration_s), dtype=np.float64).reshape(-1, 2)
+        first = len(found) - len(self.parameters)
+        for row, parameter in enumerate(self.parameters, first):
+            found[row] *= scale**parameter.power
+        return found
 
     def acceleration(
         self, motion: Motion, pendulum: Pendulum, values: FloatArray

@@ -137,6 +137,8 @@ class Model:
         the start.
     parts
         The parts of b that are held (``"hysteretic"``, ``"viscous"``), with their rates in 1/s.
+    scale
+        The amplitude where readings are no angles: what effects are bounded by is for 1 rad.
     """
 
     time_s: FloatArray
@@ -147,6 +149,7 @@ class Model:
     fold: int = 1
     first_s: float = -math.inf
     parts: Mapping[str, float] = field(default_factory=dict)
+    scale: float = 1.0
     _last: dict[str, Motion] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -195,10 +198,8 @@ class Model:
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lowest and highest values."""
         duration = float(self.time_s[-1] - self.time_s[0])
-        limits = [*zip(LOW, HIGH, strict=True)]
-        for effect in self.effects:
-            limits += effect.bounds(duration)
-        low, high = np.array(limits).T.copy()
+        limits = [effect.limits(duration, self.scale) for effect in self.effects]
+        low, high = np.concatenate([np.transpose([LOW, HIGH]), *limits]).T.copy()
         low[B] = sum(self.held_parts().values())
         return low, high
 

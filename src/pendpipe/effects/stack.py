@@ -249,7 +249,8 @@ class Stack(Model):
                 end[base] = own[: len(base)]
         duration = max(float(np.ptp(member.time_s)) for member in self.members)
         for effect, place in self.places():
-            ends[0][place], ends[1][place] = np.array(effect.bounds(duration)).T
+            limits = effect.limits(duration, self.members[0].scale)
+            ends[0][place], ends[1][place] = limits.T
         return ends[0], ends[1]
 
     def held(self) -> list[int]:

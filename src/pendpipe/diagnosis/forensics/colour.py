@@ -20,7 +20,7 @@ from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import COLOURED_NOISE, Finding, Location, nothing
 from pendpipe.diagnosis.scores import tangent_basis
 from pendpipe.estimate import Estimate
-from pendpipe.quantities import compact
+from pendpipe.quantities import after_number, compact
 
 _HARMLESS_RATIO: Final = 1.5
 """Ratio of densities below which the colour changes no conclusion."""
@@ -242,5 +242,5 @@ def _described(
         {"acceleration_density": Estimate(best, sd, f"({data.unit}/s^2)^2/Hz")},
         Location.over(data.time_s, sampled.amplitude, frequency_hz=(omega / (2.0 * math.pi),)),
         summary="amplitude and phase fluctuate as under a random torque"
-        f" ({best:.2g} (rad/s^2)^2/Hz; it would sustain {floor:.2g} {data.unit} rms)",
+        f" ({best:.2g} (rad/s^2)^2/Hz; it would sustain {floor:.2g}{after_number(data.unit)} rms)",
     )

@@ -27,6 +27,7 @@ from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Finding, Location, nothing
 from pendpipe.estimate import Estimate
+from pendpipe.quantities import after_number
 
 _FEWEST_AT_END: Final = 2
 """Readings exactly at the end of the range that make a flat top."""
@@ -159,7 +160,7 @@ def _described_ends(
         ),
         mask=mask,
         summary=f"{number} readings lie at the {sides} end of the range ({limits}"
-        f" {data.unit}), which the motion exceeds, until {when[-1]:.4g} s",
+        f"{after_number(data.unit)}), which the motion exceeds, until {when[-1]:.4g} s",
     )
 
 
@@ -245,7 +246,7 @@ def find_missing_codes(data: Data, fit: Fit, noise: Noise, samples: Samples) -> 
         parameters,
         Location(adc_codes=tuple(int(code) for code in codes[:_MOST_LISTED])),
         summary=f"{lead}{len(codes)} code(s) ({named}, in steps of {coded.lattice.step:.4g}"
-        f" {data.unit}) occurred {found:.0f} times where {expected:.0f} were expected",
+        f"{after_number(data.unit)}) occurred {found:.0f} times where {expected:.0f} were expected",
     )
 
 
@@ -363,8 +364,9 @@ def find_coarse_steps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> F
             "bias_over_step": Estimate(size, sd, ""),
         },
         Location.over(data.time_s, fit.at.sampled.amplitude),
-        summary=f"the step of {step:.3g} {data.unit} is {1.0 / coded.ratio:.2g} times the noise, so"
-        f" that errors depend on the codes; the final amplitude is {end / step:.2g} steps",
+        summary=f"the step of {step:.3g}{after_number(data.unit)} is {1.0 / coded.ratio:.2g} times"
+        " the noise, so that errors depend on the codes; the final amplitude is"
+        f" {end / step:.2g} steps",
         kind="fault" if end < _RANDOM_AMPLITUDE * step else "property",
     )
 
@@ -379,7 +381,10 @@ def _dead_bits(data: Data, fit: Fit, samples: Samples, step: float, promised: fl
     times = step / promised
     whole = abs(times - round(times)) < _WHOLE_WITHIN
     free = len(np.unique(samples.values)) - (1 if whole else 2)
-    steps = f"the step is {step:.3g} {data.unit}, but the converter's bits give {promised:.3g}"
+    steps = (
+        f"the step is {step:.3g}{after_number(data.unit)}, but the converter's bits give"
+        f" {promised:.3g}"
+    )
     parameters = {
         "step": Estimate(step, 0.0, data.unit),
         "promised": Estimate(promised, 0.0, data.unit),

@@ -20,6 +20,7 @@ from pendpipe.diagnosis.noise import TAPS, Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Finding, Location, nothing
 from pendpipe.estimate import Estimate
+from pendpipe.quantities import after_number
 
 _GLITCH_NUMBERS: Final = (1, 2, 3, 5, 10, 30, 100)
 _CERTAIN_SD: Final = 4.5
@@ -211,11 +212,14 @@ def _described(
         "largest_time": Estimate(float(when[largest]), 0.0, "s"),
     }
     if number == 1:
-        summary = f"one reading, at {when[0]:.6g} s, is wrong by {reading[0]:.3g} {data.unit}"
+        summary = (
+            f"one reading, at {when[0]:.6g} s, is wrong by"
+            f" {reading[0]:.3g}{after_number(data.unit)}"
+        )
     else:
         summary = (
             f"{number} single readings between {when[0]:.4g} and {when[-1]:.4g} s are wrong"
-            f" by up to {abs(reading[largest]):.3g} {data.unit}"
+            f" by up to {abs(reading[largest]):.3g}{after_number(data.unit)}"
         )
     if tail.inverse_freedom > 0.03:
         summary += (
