@@ -368,3 +368,19 @@ def test_a_loss_that_is_placed_a_reading_off_makes_no_glitch(
     state = State(record.fit, record.data, record.noise, [], record.fit.value)
     Forensics(record.samples, 0.01).before(state, silent)
     assert [fault.finding.identifier for fault in state.faults] == ["dropped-samples"]
+
+
+@pytest.mark.parametrize("stale", [True, False])
+def test_a_stale_reading_in_heavy_tails_is_wrong_since_it_repeats_the_one_before(
+    clean: FloatArray, stale: bool
+) -> None:
+    """Noise of Student's nu = 3 has one as far off in a hundred records, but never the same."""
+    noise = NOISE * generator(5).standard_t(3.0, AIR.count)
+    readings = rounded(clean + noise, STEP_16)
+    row = 1000 + int(np.argmax(np.abs(np.diff(clean[1000:1100])))) + 1
+    readings[row] = readings[row - 1] + (0.0 if stale else 3.0 * STEP_16)
+    assert abs(readings[row] - clean[row]) > 100.0 * NOISE
+    record = fitted(AIR, readings)
+    finding = TESTS["glitches"](record.data, record.fit, record.noise, record.samples)
+    assert (finding.p_value < 1e-4) == stale
+    assert ("repeats the one before" in finding.summary) == stale

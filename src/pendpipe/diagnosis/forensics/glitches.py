@@ -58,17 +58,24 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         # The whitening filter lacks neighbours at the ends: errors there are larger by themselves.
         used = used.copy()
         used[:TAPS] = used[-TAPS:] = False
-    error = np.abs(local.scaled)
+    error, repeats = np.abs(local.scaled), _chance_of_repeats(data, residual)
     count, step = int(np.count_nonzero(used)), _rounding_in(data, noise.white_rms * local.rms)
-    ordered = np.sort(error[used])
+    apart = used
+    if noise.coloured:
+        # The filter spreads a wrong reading over its neighbours.
+        near = _about(error * used, _NEIGHBOURS).max(axis=1)
+        apart = used & ((error == near) | (near < _CERTAIN_SD))
+    ordered = np.sort(error[apart])
     p_value, tail = _smallest_p_value(ordered, step), _noise_tail(ordered, step)
+    p_value *= repeats[np.argmax(error * used)]
     mask = np.zeros(len(data), dtype=bool)
     size = np.zeros(len(data))
     for _ in range(_ROUNDS):
         beyond = (error > 3.0) & used & ~mask & (p_value < _EXPECTED_BY_CHANCE)
-        beyond[beyond] = tail.beyond(error[beyond]) * count < _EXPECTED_BY_CHANCE
+        expected = count * tail.beyond(error[beyond]) * repeats[beyond]
+        beyond[beyond] = expected < _EXPECTED_BY_CHANCE
         if noise.coloured:
-            # The filter spreads a wrong reading over its neighbours: take the largest first.
+            # Take the largest first.
             beyond &= error == _about(error, _NEIGHBOURS).max(axis=1)
         if not beyond.any():
             break
@@ -119,6 +126,7 @@ def find_in_misfit(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
     ordered = np.sort(np.abs(local.scaled)[used & (single | ~mask)])
     step = _rounding_in(data, local.rms)
     p_value, tail = _smallest_p_value(ordered, step), _noise_tail(ordered, step)
+    p_value *= float(np.min(_chance_of_repeats(data, local.left)[single]))
     return _described(data, fit, values, local.scaled, single, p_value, tail)
 
 
@@ -147,6 +155,17 @@ def bent_ends(angle: FloatArray, size: FloatArray, mask: BoolArray, used: BoolAr
         if chances and min(chances) < _NOT_RANDOM:
             found[wrong[: int(np.argmin(chances)) + 1]] = True
     return found
+
+
+def _chance_of_repeats(data: Data, error: FloatArray) -> FloatArray:
+    """Return how probable it is that a wrong reading equals the one before it, 1 where it does not.
+
+    One that is wrong by e for another reason lies anywhere within about 2 e, in steps. A stale row
+    or a repeated picture is the same.
+    """
+    again = np.append(False, np.diff(data.values) == 0.0) & (data.fold == 1)
+    step = max(data.step, 1e-6 * float(np.ptp(data.values)))
+    return np.where(again, np.minimum(step / np.maximum(2.0 * np.abs(error), 1e-300), 1.0), 1.0)
 
 
 def _errors(fit: Fit, noise: Noise, residual: FloatArray, out: BoolArray) -> Local:
@@ -216,6 +235,9 @@ def _described(
             f"one reading, at {when[0]:.6g} s, is wrong by"
             f" {reading[0]:.3g}{after_number(data.unit)}"
         )
+        row = int(np.flatnonzero(mask)[0])
+        if row and data.values[row] == data.values[row - 1]:
+            summary += ": it repeats the one before"
     else:
         summary = (
             f"{number} single readings between {when[0]:.4g} and {when[-1]:.4g} s are wrong"
