@@ -52,11 +52,10 @@ class Estimate:
 
     def as_json(self) -> dict[str, Any]:
         """Return the form of fit.json."""
-        low, high = self.bounds95
         return {
             "value": self.value,
             "sd": self.sd,
-            "interval95": [low, high],
+            "interval95": list(self.bounds95),
             "at_bound": self.at_bound,
             "unit": self.unit,
         }

@@ -21,7 +21,7 @@ def test_one_page_holds_the_fit_and_refers_to_nothing_outside(
     assert "dry friction" in text
     assert "<svg" in text
     assert "Quote these numbers" in text
-    outside = re.findall(r'(?:src|href)="(?!#)[^"]*"', text)
+    outside = re.findall(r'(?:src|href)="(?!#|data:image/png)[^"]*"', text)
     assert not outside
     assert str(tmp_path) not in text
     assert str(ROD.parent) not in text

@@ -23,7 +23,7 @@ from pendpipe import physics
 from pendpipe.analysis.fit.by_points import fit_envelope, fit_points
 from pendpipe.analysis.separate import SeparatedRecord
 from pendpipe.analysis.turning_points import TurningPoints
-from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Estimate, chi_square_p_value
 
@@ -323,10 +323,6 @@ def fit_exponent(branch: Columns, inverse_k_sd: float) -> Exponent | None:
     )
 
 
-def _chosen(losses: Columns, rows: slice | BoolArray) -> Columns:
-    return {name: column[rows] for name, column in losses.items()}
-
-
 def _derivative(branch: Columns, inverse_k_sd: float, order: int) -> tuple[float, float, float]:
     """Derivative of ln Q_v by ln f from a least-squares polynomial: value, own sd, common sd."""
     logs = np.log(branch["frequency_hz"])
@@ -451,9 +447,12 @@ def compare(
     # Of the drag measured over that of the steady law, less 1.
     excess = 100.0 * _excess_over_steady(losses).response
     fitted = {
-        str(name): fit_exponent(_chosen(losses, losses["branch"] == name), errors.inverse_k)
-        for name in np.unique(losses["branch"])
-        if name
+        str(branch): fit_exponent(
+            {name: column[losses["branch"] == branch] for name, column in losses.items()},
+            errors.inverse_k,
+        )
+        for branch in np.unique(losses["branch"])
+        if branch
     }
     return Comparison(
         table=table,
@@ -571,7 +570,7 @@ def theory_curve(
     return {name: np.atleast_1d(column) for name, column in columns.items()}
 
 
-FEWEST_IN_A_TAIL = 8
+FEWEST_IN_A_TAIL, TAILS = 8, 12
 
 
 def amplitude_misfit(points: TurningPoints) -> dict[str, float]:
@@ -594,25 +593,22 @@ def amplitude_misfit(points: TurningPoints) -> dict[str, float]:
     }
 
 
-def tail_fits(points: TurningPoints, count: int = 12) -> list[dict[str, Any]]:
+def tail_fits(points: TurningPoints) -> list[dict[str, Any]]:
     """Fit ever later parts of a record: the first is the whole of it. As in comparison.json.
 
-    The starts are even in the logarithm of the amplitude; the last tail keeps eight
-    turning points. A fit to the tail alone depends on where it begins, which the paper
-    warns of: its a is hardly told, and what it takes from a it gives to b and c.
+    The starts are even in the turning points; the last tail keeps eight. A fit to the tail alone
+    depends on where it begins, which the paper warns of: its a is hardly told, and what it takes
+    from a it gives to b and c.
     """
-    amplitude = np.abs(points.angle_rad)
     last = len(points) - FEWEST_IN_A_TAIL
     if last < 1:
         return []
-    levels = np.geomspace(amplitude[0], max(amplitude[last], 1e-3 * amplitude[0]), count)
-    place = np.arange(len(points))
-    starts = np.unique(np.searchsorted(-amplitude[: last + 1], -levels))
-    return [tail for start in starts if (tail := _tail(points, place >= start))]
+    starts = np.unique(np.linspace(0, last, TAILS).astype(np.int64))
+    return [tail for start in starts.tolist() if (tail := _tail(points, start))]
 
 
-def _tail(points: TurningPoints, kept: BoolArray) -> dict[str, Any] | None:
-    part = points.chosen(kept)
+def _tail(points: TurningPoints, start: int) -> dict[str, Any] | None:
+    part = points.chosen(np.arange(len(points)) >= start)
     try:
         found = fit_points(part).parameters
     except InputError:

@@ -6,7 +6,6 @@ Each draws the law that was fitted, and names it in its key.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
@@ -390,10 +389,6 @@ def draw_decay(decay: Decay) -> Figure:
     )
 
 
-COLUMNS: Final = 1200
-"""A waveform of more samples than twice this is drawn as its lowest and highest in so many."""
-
-
 @styled
 def draw_fit(decay: Decay, recording: Recording) -> Figure:
     """Draw a recording with its fitted law.
@@ -413,8 +408,8 @@ def draw_fit(decay: Decay, recording: Recording) -> Figure:
     """
     unit = decay.points.unit
     factor, shown_unit = axis_unit(decay.amplitude_rad, unit)
-    time, values = _thinned(recording.time_s[recording.usable], recording.values[recording.usable])
-    readings = curve(time, factor * values, BLUE, width=0.5, alpha=0.6, label="readings")
+    time, look = recording.time_s, {"alpha": 0.6, "rasterized": True, "label": "readings"}
+    readings = curve(time, factor * recording.values, BLUE, width=0.5, **look)
     about = {"xlabel": "Time (s)", "xlim": (float(time[0]), float(time[-1]))}
     return figure_of(
         6.6,
@@ -432,19 +427,6 @@ def draw_fit(decay: Decay, recording: Recording) -> Figure:
         shares=(1.3, 0.7, 1.0),
         sharex=False,
     )
-
-
-def _thinned(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Keep the lowest and the highest reading of each of `COLUMNS` stretches."""
-    if len(time) <= 2 * COLUMNS:
-        return time, values
-    edges = np.linspace(0, len(time), COLUMNS + 1).astype(int)
-    kept = [
-        first + extreme
-        for first, last in pairwise(edges.tolist())
-        for extreme in sorted((np.argmin(values[first:last]), np.argmax(values[first:last])))
-    ]
-    return time[kept], values[kept]
 
 
 def _quality_by_amplitude(decay: Decay, factor: float) -> Iterator[Mark]:

@@ -12,7 +12,6 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.turning_points import TurningPoints
-from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.quantities import compact, with_error
 
@@ -88,7 +87,10 @@ def check_decrement(points: TurningPoints, law: Eq8) -> tuple[Decrement, ...]:
     """
     least = np.maximum(_SEEN * points.angle_sd_rad, _STEPS * points.step_rad)
     clear = points.chosen(points.amplitude_rad > least)
-    while len(clear) > 3 * _FEWEST and _end_is_steep(clear.amplitude_rad):
+    while (
+        len(clear) > 3 * _FEWEST
+        and math.log(clear.amplitude_rad[-_FEWEST] / clear.amplitude_rad[-1]) > _STEEP
+    ):
         clear = clear.first(len(clear) - 1)
     if len(clear) < 4:
         return ()
@@ -118,10 +120,6 @@ def _seen(points: TurningPoints) -> list[tuple[float, float, float]]:
         window = order[np.cumsum(beyond) == 0]
         found.append(seen_loss(points.chosen(np.isin(index, window))))
     return found
-
-
-def _end_is_steep(amplitude: FloatArray) -> bool:
-    return float(amplitude[-_FEWEST]) > math.exp(_STEEP) * float(amplitude[-1])
 
 
 def seen_loss(points: TurningPoints) -> tuple[float, float, float]:
