@@ -31,7 +31,7 @@ from benchmarks import journal
 from benchmarks.known_physics import RECORDINGS
 from benchmarks.null_families import wilson
 from pendpipe.analysis.free_decay import measure_recording
-from pendpipe.analysis.turning_points.samples import prepare
+from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.diagnosis.forensics import corrections
 from pendpipe.diagnosis.result import Confirmation
 from pendpipe.recording import Recording

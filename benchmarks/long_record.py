@@ -22,7 +22,7 @@ import numpy as np
 
 from benchmarks.table import Row, at_least, at_most, write
 from pendpipe.analysis.turning_points.find import turning_points_of
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples
 
 if TYPE_CHECKING:
     from pendpipe.arrays import FloatArray

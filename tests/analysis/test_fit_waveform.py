@@ -15,7 +15,7 @@ from pendpipe.analysis.fit.by_points import parse_fixed
 from pendpipe.analysis.fit.by_waveform import BOUNDS, Waveform, rounded, start_values
 from pendpipe.analysis.fit.least_squares import minimise
 from pendpipe.analysis.turning_points.find import turning_points_of
-from pendpipe.analysis.turning_points.samples import prepare
+from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian, turning_points
 from pendpipe.errors import InputError

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pendpipe.analysis.turning_points.find import turning_points_of
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import FloatArray
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pendpipe.analysis.noise import noise_rms
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise

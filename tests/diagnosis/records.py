@@ -9,7 +9,7 @@ from copy import copy
 
 import numpy as np
 
-from pendpipe.analysis.turning_points.samples import prepare
+from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.begin import Beginning, begin
 from pendpipe.diagnosis.data import Data

@@ -7,7 +7,7 @@ import functools
 import numpy as np
 import pytest
 
-from pendpipe.analysis.turning_points.samples import prepare
+from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import diagnose_recording, silent
 from pendpipe.diagnosis.faults import Forensics

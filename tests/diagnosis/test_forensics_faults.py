@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pendpipe.analysis.turning_points.samples import prepare
+from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import silent
 from pendpipe.diagnosis.data import gather

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.forensics import TESTS
 from pendpipe.diagnosis.forensics.colour import level_note

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pendpipe.analysis.turning_points.samples import prepare
+from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import silent
 from pendpipe.diagnosis.begin import LARGE_PHASE_ERROR, Beginning

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.forensics.corrections import loss_confirmed
 from pendpipe.diagnosis.result import Confirmation

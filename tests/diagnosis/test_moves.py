@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from pendpipe.analysis.turning_points.samples import prepare as prepare_samples
+from pendpipe.analysis.turning_points.measure import prepare as prepare_samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import diagnose_recording, silent
 from pendpipe.diagnosis.detect import Lead

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from pendpipe.analysis.free_decay import measure_recording
-from pendpipe.analysis.turning_points.samples import prepare
+from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import diagnose_recording
 from pendpipe.diagnosis.begin import Beginning, begin

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics import corrections

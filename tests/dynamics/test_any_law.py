@@ -21,8 +21,8 @@ from pendpipe.dynamics.any_law import (
     StopsError,
     Tangent,
     follow,
+    sample_motion,
 )
-from pendpipe.dynamics.sampling import sample_motion
 from pendpipe.effects import Pendulum
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model

@@ -11,7 +11,7 @@ from pendpipe.analysis.fit.by_points import held_values, start_of, swing_phase
 from pendpipe.analysis.fit.by_waveform import start_values, usable_span
 from pendpipe.analysis.fit.result import Baseline
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.analysis.two_modes import two_modes
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data, gather

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray
 from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.data import Data, at_even_times

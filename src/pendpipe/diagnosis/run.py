@@ -13,7 +13,7 @@ import numpy as np
 from pendpipe.analysis.fit.by_points import check_fixed
 from pendpipe.analysis.fit.result import Baseline, Restoring
 from pendpipe.analysis.turning_points import TurningPoints
-from pendpipe.analysis.turning_points.samples import Samples, prepare
+from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import SINE, Beginning, begin
 from pendpipe.diagnosis.cycles import SmallSwings, small_swings

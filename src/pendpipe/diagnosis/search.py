@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.alternatives import prefer_parameters, reconsider_red_noise
 from pendpipe.diagnosis.begin import Beginning

@@ -9,7 +9,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.stacked import StackedData
-from pendpipe.dynamics.sampling import Sampled
+from pendpipe.dynamics.any_law import Sampled
 from pendpipe.effects.model import Evaluated
 
 _LARGE_DIFFERENCE: Final = 0.15

@@ -16,8 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.any_law import Motion
-from pendpipe.dynamics.sampling import Sampled
+from pendpipe.dynamics.any_law import Motion, Sampled
 from pendpipe.effects.effect import Effect, How, Pendulum, Span, phase_since_reversal, subclass
 
 

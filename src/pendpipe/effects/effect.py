@@ -14,9 +14,8 @@ from typing import Any, ClassVar, Final, Literal, NamedTuple, TypeVar, cast
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.any_law import Motion
+from pendpipe.dynamics.any_law import Motion, Sampled
 from pendpipe.dynamics.eq8 import Eq8
-from pendpipe.dynamics.sampling import Sampled
 
 Kind = Literal["dynamics", "measurement", "parameter", "unnamed"]
 AnyEffect = TypeVar("AnyEffect", bound="Effect")

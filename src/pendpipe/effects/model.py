@@ -17,12 +17,14 @@ from pendpipe.dynamics.any_law import (
     Law,
     Motion,
     NoMotionError,
+    Sampled,
     StopsError,
     Tangent,
     follow,
     rates,
+    sample_motion,
+    sample_pieces,
 )
-from pendpipe.dynamics.sampling import Sampled, sample_motion, sample_pieces
 from pendpipe.effects.baseline import (
     BASELINE,
     HIGH,

@@ -16,8 +16,7 @@ from typing import Any, Final, Self
 import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
-from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.dynamics.sampling import Sampled
+from pendpipe.dynamics.any_law import NoMotionError, Sampled
 from pendpipe.effects.baseline import BASELINE, OFFSET, OMEGA, START, TIME, A, B, C
 from pendpipe.effects.effect import Effect, Parameter, Span
 from pendpipe.effects.model import Evaluated, Model, jacobian, responses

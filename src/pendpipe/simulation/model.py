@@ -18,8 +18,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.configuration.load import as_input_error, nearest
 from pendpipe.configuration.models import NotNegative, Positive, Section, Sensor
 from pendpipe.dynamics import Eq8, Release, sample
-from pendpipe.dynamics.any_law import Motion, NoMotionError
-from pendpipe.dynamics.sampling import sample_pieces
+from pendpipe.dynamics.any_law import Motion, NoMotionError, sample_pieces
 from pendpipe.effects.baseline import BASELINE, TIME
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.effect import Effect, Parameter

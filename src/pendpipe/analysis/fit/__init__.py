@@ -13,7 +13,7 @@ from pendpipe.analysis.fit.by_waveform import fit_waveform
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring, read_fit
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.find import turning_points_of
-from pendpipe.analysis.turning_points.samples import prepare
+from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.quantities import pretty_unit
 from pendpipe.recording import Recording

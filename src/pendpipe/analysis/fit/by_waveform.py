@@ -39,7 +39,7 @@ from pendpipe.analysis.fit.least_squares import (
 from pendpipe.analysis.fit.result import Baseline, FitResult, Restoring, misfit, result_of
 from pendpipe.analysis.noise import quantisation_rms, white_rms
 from pendpipe.analysis.turning_points import TurningPoints
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics import (
     Eq8,
@@ -366,7 +366,7 @@ def fit_waveform(
     Parameters
     ----------
     samples
-        The readings (`pendpipe.analysis.turning_points.samples.prepare`).
+        The readings (`pendpipe.analysis.turning_points.measure.prepare`).
     points
         Their turning points.
     baseline

@@ -22,12 +22,13 @@ from pendpipe.analysis.turning_points.measure import (
     HARMONICS,
     Measured,
     Places,
+    Samples,
     half_cycle_shape,
     loss_rates,
     measure,
+    prepare,
     shape_error,
 )
-from pendpipe.analysis.turning_points.samples import Samples, prepare
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.dynamics.kernel import Matrix, kernel

@@ -14,8 +14,14 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.noise import white_rms
-from pendpipe.analysis.turning_points.measure import HARMONICS, Measured, Places, edges, measure
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import (
+    HARMONICS,
+    Measured,
+    Places,
+    Samples,
+    edges,
+    measure,
+)
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray
 

@@ -17,8 +17,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.noise import quantisation_rms
-from pendpipe.analysis.turning_points.measure import cosine_sine, loss_rates
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples, cosine_sine, loss_rates
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.kernel import Matrix, kernel

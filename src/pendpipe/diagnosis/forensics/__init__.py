@@ -6,7 +6,7 @@ Every test is a function ``find(data, fit, noise, samples) -> Finding``.
 from collections.abc import Callable
 from typing import Final
 
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics import (
     colour,

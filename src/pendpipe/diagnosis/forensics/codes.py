@@ -8,12 +8,12 @@ import numpy as np
 from scipy.special import ndtr
 
 from pendpipe.analysis.noise import noise_rms
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.local import Local, error_of, local_residual
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.dynamics.sampling import lagrange
+from pendpipe.dynamics.any_law import lagrange
 
 _NOISE_RATIOS: Final = np.array(
     [0.03, 0.05, 0.07, 0.1, 0.13, 0.16, 0.2, 0.24, 0.28, 0.33, 0.38, 0.44, 0.5, 0.56]

@@ -8,7 +8,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 from scipy.special import gammaincc, log_ndtr, ndtr, xlogy
 
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.codes import (

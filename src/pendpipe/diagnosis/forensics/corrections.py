@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.special import stdtr
 
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.tails import upper_tail

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from scipy.special import bdtrc
 
-from pendpipe.analysis.turning_points.samples import Samples
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.local import (

@@ -6,8 +6,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.any_law import Motion
-from pendpipe.dynamics.sampling import Sampled
+from pendpipe.dynamics.any_law import Motion, Sampled
 from pendpipe.effects.effect import (
     INSTANT,
     RELAXATION,

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.sampling import Sampled
+from pendpipe.dynamics.any_law import Sampled
 from pendpipe.effects.catalogue.in_time import SteadyTone, tone_at, tried_frequencies
 from pendpipe.effects.effect import (
     INSTANT,
