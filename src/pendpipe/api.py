@@ -269,12 +269,12 @@ def fit(
       Q limit πf/b              257(13)
       Quote these numbers with their errors.
     """
+    place, motion = name or _place(recording), _motion(recording, volts_per_radian)
     from dataclasses import replace
 
     from pendpipe.analysis.fit import fit_recording
     from pendpipe.analysis.free_decay import measure_recording
 
-    place, motion = name or _place(recording), _motion(recording, volts_per_radian)
     if points is None:
         points, decay = measure_recording(motion, place)
     else:

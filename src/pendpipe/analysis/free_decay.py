@@ -284,8 +284,6 @@ def _runs_of_flags(flags: list[bool]) -> list[tuple[int, int]]:
     return list(pairwise(ends))
 
 
-__all__ = ["Cut", "FreeDecay", "find_free_decay"]
-
 _BLOCKS: Final = 9
 _LEAST_HALF_CYCLES: Final = 3
 _MANY: Final = 18
