@@ -83,7 +83,7 @@ def scaled(x: float) -> float:
     return FACTOR * math.sqrt(x)
 
 
-@kernel
+@kernel()
 def fill(values: FloatArray, table: Matrix, offset: float, row: int) -> int:
     for i in range(values.size):
         table[row, i] = scaled(values[i]) + offset

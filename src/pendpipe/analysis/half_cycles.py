@@ -85,7 +85,7 @@ def find_extremes(
     return found[: abs(count)].copy(), (count > 0) - (count < 0)
 
 
-@kernel
+@kernel()
 def _find_extremes(
     values: FloatArray,
     stride: int,
@@ -133,7 +133,7 @@ def _find_extremes(
     return first * count
 
 
-@kernel
+@kernel()
 def _median(values: FloatArray, ordered: FloatArray, known: int) -> float:
     """Median of five values of which only `known` are finite; `ordered` is room for them."""
     for i in range(5):
@@ -197,7 +197,7 @@ def thinned(
     return thin_time[:count].copy(), thin_values[:count].copy()
 
 
-@kernel
+@kernel()
 def _thin(
     time_s: FloatArray,
     values: FloatArray,

@@ -64,7 +64,7 @@ from pendpipe.dynamics.panel import (
 )
 
 
-@kernel
+@kernel()
 def _differentiate(node: FloatArray, shape: FloatArray, radius: float) -> None:
     """Write the derivatives of nu by ln r, m, h and q (by g it is 2 sin(psi)/C), and their weights.
 
@@ -102,7 +102,7 @@ def _differentiate(node: FloatArray, shape: FloatArray, radius: float) -> None:
         node[TILT + j] = node[WEIGHT + j] * node[SLIP + j] * bend * steeper
 
 
-@kernel
+@kernel()
 def _grow(node: FloatArray, half_width: float) -> None:
     """Write the integrating factor exp(integral of F_s)."""
     for j in range(NODE_COUNT):
@@ -112,7 +112,7 @@ def _grow(node: FloatArray, half_width: float) -> None:
         node[GROWTH + j] = math.exp(half_width * node[GROWTH + j])
 
 
-@kernel
+@kernel()
 def sensitivities(work: Work, node: FloatArray, radius: float, half_width: float) -> None:
     """Differentiate a solved panel, at fixed time, by the amplitude and along the directions.
 
@@ -207,7 +207,7 @@ def combine(work: Work, polynomials: FloatArray, duration: float, y: float) -> N
             total[2 + c, j] = outer * weight * own[j] + moved * by_start[j] - late * total[1, j]
 
 
-@kernel
+@kernel()
 def emit(
     work: Work,
     time_s: FloatArray,
@@ -254,7 +254,7 @@ def emit(
     return end
 
 
-@kernel
+@kernel()
 def _emit_derivatives(
     work: Work, theta: FloatArray, time_s: FloatArray, out: Matrix, at: int
 ) -> None:
@@ -275,7 +275,7 @@ def _emit_derivatives(
             by_omega[i] -= rate * column[i]
 
 
-@kernel
+@kernel()
 def rest(work: Work, out: Matrix, y: float, first: int) -> None:
     """Write the samples after the stop: the last turning point, exactly."""
     directions = work.rates
@@ -301,7 +301,7 @@ FINEST = 30
 """The finest panel is a half cycle halved so often; it is accepted as it is."""
 
 
-@kernel
+@kernel()
 def _start(work: Work, radius: float) -> None:
     """Set d ln r/dp and dtau/dp at the turning point y = m + r."""
     for c in range(work.sensitivities):
@@ -309,7 +309,7 @@ def _start(work: Work, radius: float) -> None:
         work.shift[c] = 0.0
 
 
-@kernel
+@kernel()
 def _end(work: Work, radius: float, y: float, row: FloatArray) -> None:
     """Write the derivatives of the next turning point, y' = r - m, to the row's head."""
     columns = work.sensitivities
@@ -318,7 +318,7 @@ def _end(work: Work, radius: float, y: float, row: FloatArray) -> None:
         row[HEAD + columns + c] = (y if c == 0 else 1.0) * work.shift[c]
 
 
-@kernel
+@kernel()
 def _solve_panel(
     work: Work,
     node: FloatArray,
@@ -350,7 +350,7 @@ def _solve_panel(
     return True
 
 
-@kernel
+@kernel()
 def _in_time(
     work: Work,
     node: FloatArray,
@@ -370,7 +370,7 @@ def _in_time(
     return unresolved(waveform, 0) <= (SINE_TOLERANCE if bent else WAVEFORM_TOLERANCE)
 
 
-@kernel
+@kernel()
 def half_cycle(
     work: Work,
     time_s: FloatArray,

@@ -1,4 +1,4 @@
-"""Loops as machine code: ``@kernel`` is all that a function needs.
+"""Loops as machine code: ``@kernel()`` is all that a function needs.
 
 Numba compiles a kernel with those that it calls when it is first called from Python. The machine
 code is kept in a file and loaded by llvmlite alone in later processes: a job of the workflow is
@@ -16,7 +16,7 @@ import sys
 from collections.abc import Callable, Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, NamedTuple, TypeAlias, TypeVar, overload
+from typing import Any, Final, NamedTuple, TypeAlias, TypeVar, cast
 
 import numpy as np
 
@@ -58,11 +58,7 @@ SHIPPED: Final = Path(__file__).parent / "shipped"
 """Machine code for many machines, made while the package is built (`setup.py`)."""
 
 
-@overload
-def kernel(function: _F) -> _F: ...
-@overload
-def kernel(*, any_order: bool = ..., inline: bool = ...) -> Callable[[_F], _F]: ...
-def kernel(function: Any = None, *, any_order: bool = False, inline: bool = False) -> Any:
+def kernel(*, any_order: bool = False, inline: bool = False) -> Callable[[_F], _F]:
     """Declare a function of numbers and arrays that runs as machine code.
 
     It allocates nothing and raises nothing: what it fills is given to it. Other kernels may
@@ -77,11 +73,10 @@ def kernel(function: Any = None, *, any_order: bool = False, inline: bool = Fals
     inline
         Compile it into its callers, where it is known what does not overlap.
     """
-    if function is None:
-        return functools.partial(kernel, any_order=any_order, inline=inline)
     # Multiplications and additions may be fused.
     fastmath = {"contract", "reassoc", "nsz"} if any_order else {"contract"}
-    return Kernel(function, {"fastmath": fastmath, "forceinline": inline})
+    options = {"fastmath": fastmath, "forceinline": inline}
+    return cast("Callable[[_F], _F]", functools.partial(Kernel, options=options))
 
 
 class Kernel:

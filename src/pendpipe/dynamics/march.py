@@ -45,7 +45,7 @@ from pendpipe.dynamics.table import (
 )
 
 
-@kernel
+@kernel()
 def sticks(shape: FloatArray, y: float) -> bool:
     """Return whether the pendulum, at rest at amplitude y, stays: delta + h y + q y^2 >= y C(y).
 
@@ -60,7 +60,7 @@ def sticks(shape: FloatArray, y: float) -> bool:
     return bool(h + q * (y + m) >= slope)
 
 
-@kernel
+@kernel()
 def _advance(work: Work, row: FloatArray, y: float) -> None:
     """Carry dy/dp and dtau/dp over a half cycle, which started at y."""
     columns = work.sensitivities
@@ -73,7 +73,7 @@ def _advance(work: Work, row: FloatArray, y: float) -> None:
             work.clock[c] += row[HEAD + columns + c]
 
 
-@kernel
+@kernel()
 def _lay_out(work: Work, rows: Matrix, log_y: float, half_cycles: float) -> bool:
     """Tabulate from ln y downwards if it pays; else note how far to go without a table.
 
@@ -100,7 +100,7 @@ def _lay_out(work: Work, rows: Matrix, log_y: float, half_cycles: float) -> bool
     return False
 
 
-@kernel
+@kernel()
 def _record(work: Work, turning: Matrix, k: int, tau: float, y: float) -> None:
     """Write the time and the angle of turning point k, and their derivatives."""
     omega, sign, first_sign = work.omega, work.sign, work.first_sign
@@ -123,7 +123,7 @@ def _record(work: Work, turning: Matrix, k: int, tau: float, y: float) -> None:
     times[directions + 3], angles[directions + 3] = 0.0, 1.0
 
 
-@kernel
+@kernel()
 def _emit_row(
     work: Work,
     time_s: FloatArray,
@@ -145,7 +145,7 @@ def _emit_row(
     return first, guess
 
 
-@kernel
+@kernel()
 def _begin(work: Work) -> float:
     """Forget what an earlier call left in the workspace; return the amplitude of the release."""
     shape, angle = work.shape, work.release
@@ -159,7 +159,7 @@ def _begin(work: Work) -> float:
     return y
 
 
-@kernel
+@kernel()
 def march(
     work: Work,
     rows: Matrix,

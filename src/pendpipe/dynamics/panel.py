@@ -101,13 +101,13 @@ def angle_of(shape: FloatArray, s: float) -> float:
     return 2.0 * math.asin(0.5 * s) if shape[CURVATURE] > 0.0 else s
 
 
-@kernel
+@kernel()
 def log_amplitude(shape: FloatArray, s: float) -> float:
     """Return ln(s/C) of the amplitude s, the ln of x or of 2 tan(x/2); -inf if s is negative."""
     return math.log(s / curve(shape, s)) if s > 0.0 else -math.inf
 
 
-@kernel
+@kernel()
 def amplitude_at(shape: FloatArray, log_y: float) -> float:
     """Return the amplitude s from its `log_amplitude`."""
     tangent = math.exp(log_y)
@@ -116,7 +116,7 @@ def amplitude_at(shape: FloatArray, log_y: float) -> float:
     return tangent
 
 
-@kernel
+@kernel()
 def place(node: FloatArray, start: float, half_width: float, complement: float) -> None:
     """Set a panel's nodes and forget the last guess, if it is another panel.
 
@@ -146,7 +146,7 @@ def place(node: FloatArray, start: float, half_width: float, complement: float) 
         node[LOSS + j], node[BEFORE + j], node[EARLIER + j] = 0.0, 0.0, 0.0
 
 
-@kernel
+@kernel()
 def complement_for(shape: FloatArray, log_y: float) -> float:
     """Return the complementary modulus for amplitudes up to this one, rounded to a few values."""
     if shape[CURVATURE] == 0.0 or log_y < PHASE_BELOW:
@@ -197,7 +197,7 @@ def _force(node: FloatArray, shape: FloatArray, radius: float, j: int) -> tuple[
     return reach, force * node[BEND + j]
 
 
-@kernel
+@kernel()
 def solve(
     node: FloatArray, shape: FloatArray, radius: float, half_width: float, tolerance: float
 ) -> bool:
@@ -235,7 +235,7 @@ def solve(
     return False
 
 
-@kernel
+@kernel()
 def _finish(
     node: FloatArray, shape: FloatArray, radius: float, half_width: float, tolerance: float
 ) -> bool:
@@ -264,7 +264,7 @@ def _finish(
     return bool(error * half_width <= tolerance * strength)
 
 
-@kernel
+@kernel()
 def time_nodes(node: FloatArray, half_width: float, chebyshev: FloatArray) -> float:
     """Find where in the panel the Chebyshev nodes of *time* lie.
 
@@ -296,7 +296,7 @@ def time_nodes(node: FloatArray, half_width: float, chebyshev: FloatArray) -> fl
     return float(duration)
 
 
-@kernel
+@kernel()
 def _tabulate_chebyshev(node: FloatArray, chebyshev: FloatArray) -> None:
     """Write T_k(zeta) to ``chebyshev[k]``."""
     for i in range(NODE_COUNT):
@@ -307,7 +307,7 @@ def _tabulate_chebyshev(node: FloatArray, chebyshev: FloatArray) -> None:
             chebyshev[k, i] = 2.0 * node[ZETA + i] * chebyshev[k - 1, i] - chebyshev[k - 2, i]
 
 
-@kernel
+@kernel()
 def polynomial(
     node: FloatArray, values: FloatArray, chebyshev: FloatArray, out: FloatArray, to: int
 ) -> None:
@@ -320,7 +320,7 @@ def polynomial(
     multiply(POWERS_T, values, 0, out, to)
 
 
-@kernel
+@kernel()
 def horner(c: FloatArray, theta: FloatArray, out: FloatArray) -> None:
     """Evaluate the polynomial of degree 16 with coefficients `c` at `theta`.
 

@@ -48,7 +48,7 @@ LOW, HIGH, MIDDLE, INVERSE, POINTS, PANELS = range(6)
 DONE, MORE_PANELS, LESS_SPAN = range(3)
 
 
-@kernel
+@kernel()
 def widest(shape: FloatArray, log_y: float) -> float:
     """Return the widest span below ln y that a table resolves to 1e-12.
 
@@ -61,13 +61,13 @@ def widest(shape: FloatArray, log_y: float) -> float:
     return min(_WIDEST, 0.8 * math.sqrt(above * above + 0.25 * math.pi * math.pi))
 
 
-@kernel
+@kernel()
 def points_for(shape: FloatArray, log_y: float, span: float) -> int:
     """Return how many points, a multiple of six, resolve a span below ln y."""
     return FEW_POINTS if span < _FEW * widest(shape, log_y) else MOST_POINTS
 
 
-@kernel
+@kernel()
 def half_cycles_and_span(
     shape: FloatArray, log_y: float, half_cycles: float, room: float
 ) -> tuple[float, float]:
@@ -92,7 +92,7 @@ def half_cycles_and_span(
     return count, room
 
 
-@kernel
+@kernel()
 def build(work: Work, rows: Matrix, log_y: float, span: float, panels: int) -> int:
     """Tabulate the half cycles with ln y from log_y - span to log_y in `rows`.
 
@@ -118,7 +118,7 @@ def build(work: Work, rows: Matrix, log_y: float, span: float, panels: int) -> i
     return DONE
 
 
-@kernel
+@kernel()
 def _interpolate(
     points: int,
     width: int,
@@ -160,7 +160,7 @@ def _interpolate(
     return resolved
 
 
-@kernel
+@kernel()
 def look_up(
     segment: FloatArray, table: FloatArray, log_y: float, width: int, row: FloatArray
 ) -> None:
@@ -177,7 +177,7 @@ def look_up(
             row[j] = ((upper * z + t2[j]) * z + t1[j]) * z + t0[j]
 
 
-@kernel
+@kernel()
 def look_up_turning_point(
     segment: FloatArray, table: FloatArray, log_y: float
 ) -> tuple[float, float]:

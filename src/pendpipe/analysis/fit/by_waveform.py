@@ -58,7 +58,7 @@ _FAR = 25.0
 """Standard deviations beyond which the tail's probability is taken from its series."""
 
 
-@kernel
+@kernel()
 def rounded(
     residual: FloatArray, half_step: float, noise: float, score: FloatArray, weight: FloatArray
 ) -> float:

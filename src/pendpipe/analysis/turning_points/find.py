@@ -97,7 +97,7 @@ def _level(value: FloatArray) -> float:
     return float(np.median(0.25 * (value[:-2] + 2.0 * value[1:-1] + value[2:])))
 
 
-@kernel
+@kernel()
 def solve_in_place(matrix: Matrix, right: FloatArray, size: int) -> None:
     """Solve a small positive definite system; `right` becomes the solution."""
     for p in range(size):
@@ -132,7 +132,7 @@ def smooth_times(
     return centre, slope
 
 
-@kernel
+@kernel()
 def _smooth_times(
     number: IntArray,
     time_s: FloatArray,
@@ -182,7 +182,7 @@ def _smooth_times(
         slope[k] = right[1]
 
 
-@kernel
+@kernel()
 def count_half_cycles(
     time_s: FloatArray, sign: IntArray, gap_before: IntArray, period: float, number: IntArray
 ) -> int:

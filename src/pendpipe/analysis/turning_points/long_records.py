@@ -95,13 +95,13 @@ def _fit_batch(
     return count
 
 
-@kernel
+@kernel()
 def _length(reach: int) -> int:
     """Return how many numbers of a table are used: a loop over them has no rest."""
     return (2 * reach + _LANES) // _LANES * _LANES
 
 
-@kernel
+@kernel()
 def _fill_tables(reach: int, step: float, tables: Matrix) -> tuple[float, float, float]:
     """Write the weights of the readings from -reach to reach about a turning, `step` apart.
 
@@ -127,7 +127,7 @@ def _fill_tables(reach: int, step: float, tables: Matrix) -> tuple[float, float,
     return flat, even, odd
 
 
-@kernel
+@kernel()
 def _track(
     values: FloatArray,
     start: FloatArray,

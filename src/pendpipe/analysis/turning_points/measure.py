@@ -202,7 +202,7 @@ def _product(one: FloatArray, other: FloatArray, count: int) -> float:
     return total
 
 
-@kernel
+@kernel()
 def half_cycle_sums(
     time_s: FloatArray,
     values: FloatArray,
