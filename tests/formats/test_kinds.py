@@ -872,3 +872,32 @@ def test_rows_of_a_hand_draw_no_circle(tmp_path: Path) -> None:
     recording = read_text(tmp_path, text(TIME, x, y, digits=3, head="t,x,y\n"))
     assert recording.unit == "rad"
     np.testing.assert_allclose(recording.values[20:], ANGLE[20:], atol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["Pixel (Y) [px]", "Y (bob) <b> [px]", "Bob <2> (px) [raw]"])
+def test_of_several_brackets_the_one_with_a_unit_counts(tmp_path: Path, name: str) -> None:
+    still = np.ones(len(TIME))
+    recording = read_text(
+        tmp_path, text(TIME, still, 80 * ANGLE, sign=";", head=f"t [s];Pixel (X) [px];{name}\n")
+    )
+    assert recording.unit == "pixels"
+    np.testing.assert_allclose(recording.values, 80 * ANGLE, atol=1e-4)
+
+
+@pytest.mark.parametrize("head", ["", "t (s),ax (mg),ay (mg)\n"])
+def test_the_pull_along_the_rod_gives_way_to_the_swing_within_a_bin(
+    tmp_path: Path, head: str
+) -> None:
+    time, phase = TIME[:430], 2 * np.pi * 0.745 * TIME[:430]
+    along = 900 * np.exp(-0.1 * time) * np.cos(2 * phase)
+    across = 300 * np.exp(-0.05 * time) * np.cos(phase)
+    recording = read_text(tmp_path, text(time, along, across, head=head))
+    found = recording.values / np.abs(recording.values).max()
+    np.testing.assert_allclose(found, across / across.max(), atol=1e-3)
+    assert any("twice the frequency" in note for note in recording.notes)
+
+
+def test_clipped_readings_are_said(tmp_path: Path) -> None:
+    recording = read_text(tmp_path, text(TIME, np.clip(ANGLE, -0.3, 0.3), head="t,theta\n"))
+    assert any("range" in note for note in recording.notes)
+    assert not any("range" in n for n in read_text(tmp_path, text(TIME, ANGLE)).notes)

@@ -372,14 +372,17 @@ def _of_equals(equals: Sequence[tuple[Column, ...]]) -> tuple[tuple[Column, ...]
     graded = [c for c in equals if c[0].swing.clear and c[0].swing.graded > 0.3]
     if graded and own.graded < 0.1 and own.clear:
         return graded[0], ", whose swing decays"
+    for column in equals:
+        # Height, and the pull along the string, go through two cycles in one of the swing.
+        cycle = column[0].swing.samples_per_cycle
+        ratio = cycle / (own.samples_per_cycle or np.inf)
+        # Known to one cycle more or less in the whole.
+        blur = max(0.05, min(1.01 * cycle / len(column[0].values), 0.2))
+        if column[0].swing.clear and abs(ratio - 2.0) < blur:
+            return column, f", of which '{first[0].label}' has twice the frequency"
     units = {(unit_of(c[0].unit) or c[0].unit) for c in equals if c[0].unit}
     if len(units) > 1 or not all(c[0].unit or c[0].name for c in equals):
         return first, ""
-    for column in equals:
-        # Height, and the pull along the string, go through two cycles in one of the swing.
-        ratio = column[0].swing.samples_per_cycle / (own.samples_per_cycle or np.inf)
-        if column[0].swing.clear and abs(ratio - 2.0) < 0.05:
-            return column, f", of which '{first[0].label}' has twice the frequency"
     largest = max(column[0].swing.amplitude for column in equals)
     wide = next(c for c in equals if c[0].swing.amplitude >= largest / 3)
     return wide, "" if wide is first else ", which swings most"

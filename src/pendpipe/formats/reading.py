@@ -246,13 +246,18 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     if found.quantity == "reading":
         metadata["unit"] = found.unit
     own_step = choice.readings[0].resolution
+    step = own_step * found.factor if own_step is not None else find_step(values)
+    limits = choice.readings[0].limits
+    limits = limits and (limits[0] * found.factor, limits[1] * found.factor)
+    if cut := clipped_samples(values, step, limits):
+        notes.append(f"{cut} reading(s) at the end of the sensor's range: its turns are cut off")
     recording = Recording(
         time_s=np.ascontiguousarray(base.time_s),
         values=np.ascontiguousarray(values),
         quantity=found.quantity,
         quality=quality if quality.any() else None,
         metadata=metadata,
-        resolution=own_step * found.factor if own_step is not None else find_step(values),
+        resolution=step,
         notes=tuple(notes),
         weak_guesses=(*choice.weak_guesses, *base.weak_guesses, *found.weak_guesses),
         radius_excess=None if found.radius_excess is None else found.radius_excess[base.rows],

@@ -105,7 +105,7 @@ def unit_of(text: str) -> Unit | None:
     return _UNITS.get(word) or _UNITS.get(word.replace(" ", "").rstrip("."))
 
 
-_BRACKETED: Final = re.compile(r"^(.*?)\s*[\[({<]\s*([^\])}>]*)\s*[\])}>]\s*(.*)$")
+_BRACKETED: Final = re.compile(r"\s*[\[({<]\s*([^\])}>]*)\s*[\])}>]\s*")
 _SLASHED: Final = re.compile(r"^(.+?)\s*/\s*(\S.*)$")
 _SPACED: Final = re.compile(r"^(.+?)(?:\s+in\s+|\s*[,;:]\s*|\s+(?=\S\S))(\S+)$")
 _SUFFIX: Final = re.compile(r"^(.+?)[_\-.]([A-Za-zµ°]+)$")
@@ -136,12 +136,13 @@ def split_header(text: str) -> tuple[str, str]:
     )
     if unit_of(text) is not None and len(plain(text)) > 1 and "/" in text:
         return text, text
-    bracketed = _BRACKETED.match(text)
-    # "angle (0 up, pi down)" is a remark, "[foo]" a unit that nobody knows.
-    remark = bracketed is not None and unit_of(bracketed[2]) is None and " " in bracketed[2]
-    if bracketed and bracketed[1] and not remark:
-        name = f"{bracketed[1]} {bracketed[3]}".strip()
-        return re.sub(r"(?i)\s*\brun\s*#?\d+\s*$", "", name), bracketed[2].strip()
+    brackets = list(_BRACKETED.finditer(text))
+    known = [found for found in brackets if unit_of(found[1]) is not None]
+    for found in [*known[-1:], *brackets[:1]]:
+        # "angle (0 up, pi down)" is a remark, "[foo]" a unit that nobody knows.
+        if found.start() and (known or " " not in found[1]):
+            name = f"{text[: found.start()]} {text[found.end() :]}".strip()
+            return re.sub(r"(?i)\s*\brun\s*#?\d+\s*$", "", name), found[1].strip()
     for pattern in (_SLASHED, _SPACED, _SUFFIX, _CAMEL):
         split = pattern.match(text)
         # One letter after an underscore is as likely an axis or an index as a unit.
