@@ -901,3 +901,28 @@ def test_clipped_readings_are_said(tmp_path: Path) -> None:
     recording = read_text(tmp_path, text(TIME, np.clip(ANGLE, -0.3, 0.3), head="t,theta\n"))
     assert any("range" in note for note in recording.notes)
     assert not any("range" in n for n in read_text(tmp_path, text(TIME, ANGLE)).notes)
+
+
+@pytest.mark.parametrize("wrong", [-0.89, 0.89])
+def test_a_lone_wrong_time_stamp_is_interpolated(tmp_path: Path, wrong: float) -> None:
+    """Some clocks count the full second a row too late, or too early."""
+    stamps = TIME.copy()
+    stamps[29::100] += wrong
+    recording = read_text(tmp_path, text(stamps, ANGLE, head="t,theta\n"))
+    same(recording)
+    assert any("15 time stamp(s)" in note for note in recording.notes)
+
+
+def test_of_a_clock_that_steps_back_either_part_can_be_read(tmp_path: Path) -> None:
+    stamps = np.where(np.arange(len(TIME)) < 600, TIME, TIME - 0.11)
+    ticks, path = 1e-3 * np.cumsum(33.0 + np.arange(len(TIME)) % 2), tmp_path / "a.csv"
+    path.write_text(text(stamps, ANGLE, ticks, head="t (s),theta (rad),Step\n"))
+    with pytest.raises(InputError) as fault:
+        read(path)
+    assert "--column 'Step:READING'" in str(fault.value)
+    stop = float(str(fault.value).split("(--stop ")[1].split(")")[0])
+    assert stop == pytest.approx(TIME[599], abs=1e-6)
+    same(read(path, ReadOptions(stop_s=stop)), ANGLE[:600], TIME[:600])
+    later = read(path, ReadOptions(start_s=stop))
+    np.testing.assert_allclose(later.values, ANGLE[-len(later) :], atol=1e-5)
+    assert len(later) == pytest.approx(897, abs=1)

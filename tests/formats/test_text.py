@@ -232,6 +232,12 @@ def spoil(row: int, text: str) -> Callable[[list[str]], list[str]]:
     return spoilt
 
 
+def set_back(lines: list[str], row: int) -> list[str]:
+    """Set the clock back by 0.05 s, once."""
+    later = (line.split(",") for line in lines[row:])
+    return [*lines[:row], *(f"{float(time) - 0.05:.4f},{angle}" for time, angle in later)]
+
+
 @pytest.mark.parametrize(
     ("fault", "said"),
     [
@@ -239,7 +245,7 @@ def spoil(row: int, text: str) -> Callable[[list[str]], list[str]]:
         (spoil(7, "oops,0.4"), "line 8: 'oops' is no number"),
         (spoil(1, "oops,0.4"), "line 2: 'oops' is no number"),
         (spoil(2, "restarted here"), "line 3: 'restarted here' is no number"),
-        (spoil(7, "0.01,0.4"), "line 8: the time falls"),
+        (lambda lines: set_back(lines, 7), "line 8: the time falls (0.1 is followed by 0.07)"),
         (spoil(7, "0.12,inf"), "line 8: 1 reading(s) that are infinite"),
         (spoil(7, "nan,0.4"), "line 8: the time is missing or NaN"),
         (spoil(800, "15.98,abc"), "line 801: 'abc' is no number"),

@@ -191,7 +191,7 @@ def _settled(column: Column) -> Column:
     """Undo a clock's overflow; and "run1" counts nothing where it swings."""
     if column.role == "time":
         return replace(column, values=_counted_on(column.values))
-    swings = column.role == "index" and column.swing.clear
+    swings = column.role == "index" and column.swing.clear and one_way(column.values) < 0.95
     return replace(column, role="unknown") if swings else column
 
 
@@ -555,7 +555,8 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     number = every.astype(np.float64) if column is None else column.values - column.values[0]
     note = f"no time column: times from the header's {1 / interval_s:g} Hz"
     note += f" and '{column.label}'" if column is not None else ""
-    return _in_order(table, choice, TimeBase(number * interval_s, every, [note]), interval_s)
+    base = TimeBase(number * interval_s, every, [note])
+    return _in_order(table, choice, base, interval_s, options)
 
 
 def _from_column(
@@ -585,7 +586,7 @@ def _from_column(
     if left := len(filled) - len(rows):
         base.notes.append(f"{left} row(s) with neither time nor reading left out")
     (base.weak_guesses if weak else base.notes).extend([note] * bool(note))
-    return _in_order(table, choice, base, factor)
+    return _in_order(table, choice, base, factor, options)
 
 
 def refuse_text(table: Table, column: Column, remedy: str) -> None:
@@ -643,7 +644,9 @@ def _time_by_size(column: Column, period: float, values: FloatArray) -> tuple[fl
     return 1.0, f"{taken} seconds", False
 
 
-def _in_order(table: Table, choice: Choice, base: TimeBase, tick: float) -> TimeBase:
+def _in_order(
+    table: Table, choice: Choice, base: TimeBase, tick: float, options: ReadOptions
+) -> TimeBase:
     """Turn times that are out of order, or repeat, into times that rise; or refuse them."""
     if one_way(base.time_s) > 0.95 and base.time_s[-1] < base.time_s[0]:
         base.keep(slice(None, None, -1), "the newest row stands first: rows turned round")
@@ -652,7 +655,16 @@ def _in_order(table: Table, choice: Choice, base: TimeBase, tick: float) -> Time
         base.metadata["recorded_at"] = f"{start:.6f} s since 1970"
         base.notes.append(f"times are counted from the first row ({start:.6f} s on its clock)")
         base.time_s = base.time_s - start
-    for repaired in (_count_rows, _keep_last, _drop_repeats, _first_of_stacked):
+    if np.diff(base.time_s).min(initial=1.0) <= 0:
+        # What lies before --start, or behind --stop, need not be in order.
+        start_s, stop_s = options.start_s, options.stop_s
+        late = np.flatnonzero(base.time_s >= (np.inf if stop_s is None else stop_s))
+        asked = slice(0, late.min(initial=len(base.time_s)) + 1)
+        base.time_s, base.rows = base.time_s[asked], base.rows[asked]
+        early = np.flatnonzero(base.time_s <= (-np.inf if start_s is None else start_s))
+        asked = slice(early.max(initial=0), None)
+        base.time_s, base.rows = base.time_s[asked], base.rows[asked]
+    for repaired in (_count_rows, _keep_last, _drop_repeats, _first_of_stacked, _lone_stamps):
         if np.diff(base.time_s).min(initial=1.0) <= 0:
             repaired(choice, base)
     steps = np.diff(base.time_s)
@@ -661,10 +673,18 @@ def _in_order(table: Table, choice: Choice, base: TimeBase, tick: float) -> Time
     at = int(np.argmax(steps <= 0))
     verb = "repeats" if steps[at] == 0 else "falls"
     before, after = base.time_s[at] / tick, base.time_s[at + 1] / tick
+    clocks = (
+        f"take the time from '{column.label}' (--column '{column.label}:READING'), "
+        for column in table.columns
+        if column is not choice.time and not _counts_samples(column)
+        if np.diff(column.values).min(initial=np.inf) > 0
+    )
+    end = f"{base.time_s[at]:.10g}"
     raise InputError(
         table.where(int(base.rows[at + 1])),
         f"the time {verb} ({before:.10g} is followed by {after:.10g})",
-        "correct the rows, or give --sample-rate if they are evenly spaced",
+        f"{next(clocks, '')}read what lies before it (--stop {end}) or behind it (--start {end}),"
+        " or give --sample-rate if the rows are evenly spaced",
     )
 
 
@@ -719,6 +739,20 @@ def _first_of_stacked(_choice: Choice, base: TimeBase) -> None:
         " put each into a file of its own for the others"
     )
     base.time_s, base.rows = base.time_s[: starts[0]], base.rows[: starts[0]]
+
+
+def _lone_stamps(_choice: Choice, base: TimeBase) -> None:
+    """Interpolate stamps that fall out of a time that rises without them."""
+    padded = np.concatenate(([-np.inf], base.time_s, [np.inf]))
+    at = np.flatnonzero(np.diff(base.time_s) < 0)
+    # Either the stamp before a fall is too late, or the one behind it too early.
+    wrong = np.where(padded[at + 3] > padded[at + 1], at + 1, at)
+    good = np.delete(np.arange(len(base.time_s)), wrong)
+    inside = not {0, len(base.time_s) - 1} & set(wrong.tolist())
+    rises = np.diff(base.time_s[good]).min(initial=1.0) > 0
+    if inside and rises and len(wrong) <= 0.05 * len(good):
+        base.time_s = np.interp(np.arange(len(base.time_s)), good, base.time_s[good])
+        base.notes.append(f"{len(wrong)} time stamp(s) that fall out of order interpolated")
 
 
 def _rounded(time: FloatArray) -> FloatArray | None:
