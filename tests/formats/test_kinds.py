@@ -926,3 +926,20 @@ def test_of_a_clock_that_steps_back_either_part_can_be_read(tmp_path: Path) -> N
     later = read(path, ReadOptions(start_s=stop))
     np.testing.assert_allclose(later.values, ANGLE[-len(later) :], atol=1e-5)
     assert len(later) == pytest.approx(897, abs=1)
+
+
+def test_rows_stamped_on_arrival_are_counted_where_the_periods_agree(tmp_path: Path) -> None:
+    random = np.random.default_rng(5)
+    time, angle = TIME[::3], ANGLE[::3]
+    late = np.maximum.accumulate(time + random.exponential(0.1, len(time)))
+    late += 1e-4 * np.arange(len(time))
+    recording = read_text(tmp_path, text(late, angle, head="t (s),theta (rad)\n"))
+    np.testing.assert_allclose(recording.time_s - recording.time_s[0], time, atol=0.1)
+    assert np.ptp(np.diff(recording.time_s)) < 1e-9
+    assert any("--sample-rate" in guess for guess in recording.weak_guesses)
+
+
+def test_true_stamps_of_uneven_samples_stay(tmp_path: Path) -> None:
+    kept = np.sort(np.random.default_rng(5).choice(len(TIME), 700, replace=False))
+    recording = read_text(tmp_path, text(TIME[kept], ANGLE[kept], head="t (s),theta (rad)\n"))
+    same(recording, ANGLE[kept], TIME[kept])

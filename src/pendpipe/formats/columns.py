@@ -20,6 +20,7 @@ from pendpipe.formats.table import (
     Table,
     derivative_slope,
     follows_sine,
+    is_uniform,
     periods,
     swing_of,
 )
@@ -669,6 +670,7 @@ def _in_order(
             repaired(choice, base)
     steps = np.diff(base.time_s)
     if steps.min(initial=1.0) > 0:
+        _count_late_rows(choice, base)
         return base
     at = int(np.argmax(steps <= 0))
     verb = "repeats" if steps[at] == 0 else "falls"
@@ -700,6 +702,28 @@ def _count_rows(_choice: Choice, base: TimeBase) -> None:
             "time stamps are rounded and repeat: rows are counted at"
             f" {1.0 / interval:.6g} Hz{lost}, which all stamps agree with"
         )
+
+
+def _count_late_rows(choice: Choice, base: TimeBase) -> None:
+    """Count rows that were stamped as they arrived: by rows the periods agree far better."""
+    values = _values(choice, base)
+    if not len(values) or is_uniform(base.time_s):
+        return
+    index = np.arange(len(values))
+    even: FloatArray = np.polynomial.Polynomial.fit(index, base.time_s, 1)(index)
+    stamped, counted = (periods(time, values)[0] for time in (base.time_s, even))
+    if min(len(stamped), len(counted)) < 8:
+        return
+    scatter = [np.median(np.abs(np.diff(found))) / np.median(found) for found in (stamped, counted)]
+    if scatter[1] < min(0.1 * scatter[0], 0.03):
+        late = float(np.std(base.time_s - even))
+        base.weak_guesses.append(
+            f"time stamps scatter by {late:.2g} s, as of arrival: rows are counted at"
+            f" {1.0 / (even[1] - even[0]):.6g} Hz, by which the periods agree"
+            f" {scatter[0] / scatter[1]:.0f} times better; the rate is known"
+            f" to {100.0 * late / np.ptp(even):.1g} % (--sample-rate)"
+        )
+        base.time_s = even
 
 
 def _values(choice: Choice, base: TimeBase) -> FloatArray:
