@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -15,9 +16,10 @@ from pendpipe.diagnosis.gauss_newton import SETTLED
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import ROUNDS, Fit, Refining, pulled
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.scores import finer_shape
+from pendpipe.diagnosis.scores import finer_shape, scores_and_lengths
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
+from pendpipe.effects.effect import Sudden
 
 NEAR: Final = 16.0
 """Twice the log-likelihood by which a lead may be behind the best and still win in the end."""
@@ -54,7 +56,8 @@ def refit_leads(
     most: int = _MOST_REFITTED,
 ) -> list[Rival]:
     """Refit the leading effects nonlinearly, and return them ranked, the best first."""
-    leads = _worth_refitting(detection, phase_lost, most, wide=bool(pulled(base)))
+    scanned = _about_one_instant(base, noise, detection.leads)
+    leads = _worth_refitting(scanned, phase_lost, most, wide=bool(pulled(base)))
     fits: list[tuple[Lead, Fit]] = []
     for lead, fit in side_by_side(base, data, noise, leads, held, phase_lost=phase_lost):
         if fit is not None and believable(base, fit, lead.effect):
@@ -84,13 +87,31 @@ def _names_first(rivals: list[Rival]) -> list[Rival]:
     return sorted(rivals, key=order)
 
 
-def _worth_refitting(detection: Detection, phase_lost: bool, most: int, wide: bool) -> list[Lead]:
+def _about_one_instant(base: Fit, noise: Noise, leads: Sequence[Lead]) -> Sequence[Lead]:
+    """Score all that is sudden again about the instant of the best lead, if that is sudden.
+
+    A knock's score depends on its phase in the cycle, and the scan's instants lie farther apart.
+    """
+    best = max(leads, key=_rank, default=None)
+    if best is None or not isinstance(best.effect, Sudden):
+        return leads
+    found = []
+    for lead in leads:
+        if isinstance(lead.effect, Sudden):
+            shape = finer_shape(base, noise, lead.effect, best.shape)
+            score = float(scores_and_lengths(base, noise, lead.effect, [shape])[0][0] ** 2)
+            lead = replace(lead, shape=shape, score=score) if score > lead.score else lead
+        found.append(lead)
+    return found
+
+
+def _worth_refitting(found: Sequence[Lead], phase_lost: bool, most: int, wide: bool) -> list[Lead]:
     """Return the leads that may win, or be in the winner's class.
 
     There are more (`wide`) where the base has a value at its bound: the score keeps it there,
     while a refit may release it and gain far more.
     """
-    leads = sorted(detection.leads, key=lambda lead: -_rank(lead))
+    leads = sorted(found, key=lambda lead: -_rank(lead))
     if not leads:
         return []
     best = _rank(leads[0])
