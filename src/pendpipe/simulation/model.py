@@ -183,13 +183,12 @@ class Instrument:
 
     def times(self, time_s: FloatArray) -> FloatArray:
         """When the readings are really taken (slips, jitter)."""
-        if "clock-slips" in self.settings:
-            slips = self.settings["clock-slips"]
+        if slips := self.settings.get("clock-slips"):
             time_s = time_s + slips["dt"] * self._staircase(slips["number"], len(time_s))
-        if "jitter" not in self.settings:
-            return time_s
-        scatter = self.settings["jitter"]["sigma_t"] * self.random.standard_normal(len(time_s))
-        return np.sort(time_s + scatter)
+        if jitter := self.settings.get("jitter"):
+            scatter = self.random.standard_normal(len(time_s))
+            time_s = np.sort(time_s + jitter["sigma_t"] * scatter)
+        return time_s
 
     def _staircase(self, number: float, count: int) -> FloatArray:
         """Steps of one, up or down, at random readings."""
@@ -235,16 +234,13 @@ class Instrument:
     def spoilt(self, angle: FloatArray) -> FloatArray:
         """Add slips and glitches, then clip, then round coarsely."""
         angle = angle.copy()
-        if "count-slips" in self.settings:
-            slips = self.settings["count-slips"]
+        if slips := self.settings.get("count-slips"):
             angle += slips["step"] * self._staircase(slips["number"], len(angle))
-        if "glitches" in self.settings:
-            glitches = self.settings["glitches"]
+        if glitches := self.settings.get("glitches"):
             number = min(round(glitches["number"]), len(angle))
             where = self.random.choice(len(angle), number, replace=False)
             angle[where] += glitches["rms"] * self.random.standard_normal(number)
-        if "clipping" in self.settings:
-            levels = self.settings["clipping"]
+        if levels := self.settings.get("clipping"):
             refuse_if(
                 not levels["lower_level"] < levels["upper_level"],
                 self.place,
