@@ -49,8 +49,8 @@ def a_fit(method: str, restoring: str, frequency: float, **values: float) -> Fit
         baseline="eq8",
         parameters={name: Estimate(value, 0.0, "") for name, value in given.items()},
         quality_factor_limit=None,
-        covariance_order=("b",),
-        covariance=np.array([[1e-8]]),
+        covariance_order=("a", "b", "c"),
+        covariance=np.diag([0.0, 1e-8, 0.0]),
         noise_rms_rad=1e-5,
         residual_rms_rad=1e-5,
         chi2_per_dof=1.0,
@@ -127,8 +127,12 @@ def test_the_quality_factor_of_sin_x_is_that_of_its_turning_points() -> None:
     moved = [
         np.abs(turning_points(law, Release(0.0, 1.5), count=160).angle_rad) for law in (up, down)
     ]
-    q = [np.pi / np.log(each[:-2] / each[2:]) for each in moved]
-    assert half_width[:60] == pytest.approx(1.96 * 0.5 * np.abs(q[1] - q[0])[:60], rel=0.02)
+    at = y[1:-1]
+    q = [np.interp(-at, -e[1:-1], np.pi / np.log(e[:-2] / e[2:])) for e in moved]
+    off = np.abs(half_width / (1.96 * 0.5 * np.abs(q[1] - q[0])) - 1.0)
+    # Eq. 13's shares of the losses are those of small amplitudes.
+    assert np.max(off[1:100]) < 0.06
+    assert np.max(off[60:100]) < 0.005
 
 
 def test_figure_7_draws_all_samples_inside_the_envelope(example: Any) -> None:

@@ -5,7 +5,7 @@ Each draws the law that was fitted, and names it in its key.
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,7 +15,7 @@ from scipy.interpolate import make_interp_spline
 
 from pendpipe import physics
 from pendpipe.analysis.fit.by_points import fit_envelope
-from pendpipe.analysis.fit.result import FitResult, read_fit, seen_qualities
+from pendpipe.analysis.fit.result import FitResult, read_fit, relative_loss_sd, seen_qualities
 from pendpipe.analysis.turning_points import TurningPoints, read_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Release, turning_points
@@ -276,8 +276,7 @@ def _maximum(decay: Decay, elapsed_s: FloatArray, quality: FloatArray) -> list[M
 def quality_with_band(decay: Decay, elapsed_s: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Q of the fitted law along a decay, and the half width of its 95 % band.
 
-    The band follows from the fit's covariance of the amplitude and a, b, c by the
-    derivatives of Q, which are differences over a thousandth of a standard deviation.
+    The band is that of Q at the amplitudes of the decay.
 
     Parameters
     ----------
@@ -289,22 +288,11 @@ def quality_with_band(decay: Decay, elapsed_s: FloatArray) -> tuple[FloatArray, 
     Returns
     -------
     tuple of FloatArray
-        Q and the half width, each of shape (n,); zero width without a covariance.
+        Q and the half width, each of shape (n,).
     """
-    fit, order = decay.fit, decay.fit.covariance_order
-    quality = decay.along(elapsed_s)[1]
-    variances = dict(zip(order, np.diag(fit.covariance), strict=True))
-    names = [name for name in ("amplitude", "a", "b", "c") if variances.get(name, 0.0) > 0.0]
-    slopes = np.zeros((len(names), len(elapsed_s)))
-    for row, name in zip(slopes, names, strict=True):
-        step, own = 1e-3 * np.sqrt(variances[name]), fit.parameters[name]
-        moved = replace(own, value=own.value + step)
-        changed = replace(decay, fit=replace(fit, parameters={**fit.parameters, name: moved}))
-        row[:] = (changed.along(elapsed_s)[1] - quality) / step
-    places = [order.index(name) for name in names]
-    covariance = fit.covariance[np.ix_(places, places)]
-    variance = np.nan_to_num(np.einsum("in,ij,jn->n", slopes, covariance, slopes))
-    return quality, 1.96 * np.sqrt(np.maximum(variance, 0.0))
+    amplitude, quality = decay.along(elapsed_s)
+    relative = np.array([relative_loss_sd(decay.fit, y) for y in amplitude.tolist()])
+    return quality, 1.96 * relative * quality
 
 
 FALL = 0.75

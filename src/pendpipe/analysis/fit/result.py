@@ -453,11 +453,16 @@ def _quality(result: FitResult, amplitude: float) -> Quality:
     period = period_of(result, amplitude)
     value = math.pi / (period * loss) if loss > 0.0 else math.inf
     covariance = _covariance_of_losses(result, amplitude)
-    error = Estimate(value, value * _sd(np.ones(3), covariance), "")
+    error = Estimate(value, value * relative_loss_sd(result, amplitude), "")
     index = list(losses).index(dominant)
     share = losses[dominant] / sum(losses.values())
     of_it = Estimate(share, _sd(np.eye(3)[index] - share, covariance), "")
     return Quality(amplitude, error, period, dominant, of_it)
+
+
+def relative_loss_sd(result: FitResult, amplitude: float) -> float:
+    """Relative standard deviation of the law's loss, and so of Q, at one amplitude."""
+    return _sd(np.ones(3), _covariance_of_losses(result, amplitude))
 
 
 def _sd(weights: FloatArray, covariance: FloatArray) -> float:
