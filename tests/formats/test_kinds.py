@@ -943,3 +943,37 @@ def test_true_stamps_of_uneven_samples_stay(tmp_path: Path) -> None:
     kept = np.sort(np.random.default_rng(5).choice(len(TIME), 700, replace=False))
     recording = read_text(tmp_path, text(TIME[kept], ANGLE[kept], head="t (s),theta (rad)\n"))
     same(recording, ANGLE[kept], TIME[kept])
+
+
+def test_trackers_masses_are_named_and_chosen(tmp_path: Path) -> None:
+    path, other = tmp_path / "a.csv", 0.2 * RATE
+    path.write_text(
+        text(
+            TIME,
+            ANGLE,
+            0.1 * ANGLE,
+            other,
+            0.1 * other,
+            head=",Right Mass,,Left Mass,\nt,x,y,x,y\n",
+        )
+    )
+    recording = read(path)
+    same(recording)
+    note = next(note for note in recording.notes if "is taken from" in note)
+    assert "'x of Right Mass'" in note
+    assert "x of Left Mass" in note
+    for key in ("Left Mass", "x of left mass", "x (2)", "4"):
+        chosen = read(path, ReadOptions(column=key))
+        np.testing.assert_allclose(chosen.values, other, atol=1e-5)
+        assert chosen.unit == recording.unit
+
+
+def test_inspect_prints_the_number_that_column_takes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "a.csv").write_text(text(TIME, ANGLE, 900 + 80 * ANGLE, head="t,theta,foo\n"))
+    assert main(["inspect", str(tmp_path / "a.csv"), "--column", "foo"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert "  channel 2   foo (--column 3)" in told
+    assert next(line for line in told if "hangs at" in line).split()[-1] == "899.937"
+    assert any(line.endswith("foo, in no known unit") for line in told)

@@ -23,7 +23,7 @@ from pendpipe.analysis.turning_points.find import find_turning_points
 from pendpipe.analysis.turning_points.table import BEAT, Cut, TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.errors import NotAnalysableError, refuse_if
-from pendpipe.quantities import with_error
+from pendpipe.quantities import after_number, with_error
 from pendpipe.recording import Recording
 
 # Loose on purpose: an impulse or a beat is physics to be diagnosed, not to be cut.
@@ -356,8 +356,8 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     half_period = usual_half_period(time, values)
     if half_period is None or span < 3.0 * least:
         why = (
-            f"no oscillation: the reading moves by {span:.3g} {recording.unit}, its noise and step"
-            f" hide {least:.2g}"
+            f"no oscillation: the reading moves by {span:.3g}{after_number(recording.unit)},"
+            f" its noise and step hide {least:.2g}"
             if span < 10.0 * least
             else "no oscillation: the reading does not swing to and fro"
         )

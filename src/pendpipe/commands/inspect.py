@@ -4,6 +4,7 @@ from typing import Final
 
 from pendpipe.arguments import FILE, Arguments, print_answer, read_options, shared
 from pendpipe.formats import Inspection, inspect
+from pendpipe.quantities import after_number
 
 ARGUMENTS: Final = FILE | shared("--json")
 
@@ -18,19 +19,29 @@ def _lines(file: str, found: Inspection) -> list[str]:
     """Print it in words, a fact a line; what is uncertain first."""
     even = "evenly spaced" if found.uniform else "not evenly spaced (median interval)"
     read = [
-        ("read", f"{found.chosen}, in {found.unit or 'no known unit'}"),
-        ("hangs at", f"{found.level:.6g} {found.unit}"),
+        ("read", f"{found.chosen}, in{after_number(found.unit) or ' no known unit'}"),
+        ("hangs at", f"{found.level:.6g}{after_number(found.unit)}"),
     ]
     facts = [
         ("format", found.format),
         *(
-            (f"channel {number}", name + (f" [{unit}]" if unit else ""))
-            for number, (name, unit) in enumerate(found.channels, start=1)
+            (
+                f"channel {number}",
+                name + f" [{unit}]" * bool(unit) + f" (--column {place})" * (place != number),
+            )
+            for number, ((name, unit), place) in enumerate(
+                zip(found.channels, found.columns, strict=True), start=1
+            )
         ),
         *(read if found.chosen else []),
         ("samples", f"{found.samples} at {found.sample_rate_hz:.6g} Hz, {even}"),
         ("span", f"{found.duration_s:.6g} s"),
-        ("step", f"{found.resolution:.6g} {found.unit}" if found.resolution else "none found"),
+        (
+            "step",
+            f"{found.resolution:.6g}{after_number(found.unit)}"
+            if found.resolution
+            else "none found",
+        ),
         ("clipped", f"{found.clipped_samples} sample(s)"),
         *(("gap", f"{gap.missing_s:.6g} s after sample {gap.after_sample}") for gap in found.gaps),
         *(

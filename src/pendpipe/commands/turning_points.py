@@ -11,6 +11,7 @@ from typing import Final
 from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.analysis.turning_points import write_turning_points
 from pendpipe.arguments import FILE, Arguments, read_motion, shared, tell
+from pendpipe.quantities import after_number
 from pendpipe.stages.refusal import run_stage
 
 ARGUMENTS: Final = (
@@ -40,5 +41,5 @@ def _measure(arguments: Arguments) -> None:
         tell(f"{arguments.file}: {note}")
     print(
         f"{arguments.out}: {len(points)} turning points, {points.apparent_frequency_hz:.6g} Hz,"
-        f" {abs(points.angle_rad[0]):.4g} {points.unit} at first"
+        f" {abs(points.angle_rad[0]):.4g}{after_number(points.unit)} at first"
     )

@@ -162,7 +162,8 @@ def find(table: Table, columns: Sequence[Column], key: str, numbers: Sequence[in
     """Find a column by its name (in any case), or by its number: in the file, or as given."""
     names = [f"{n} {c.label}" for n, c in zip(numbers, columns, strict=False)]
     numbers = numbers or [column.number for column in columns]
-    alike = [c for form in (str, str.lower) for c in columns if form(c.name) == form(key)]
+    called = [(name, c) for c in columns for name in (c.name, c.label, c.of)]
+    alike = [c for form in (str, str.lower) for name, c in called if form(name) == form(key)]
     alike += [c for c, number in zip(columns, numbers, strict=True) if str(number) == key]
     known = listed(names or [column.label for column in columns])
     refuse_if(not alike, table.place, f"there is no column '{key}'", f"choose from: {known}")
@@ -447,6 +448,8 @@ def _bob_from_pivot(columns: Sequence[Column]) -> list[tuple[Column, Column]]:
     if len(both) != 2:
         return []
     pivot, bob = sorted(both, key=lambda point: float(np.nanstd(point["x"].values)))
+    if np.nanstd(pivot["x"].values) > 0.5 * np.nanstd(bob["x"].values):
+        return []
     x, y = (
         replace(
             bob[axis],

@@ -385,6 +385,8 @@ class Inspection:
         Missing times; events; samples at the converter's end.
     warnings
         What was guessed, repaired or looks odd.
+    columns
+        The number of each channel's column, as --column takes it.
     chosen
         The column or columns that the readings are taken from.
     level
@@ -405,6 +407,7 @@ class Inspection:
     markers: tuple[Marker, ...]
     clipped_samples: int
     warnings: tuple[str, ...]
+    columns: tuple[int, ...] = ()
     chosen: str = ""
     level: float = 0.0
     weak_guesses: tuple[str, ...] = ()
@@ -484,6 +487,7 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
         markers=table.markers,
         clipped_samples=clipped_samples(values, step, limits),
         warnings=tuple(notes),
+        columns=tuple(column.number for column in choice.channels),
         chosen=", ".join(column.label for column in choice.readings),
         level=float(np.median(finite)) if len(finite) else float("nan"),
         weak_guesses=weak,

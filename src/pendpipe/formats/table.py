@@ -312,6 +312,8 @@ class Column:
         The lowest and the highest value that the converter can give.
     role
         What it holds, once that is settled.
+    of
+        What it is a column of, where a line above the names says so: a tracked mass.
     """
 
     name: str
@@ -323,6 +325,7 @@ class Column:
     resolution: float | None = None
     limits: tuple[float, float] | None = None
     role: Role = "unknown"
+    of: str = ""
 
     @cached_property
     def swing(self) -> Swing:
@@ -332,7 +335,8 @@ class Column:
     @property
     def label(self) -> str:
         """Its name, or its number where it has none."""
-        return self.name or f"column {self.number}"
+        of = f"{self.name.partition(' (')[0]} of {self.of}" if self.of else ""
+        return of or self.name or f"column {self.number}"
 
 
 @dataclass(frozen=True, eq=False)

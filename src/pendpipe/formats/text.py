@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from html import unescape
-from itertools import pairwise, product, zip_longest
+from itertools import accumulate, pairwise, product, zip_longest
 from pathlib import Path
 from typing import Final
 
@@ -409,10 +409,11 @@ class Layout:
 
 @dataclass(frozen=True)
 class Header:
-    """Names and units (one a column, ``""`` where absent), interval, remarks."""
+    """Names, units and masses (one a column, ``""`` where absent), interval, remarks."""
 
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
+    points: tuple[str, ...] = ()
     interval_s: float | None = None
     metadata: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -775,7 +776,8 @@ def _by_key(
 def _column(header: Header, place: int, values: FloatArray) -> Column:
     known = place < len(header.names)
     name, unit = (header.names[place], header.units[place]) if known else ("", "")
-    return Column(name, unit, np.ascontiguousarray(values), place + 1)
+    of = header.points[place] if header.points else ""
+    return Column(name, unit, np.ascontiguousarray(values), place + 1, of=of)
 
 
 _RATE_WORD: Final = re.compile(
@@ -813,7 +815,7 @@ def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
     metadata = _metadata([line for _, line in filled])
     if not cells:
         return Header(
-            (), (), interval, metadata, ("no header: columns are recognised by their values",)
+            (), (), (), interval, metadata, ("no header: columns are recognised by their values",)
         )
     notes: tuple[str, ...] = ()
     pairs = [split_header(cell) for cell in cells]
@@ -827,7 +829,16 @@ def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
     # Names that stand more than once are numbered: Volt, Volt (2).
     before = ((name, names[:place].count(name)) for place, name in enumerate(names))
     unique = tuple(f"{name} ({n + 1})" if n and name else name for name, n in before)
-    return Header(unique, tuple(units), interval, metadata, notes)
+    over = [layout.split(line) for number, line in filled if number < names_at][-1:]
+    points = _points(over[0], unique) if over and unique != tuple(names) else ()
+    return Header(unique, tuple(units), points, interval, metadata, notes)
+
+
+def _points(cells: list[str], names: Sequence[str]) -> tuple[str, ...]:
+    """Read Tracker's names of masses, each above the first of the mass's columns."""
+    if len(cells) != len(names) or cells[0] or not cells[1]:
+        return ()
+    return tuple(accumulate(cells, lambda mass, cell: cell or mass))
 
 
 def _splits(line: str, layout: Layout) -> Iterator[list[str]]:

@@ -250,8 +250,8 @@ def role_of(name: str) -> Role:
     """
     words = plain(re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.strip()))
     whole = re.sub(r"[\s_\-.]+", " ", words).strip()
-    # "Zeit2" is the time of the second run.
-    forms = (whole, words, re.sub(r" ?\d+$", "", whole))
+    # "Zeit2" and "Zeit (2)" are the time of the second run.
+    forms = (whole, words, re.sub(r" ?\(?\d+\)?$", "", whole))
     is_it = (role for form in forms for role, pattern in _PATTERNS if pattern.fullmatch(form))
     # One letter inside a longer name ("pendulum a") means little.
     holds_it = (

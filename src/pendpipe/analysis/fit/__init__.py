@@ -15,7 +15,7 @@ from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.find import turning_points_of
 from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.errors import NotAnalysableError, refuse_if
-from pendpipe.quantities import pretty_unit
+from pendpipe.quantities import after_number, pretty_unit
 from pendpipe.recording import Recording
 
 __all__ = ["FitResult", "fit_recording", "read_fit"]
@@ -112,8 +112,8 @@ def _fit(
         largest = float(np.max(points.amplitude_rad))
         raise NotAnalysableError(
             place,
-            f"sin x needs six turning points below pi rad (the largest is {largest:.3g}"
-            f" {points.unit})",
+            f"sin x needs six turning points below pi rad (the largest is"
+            f" {largest:.3g}{after_number(points.unit)})",
             "use --restoring linear",
         )
     if method == "turning-points":
