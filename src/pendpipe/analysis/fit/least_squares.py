@@ -4,11 +4,9 @@ scipy's optimisers cost more to import (0.7 s) than a thousand of these fits, an
 combines bounds, a prior and normal equations summed piece by piece.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Self
 
 import numpy as np
 
@@ -24,9 +22,9 @@ class Bounds(NamedTuple):
     lower: FloatArray
     upper: FloatArray
 
-    def about(self, value: FloatArray) -> Bounds:
+    def about(self, value: FloatArray) -> Self:
         """The bounds of a step from `value`."""
-        return Bounds(self.lower - value, self.upper - value)
+        return type(self)(self.lower - value, self.upper - value)
 
     def clip(self, value: FloatArray) -> FloatArray:
         """Put each entry within its bounds."""

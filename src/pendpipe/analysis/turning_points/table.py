@@ -1,13 +1,11 @@
 """Turning points with their errors, and the file they are kept in."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 
@@ -117,11 +115,11 @@ class TurningPoints:
         first = float(np.sum(alternating * self.angle_rad))
         return np.asarray(alternating * math.copysign(1.0, first))
 
-    def first(self, count: int) -> TurningPoints:
+    def first(self, count: int) -> Self:
         """The first `count` of them."""
         return self.chosen(np.arange(len(self)) < count)
 
-    def chosen(self, keep: BoolArray) -> TurningPoints:
+    def chosen(self, keep: BoolArray) -> Self:
         """Some of them, with all that they share."""
         return replace(self, **{name: getattr(self, name)[keep] for name in COLUMNS})
 
