@@ -1,6 +1,7 @@
 """Glitches: single wrong readings."""
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -90,6 +91,10 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         mask &= ~ends
         p_value = _smallest_p_value(np.sort(error[used & ~ends]), step)
     if not mask.any() or p_value > _EXPECTED_BY_CHANCE:
+        if noise.coloured:
+            # Near the ends, where the filter lacks neighbours, a window needs none.
+            alone = find_in_misfit(data, fit, noise, samples)
+            return replace(alone, p_value=min(2.0 * alone.p_value, 1.0))
         quiet = "no reading exceeds the noise"
         return Finding("glitches", max(p_value, _EXPECTED_BY_CHANCE), summary=quiet)
     return _described(data, fit, residual, size, mask, p_value, tail)
