@@ -144,3 +144,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'pendpipe.physics' has no attribute {name!r}")
     modules = (importlib.import_module(f"{__name__}.{module}") for module in _MODULES)
     return next(vars(module)[name] for module in modules if name in vars(module))
+
+
+def __dir__() -> list[str]:
+    """List the public names, imported or not."""
+    return sorted({*__all__, *globals()})
