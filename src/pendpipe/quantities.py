@@ -1,6 +1,7 @@
 """How a number is printed: with its unit, an SI prefix, and its error."""
 
 import math
+from collections.abc import Sequence
 
 from pendpipe.arrays import FloatArray
 
@@ -109,3 +110,17 @@ def with_error(value: float, sd: float | None, unit: str = "", *, short: bool = 
 
 def _minus(number: str) -> str:
     return number.replace("-", "\N{MINUS SIGN}")
+
+
+def in_columns(rows: Sequence[Sequence[str]]) -> str:
+    """Rows of words in columns as wide as they need, a line a row.
+
+    >>> print(in_columns([("f", "0.5 Hz"), ("Q limit", "136")]))
+    f        0.5 Hz
+    Q limit  136
+    """
+    width = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(
+        "  ".join(cell.ljust(size) for cell, size in zip(row, width, strict=True)).rstrip()
+        for row in rows
+    )

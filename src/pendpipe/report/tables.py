@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 from pendpipe import physics
 from pendpipe.figures.data import Entry, error, number, typical_record, used
 from pendpipe.files import without_folders
-from pendpipe.quantities import compact, pretty_unit, with_error
+from pendpipe.quantities import compact, in_columns, pretty_unit, with_error
 from pendpipe.templates import render as fill_template
 
 
@@ -344,13 +344,10 @@ def headline(comparison: Comparison, truth: Mapping[str, Any]) -> list[Row]:
 
 def as_text(rows: list[Row]) -> str:
     """The same table for a terminal, a line a number."""
-    first, second = (max(len(row[column]) for row in rows) + 2 for column in (0, 1))
-    lines = []
-    for row in rows:
-        beside = {"paper": row.paper, "truth": row.truth}
-        others = "; ".join(f"{whose} {value}" for whose, value in beside.items() if value)
-        lines.append(f"{row.name:<{first}}{row.found:<{second}}{others}".rstrip())
-    return "\n".join(lines)
+    beside = [(("paper", row.paper), ("truth", row.truth)) for row in rows]
+    others = ["; ".join(f"{whose} {value}" for whose, value in each if value) for each in beside]
+    names, found = [row.name for row in rows], [row.found for row in rows]
+    return in_columns([*zip(names, found, others, strict=True)])
 
 
 def _row(name: str, found: Any, key: str, truth: float | None = None) -> Row | None:

@@ -18,7 +18,7 @@ from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Estimate, number, quality_of_rate
 from pendpipe.files import make_folder, read_json, write_json
-from pendpipe.quantities import compact, with_error
+from pendpipe.quantities import compact, in_columns, with_error
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -636,10 +636,5 @@ def _bare(rate: Estimate) -> str:
 
 
 def table(rows: list[tuple[str, ...]]) -> str:
-    """Lay rows out below their head, in columns as wide as they need."""
-    full = [HEAD, *rows]
-    width = [max(map(len, column)) for column in zip(*full, strict=True)]
-    return "\n".join(
-        "  ".join(cell.ljust(size) for cell, size in zip(line, width, strict=True)).rstrip()
-        for line in full
-    )
+    """Lay rows out below their head."""
+    return in_columns([HEAD, *rows])
