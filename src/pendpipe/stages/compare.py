@@ -79,7 +79,15 @@ def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: P
         "hysteretic_coefficient": separated.benchmark,
         **_campaign_numbers(found),
         "joint": None if together is None else joint_values(*together),
-        "tail": _tail(campaign, results),
+        # The trap of tail fits, on the typical record.
+        "tail": [
+            fit
+            for result in results
+            if result.record.record == settings.typical_record and result.refused is None
+            for fit in tail_fits(
+                read_turning_points(campaign.folder / result.record.record / "turning_points.csv")
+            )
+        ],
         "calibration": read_json(sensor_file(campaign)) if settings.calibration else None,
         "provenance": {
             "version": __version__,
@@ -295,15 +303,6 @@ def _shared(number: SharedEstimate) -> dict[str, Any]:
         "dof": number.degrees_of_freedom,
         "p_value": number.p_value,
     }
-
-
-def _tail(campaign: Campaign, results: list[RecordResult]) -> list[dict[str, Any]]:
-    """The tail-fit trap on the typical record."""
-    name = campaign.configuration.typical_record
-    usable = [result.record.record for result in results if result.refused is None]
-    if name is None or name not in usable:
-        return []
-    return tail_fits(read_turning_points(campaign.folder / name / "turning_points.csv"))
 
 
 NUMBERS: Final = (
