@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.analysis.two_modes import two_modes
 from pendpipe.dynamics import Eq8, Release, sample
+from pendpipe.recording import Recording
 
 TIME = np.arange(0.0, 80.0, 0.01)
 TRUTH = ((0.80, 0.02, 0.5), (0.86, 0.03, 0.3))
@@ -61,3 +63,13 @@ def test_a_knock_is_not_two_modes_where_one_decay_may_do() -> None:
     assert two_modes(TIME, knocked + noise, 0.62, may_be_one=True) is None
     beat = motion(TIME) + noise
     assert two_modes(TIME, beat, 0.61, may_be_one=True) is not None
+
+
+@pytest.mark.parametrize("phase", [0.0, 2.8, np.pi])
+def test_a_beat_may_begin_at_its_node_or_at_its_top(phase: float) -> None:
+    time = np.arange(700) * 0.0507
+    first = 0.1 * np.exp(-0.018 * time) * np.cos(2.0 * np.pi * 0.7075 * time)
+    second = 0.09 * np.exp(-0.018 * time) * np.cos(2.0 * np.pi * 0.7345 * time + phase)
+    noise = 8e-4 * np.random.default_rng(3).standard_normal(len(time))
+    points, _ = measure_recording(Recording(time, first + second + noise, "angle_rad"), "the test")
+    assert any(note.startswith("two modes beat: 0.707") for note in points.notes)

@@ -74,10 +74,15 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
         return Rough(np.arange(len(index)), time, side, float(np.median(piece))), stride
     whole, gap_before = _beside_gaps(samples.time_s, index)
     time, value, side, gap_before = time[whole], value[whole], side[whole], gap_before[whole]
-    number = np.zeros(len(time), dtype=np.int64)
-    usual = float(np.median(np.diff(time[:6])))
-    cut = slice(0, count_half_cycles(time, side, gap_before, usual, number))
-    return Rough(number[cut], time[cut], side[cut], _level(value[cut])), stride
+    # A beat may begin at a node, where a half cycle or two hang together with nothing.
+    begin, count = 0, 0
+    while count < 3 and len(time) - (begin := begin + count) >= 3:
+        rest = slice(begin, None)
+        number = np.zeros(len(time) - begin, dtype=np.int64)
+        usual = float(np.median(np.diff(time[rest][:6])))
+        count = count_half_cycles(time[rest], side[rest], gap_before[rest], usual, number)
+    cut = slice(begin, begin + count)
+    return Rough(number[:count], time[cut], side[cut], _level(value[cut])), stride
 
 
 def _beside_gaps(time: FloatArray, index: IntArray) -> tuple[np.ndarray, IntArray]:
