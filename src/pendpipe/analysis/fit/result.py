@@ -603,8 +603,8 @@ def quotable(result: FitResult) -> str:
         return f"Quote {what}, not a, b or c: run pendpipe diagnose to learn what the law lacks."
     if result.chi2_per_dof > 2.0:
         return (
-            "Quote Q at these amplitudes. Physics is missing from the law: run pendpipe diagnose"
-            " before you quote a, b or c."
+            "Quote Q at these amplitudes. The fit leaves more than white noise: ask pendpipe"
+            " diagnose for the cause before you quote a, b or c."
         )
     return "Quote Q at these amplitudes. a, b and c are correlated: quote all three."
 
