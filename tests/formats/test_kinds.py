@@ -977,3 +977,24 @@ def test_inspect_prints_the_number_that_column_takes(
     assert "  channel 2   foo (--column 3)" in told
     assert next(line for line in told if "hangs at" in line).split()[-1] == "899.937"
     assert any(line.endswith("foo, in no known unit") for line in told)
+
+
+@pytest.mark.parametrize("wavers", [0.0, 0.5])
+def test_amplitudes_that_are_alike_or_waver_are_refused_as_amplitudes(
+    tmp_path: Path, wavers: float
+) -> None:
+    rows = np.arange(40)
+    sizes = 33 * np.exp(-0.03 * rows) + wavers * np.sin(2.0 * rows)
+    with pytest.raises(InputError, match="only falls: amplitudes"):
+        read_text(tmp_path, text(np.rint(2 * sizes) / 2, digits=1, head="deg\n"))
+
+
+@pytest.mark.parametrize("runs", [0, 3])
+def test_passages_of_a_light_gate_are_no_swing(tmp_path: Path, runs: int) -> None:
+    passages = [f"{n};{800 * n + n % 3}\n" for n in range(1, 60)]
+    content = "".join(passages)
+    if runs:
+        each = (f"{run};{row}" for run in range(runs) for row in passages)
+        content = "Tirada;Interrupt;t\n" + "".join(each)
+    with pytest.raises(InputError, match="only counts, as passages of a light gate do"):
+        read_text(tmp_path, content)

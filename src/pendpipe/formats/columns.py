@@ -144,6 +144,14 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         f"'{''.join(falling[:1])}' only falls: amplitudes, not a recording of the swing",
         "give the recording that they were read from",
     )
+    counting = [c.label for c in readings if _counts_samples(c) and one_way(c.values) == 1.0]
+    refuse_if(
+        reading and counting,
+        table.place,
+        f"'{''.join(counting[:1])}' only counts, as passages of a light gate do: no recording of"
+        " the swing",
+        "give readings of the swing: times of passages tell no amplitude",
+    )
     names = listed([column.label for column in table.columns])
     refuse_if(
         reading and not readings,
@@ -174,7 +182,11 @@ def _only_falls(values: FloatArray) -> bool:
     """Whether a column holds a decay without its swings: sizes that fall from row to row."""
     sizes = np.abs(values[np.isfinite(values)])
     steps = np.diff(sizes)
-    return len(steps) >= 5 and sizes[-1] < 0.8 * sizes[0] and bool(np.mean(steps < 0.0) > 0.85)
+    if len(steps) < 5 or not sizes[-1] < 0.8 * sizes[0]:
+        return False
+    # Of a swing as many sizes rise as fall; of a list few rise, but some may be alike.
+    falls, rises = float(np.mean(steps < 0.0)), float(np.mean(steps > 0.0))
+    return falls > max(0.4, 3.0 * rises)
 
 
 def _parts(table: Table, options: ReadOptions) -> list[str]:
@@ -261,6 +273,7 @@ def _time(table: Table, options: ReadOptions) -> tuple[Column | None, bool]:
             role in ("none", "signal", "volts", "velocity", "acceleration")
             or taken in (column.name.lower() or "-", str(column.number))
             or share < (0.5 if named else 0.95)
+            or (len(table.columns) == 1 and not named)
         ):
             continue
         # A drifting reading rises too, but hardly in even steps.

@@ -204,7 +204,7 @@ _WORDS: Final[tuple[tuple[Role, str], ...]] = (
     (
         "index",
         r"frames?|seq|sequence|bild|index|idx|samples?|n|no|nr|num|number|#|row|point|points|pt#|counter|trial"
-        r"|run|scan|id|record|zeile|schritt|step|campione|riga",
+        r"|run|tirada|ensayo|corrida|prova|lauf|scan|id|record|zeile|schritt|step|campione|riga",
     ),
     (
         "angle",
