@@ -99,10 +99,11 @@ def reconsider_red_noise(
 ) -> None:
     """Test whether apparent red noise is an effect, and re-estimate the noise if so.
 
-    The best effect for noise that is not red is fitted, and the noise is estimated from what it
-    leaves. This replaces red noise if effect and noise together are more likely by a factor 1/p,
-    where p is this test's part of the significance level: a normalised density exceeds that of
-    the true model by 1/p with a probability of at most p (Markov).
+    No tone is asked: red noise has no line. The best effect for noise that is not red is fitted,
+    and the noise is estimated from what it leaves. This replaces red noise if effect and noise
+    together are more likely by a factor 1/p, where p is this test's part of the significance level:
+    a normalised density exceeds that of the true model by 1/p with a probability of at most p
+    (Markov).
 
     Parameters
     ----------
@@ -117,7 +118,7 @@ def reconsider_red_noise(
     """
     share = level * RED_NOISE_SHARE
     progress("testing whether the red noise is a drift or a step")
-    effects = [effect for effect in effects if effect.kind != "unnamed"]
+    effects = [each for each in effects if each.kind != "unnamed" and not each.spectral]
     assert state.now is not None
     fit, data, noise = settled(state.fit, state.data, state.noise, state.held, red=False)
     other = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)

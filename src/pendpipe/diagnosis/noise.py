@@ -234,7 +234,8 @@ def estimate_noise(
     cycles
         Over which the motion is to be seen: what it leaves is a line as wide as one over these.
     red
-        Whether the noise may grow to low frequencies; else it is told by those above the motion's.
+        Whether the noise may grow to low frequencies; else it is told by what lies above half the
+        motion's.
     slope
         If the error is in the time: the speed at each reading.
     """
@@ -242,7 +243,7 @@ def estimate_noise(
     lowest, highest = _cycles_per_reading(data, frequency_hz)
     noise_only = _noise_only(len(data), lowest, highest, width)
     if not red:
-        noise_only &= np.arange(len(data)) > 2.0 * lowest * len(data)
+        noise_only &= np.arange(len(data)) > lowest * len(data)
     level = None if slope is None else _level_of_counts(slope)
     noise = Noise(np.ones(len(data)), data.weight, level, harmonics=~noise_only)
     noise.harmonics[0] = False
