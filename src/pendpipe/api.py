@@ -357,12 +357,15 @@ def diagnose(
     >>> answer.verdict, answer.effects[0].identifier
     ('missing-physics', 'circular-error')
     """
+    known, problem = restoring in (None, "auto", "linear"), f"{restoring!r} is no choice"
+    refuse_if(not known, "restoring", problem, "give 'linear', or leave it out")
     if not isinstance(recording, Recording | str | Path):
         from pendpipe.diagnosis.several import diagnose_several
         from pendpipe.files import distinct_names
 
         refuse_if(fixed, "fixed", "nothing is held in several recordings", "leave it out")
-        refuse_if(restoring, "restoring", "it is for one recording", "leave it out")
+        one = restoring == "linear"
+        refuse_if(one, "restoring", "it is for one recording", "leave it out")
         if not isinstance(recording, Mapping):
             files = [
                 f"recording {number}" if isinstance(each, Recording) else each

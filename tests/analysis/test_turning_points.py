@@ -18,7 +18,7 @@ from pendpipe.analysis.turning_points import (
 )
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, turning_points
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.recording import Quantity, Recording
 
 OMEGA = 2.0 * math.pi * 0.516
@@ -309,3 +309,12 @@ def test_a_torsion_pendulum_and_what_is_no_angle_swing_beyond_pi(quantity: Quant
     points = find_turning_points(Recording(TIME, values, quantity))
     assert points.unit == {"angle_rad": "rad", "displacement_m": "m", "reading": "1"}[quantity]
     assert points.amplitude_rad[0] == pytest.approx(40.0 * math.exp(-0.02 * points.time_s[0]), 1e-3)
+
+
+@pytest.mark.parametrize("in_a_cycle", [4.3, 6.0, 8.0])
+def test_too_few_readings_in_a_cycle_are_refused_in_a_line(in_a_cycle: float) -> None:
+    time = np.arange(400) / in_a_cycle
+    angle = 0.2 * np.exp(-np.pi / 200.0 * time) * np.cos(2.0 * np.pi * time + 0.3)
+    noise = 1e-4 * np.random.default_rng(5).standard_normal(len(time))
+    with pytest.raises(NotAnalysableError, match=r"nine readings|three half cycles"):
+        find_turning_points(Recording(time, angle + noise, "angle_rad"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,9 +12,20 @@ from scipy.stats import binom
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import diagnose_recording
+from pendpipe.diagnosis.forensics.colour import wander_note
+from pendpipe.diagnosis.noise import estimate_noise
 from pendpipe.recording import Recording
 
-from .records import INTERVAL_S, NOISE_RAD, TIME_S, TRUTH, other_engine, recording
+from .records import (
+    FREQUENCY_HZ,
+    INTERVAL_S,
+    NOISE_RAD,
+    TIME_S,
+    TRUTH,
+    null_fit,
+    other_engine,
+    recording,
+)
 
 CLEAN = other_engine(TRUTH)
 SLOW = {"offset-drift", "equilibrium-creep", "ac-coupling", "equilibrium-step"}
@@ -66,4 +78,15 @@ def test_what_wanders_more_slowly_than_the_motion_is_told_beside_what_is_faster(
     """A zero that comes and goes has no name; the sentence does not call all of it noise."""
     wander = 5e-3 * np.exp(-(((TIME_S - 30.0) / 8.0) ** 2))
     found = diagnose_recording(recording(CLEAN + wander, 3)).diagnosis
-    assert found.effects or "the zero wanders" in found.statement
+    assert found.effects or "the zero wanders by 1.4" in found.statement
+
+
+def test_noise_about_the_motion_is_no_wander_of_the_zero() -> None:
+    fit, data, _ = null_fit()
+    turns = 2.0 * np.pi * FREQUENCY_HZ * TIME_S
+    slow = np.random.default_rng(1).standard_normal((2, len(TIME_S))).cumsum(axis=1)
+    line = 3e-5 * (slow[0] * np.cos(turns) + slow[1] * np.sin(turns))
+    near = replace(data, values=data.values + line)
+    noise = estimate_noise(near, near.residual(fit.at.reading), FREQUENCY_HZ, 0.0)
+    coloured = replace(noise, variance=np.linspace(2.0, 1.0, len(near)))
+    assert wander_note(coloured, near, fit) is None

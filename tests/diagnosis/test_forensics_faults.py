@@ -367,7 +367,22 @@ def test_a_loss_that_is_placed_a_reading_off_makes_no_glitch(
     )
     state = State(record.fit, record.data, record.noise, [], record.fit.value)
     Forensics(record.samples, 0.01).before(state, silent)
-    assert [fault.finding.identifier for fault in state.faults] == ["dropped-samples"]
+    (fault,) = state.faults
+    assert fault.finding.identifier == "dropped-samples"
+    # What the readings beside it took from chi^2 is no gain of the correction.
+    weight = np.flatnonzero(state.data.weight == 0.0)
+    assert len(weight) == 4
+
+
+def test_readings_left_out_beside_a_step_are_no_gain_of_a_correction() -> None:
+    fit, data, noise = null_fit()
+    weight = data.weight.copy()
+    weight[np.arange(50, len(data), 30)] = 0.0
+    state = State(fit, data, noise, [], fit.value)
+    samples = prepare(Recording(data.time_s, data.values, "angle_rad"), "the test")
+    unchanged = replace(data, weight=weight)
+    assert not Forensics(samples, 0.01)._correct(state, unchanged, Finding("clock-slips", 1e-9))
+    assert state.faults == []
 
 
 @pytest.mark.parametrize("stale", [True, False])

@@ -18,6 +18,7 @@ from pendpipe.diagnosis.detect import TESTS_SHARE
 from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.forensics import TESTS, Test, corrections
 from pendpipe.diagnosis.forensics.glitches import find_in_misfit
+from pendpipe.diagnosis.gauss_newton import SETTLED
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import TAPS, white_noise
 from pendpipe.diagnosis.refine import refine
@@ -120,11 +121,14 @@ class Forensics:
         """Make one test and keep its finding; return whether to repeat it."""
         finding, p_value = self._tested(name, state, test)
         known = next((each for each in state.faults if each.finding.identifier == name), None)
-        if finding.kind != "fault" or not _pays(finding, state):
+        if finding.kind != "fault":
             return False
-        if p_value > self.level:
+        pays = _pays(finding, state)
+        if p_value > self.level or not pays:
             if known is None:
-                self._quiet[name] = min(p_value, self._quiet.get(name, 1.0))
+                # What does not pay its price is no more than chance, whatever its p-value.
+                least = p_value if pays else max(p_value, self.level)
+                self._quiet[name] = min(least, self._quiet.get(name, 1.0))
             return False
         progress(f"{name}: {finding.summary}")
         if known is None:
@@ -251,7 +255,9 @@ class Forensics:
             if self._correct(state, corrected, finding):
                 progress(finding.summary)
 
-    def _correct(self, state: State, corrected: Data, finding: Finding, least: float = 0.0) -> bool:
+    def _correct(
+        self, state: State, corrected: Data, finding: Finding, least: float = SETTLED
+    ) -> bool:
         """Keep a significant finding and its correction if chi^2 falls by more than `least`."""
         model, p_value = state.fit.model, _global(finding)
         if p_value > self.level:
@@ -259,11 +265,13 @@ class Forensics:
         if corrected.time_s is not state.data.time_s:
             model = model.at_times(corrected.time_s)
         noise = replace(state.noise, weight=corrected.weight)
+        before = replace(state.data, weight=corrected.weight)
         try:
             fit = refine(model, corrected, noise, state.fit.value, held=state.held)
+            as_it_was = refine(state.fit.model, before, noise, state.fit.value, held=state.held)
         except NoMotionError:
             return False  # the model comes to rest before the corrected times
-        gain = state.fit.chi2 - fit.chi2
+        gain = as_it_was.chi2 - fit.chi2
         if gain <= least:
             return False
         found = replace(finding, delta_chi2=finding.delta_chi2 + gain)
@@ -281,7 +289,7 @@ class Forensics:
         if not remainder_of(rival.fit, state.data, state.noise).systematic:
             return False
         finding, p_value = self._tested(name, state)
-        if p_value > self.level:
+        if p_value > self.level or not _pays(finding, state):
             return False
         if finding.delta_chi2 < rival.gain - rival.charge:
             return False

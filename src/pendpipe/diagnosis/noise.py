@@ -242,8 +242,9 @@ def estimate_noise(
     width = max(_HARMONIC_HALF_WIDTH, _LOBE / cycles)
     lowest, highest = _cycles_per_reading(data, frequency_hz)
     noise_only = _noise_only(len(data), lowest, highest, width)
-    if not red:
-        noise_only &= np.arange(len(data)) > lowest * len(data)
+    faster = noise_only & (np.arange(len(data)) > lowest * len(data))
+    if not red and np.count_nonzero(faster) >= _FEWEST_COSINES:
+        noise_only = faster
     level = None if slope is None else _level_of_counts(slope)
     noise = Noise(np.ones(len(data)), data.weight, level, harmonics=~noise_only)
     noise.harmonics[0] = False

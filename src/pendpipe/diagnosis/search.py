@@ -274,7 +274,8 @@ def _first_that_predicts(
     In a gross misfit it is what is still missing that decides how well cycles are predicted.
     """
     gross = is_gross(state.fit, state.data)
-    for rival in rivals[:_TRIED]:
+    asked = [each for each in rivals if each is rivals[0] or not each.lead.effect.rare]
+    for rival in asked[:_TRIED]:
         step = Step((rival, *(other for other in rivals if other is not rival)), p_value, state.fit)
         if rival.worth < price([*state.steps, step]) - price(state.steps):
             continue

@@ -248,7 +248,7 @@ class Stack(Model):
                 end[base] = own[: len(base)]
         duration = max(float(np.ptp(member.time_s)) for member in self.members)
         for effect, place in self.places():
-            limits = effect.limits(duration, self.members[0].scale)
+            limits = effect.limits(duration, max(member.scale for member in self.members))
             ends[0][place], ends[1][place] = limits.T
         return ends[0], ends[1]
 

@@ -789,7 +789,10 @@ def _lone_stamps(_choice: Choice, base: TimeBase) -> None:
     wrong = np.where(padded[at + 3] > padded[at + 1], at + 1, at)
     good = np.delete(np.arange(len(base.time_s)), wrong)
     inside = not {0, len(base.time_s) - 1} & set(wrong.tolist())
-    rises = np.diff(base.time_s[good]).min(initial=1.0) > 0
+    rows, steps = np.diff(good), np.diff(base.time_s[good])
+    # Behind a clock that was set back the next row comes too soon.
+    soon = np.any(steps[rows > 1] < 0.5 * rows[rows > 1] * np.median(steps))
+    rises = steps.min(initial=1.0) > 0 and not soon
     if inside and rises and len(wrong) <= 0.05 * len(good):
         base.time_s = np.interp(np.arange(len(base.time_s)), good, base.time_s[good])
         base.notes.append(f"{len(wrong)} time stamp(s) that fall out of order interpolated")

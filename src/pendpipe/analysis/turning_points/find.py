@@ -74,13 +74,18 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
         return Rough(np.arange(len(index)), time, side, float(np.median(piece))), stride
     whole, gap_before = _beside_gaps(samples.time_s, index)
     time, value, side, gap_before = time[whole], value[whole], side[whole], gap_before[whole]
-    # A beat may begin at a node, where a half cycle or two hang together with nothing.
-    begin, count = 0, 0
-    while count < 3 and len(time) - (begin := begin + count) >= 3:
+    if len(time) < 3:
+        return Rough(np.arange(len(time)), time, side, float(np.median(piece))), stride
+    begin = 0
+    while True:
         rest = slice(begin, None)
-        number = np.zeros(len(time) - begin, dtype=np.int64)
         usual = float(np.median(np.diff(time[rest][:6])))
+        number = np.zeros(len(time) - begin, dtype=np.int64)
         count = count_half_cycles(time[rest], side[rest], gap_before[rest], usual, number)
+        if count >= 3 or len(time) - begin - count < 3:
+            break
+        # A beat may begin at a node, where a half cycle or two hang together with nothing.
+        begin += count
     cut = slice(begin, begin + count)
     return Rough(number[:count], time[cut], side[cut], _level(value[cut])), stride
 
@@ -263,6 +268,8 @@ def resmoothed(places: Places, measured: Measured, noise: float) -> Places:
     """Smooth the measured times over neighbours, and so the places of the half cycles."""
     time, weight = times_and_weights(places, measured, noise)
     known = weight > 0.0
+    if not known.any():
+        return places
     wanted = float(np.median(places.angular_frequency) / _PHASE_WANTED) ** 2
     centre, half_period = smooth_times(
         places.number[known], time[known], weight[known], wanted, places.number
@@ -372,6 +379,8 @@ def _measured(samples: Samples, place: str | Path) -> TurningPoints:
     rough, stride = rough_half_cycles(samples)
     _refuse_few(samples, len(rough.number), place)
     places, first = _locate(samples, rough, stride)
+    few, remedy = not np.any(_known(first)), "sample faster"
+    refuse_if(few, place, "fewer than nine readings in a cycle", remedy, NotAnalysableError)
     amplitude, rates, level = _losses(places, first, samples.noise_rms, rough.level)
     places, measured, shape = _shaped(samples, places, amplitude, rates, level, stride)
     samples = replace(samples, noise_rms=_noise(samples, measured))
@@ -403,11 +412,16 @@ def _locate(samples: Samples, rough: Rough, stride: int) -> tuple[Places, Measur
     return follow_tail(samples, places, measured, rough.level)
 
 
+def _known(measured: Measured) -> BoolArray:
+    """Which half cycles tell amplitude and level."""
+    return np.isfinite(measured.amplitude) & (measured.readings > 4) & ~measured.one_sided
+
+
 def _losses(
     places: Places, measured: Measured, noise: float, start: float
 ) -> tuple[FloatArray, FloatArray, float]:
     """Amplitudes at the mean level, the rates they fall at, and that level."""
-    known = np.isfinite(measured.amplitude) & (measured.readings > 4) & ~measured.one_sided
+    known = _known(measured)
     shift = float(np.sum(measured.score[known]) / np.sum(measured.information[known]))
     amplitude = measured.amplitude - places.side * measured.coupling * shift
     sd = noise * np.sqrt(measured.variance)

@@ -26,6 +26,8 @@ _HARMLESS_RATIO: Final = 1.5
 """Ratio of densities below which the colour changes no conclusion."""
 _LOWEST: Final = 0.1
 """Lowest frequency used, over the motion's: slower noise is a drift, allowed for elsewhere."""
+_SLOWER: Final = 0.5
+"""Frequency below which noise is a wander of the zero, over the motion's."""
 _MISFIT: Final = 1.3
 """chi^2 per reading from which a misfit of the motion may leak between its harmonics."""
 _NEAR_BAND: Final = (0.3, 3.0)
@@ -60,7 +62,7 @@ def level_note(noise: Noise) -> str | None:
 def wander_note(noise: Noise, data: Data, fit: Fit) -> str | None:
     """Say how far the zero wanders if most of what is left is noise slower than the motion."""
     count, omega = len(data), fit.at.sampled.motion.angular_frequency
-    slower = max(int(omega / math.pi * count * data.interval_s), 1)
+    slower = max(int(_SLOWER * omega / math.pi * count * data.interval_s), 1)
     power = dct(data.residual(fit.at.reading) * data.weight, norm="ortho") ** 2 / count
     slow, fast = float(power[:slower].sum()), float(power[slower:].sum())
     if not (data.uniform and noise.coloured) or slow < fast:

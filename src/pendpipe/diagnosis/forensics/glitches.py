@@ -89,7 +89,8 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     ends = bent_ends(data.values - residual, size, mask, used)
     if ends.any():
         mask &= ~ends
-        p_value = _smallest_p_value(np.sort(error[used & ~ends]), step)
+        p_value = _smallest_p_value(np.sort(error[apart & ~ends]), step)
+        p_value *= repeats[np.argmax(error * (used & ~ends))]
     if not mask.any() or p_value > _EXPECTED_BY_CHANCE:
         if noise.coloured:
             # Near the ends, where the filter lacks neighbours, a window needs none.
@@ -131,7 +132,7 @@ def find_in_misfit(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
     ordered = np.sort(np.abs(local.scaled)[used & (single | ~mask)])
     step = _rounding_in(data, local.rms)
     p_value, tail = _smallest_p_value(ordered, step), _noise_tail(ordered, step)
-    p_value *= float(np.min(_chance_of_repeats(data, local.left)[single]))
+    p_value *= _chance_of_repeats(data, local.left)[np.argmax(np.abs(local.scaled) * single)]
     return _described(data, fit, values, local.scaled, single, p_value, tail)
 
 
