@@ -109,8 +109,10 @@ def statement(
     stamps = [f"Note: {'; '.join(notes)}."] if notes else []
     noise = [each.location.summary for each in effects if each.identifier == COLOURED_NOISE]
     if len(noise) == len(effects):
+        wanders = any("the zero wanders" in note for note in notes)
+        what = "the motion of this recording, whose zero wanders" if wanders else "this recording"
         nothing = (
-            f"{_capital(model)} describes this recording: the residual of"
+            f"{_capital(model)} describes {what}: the residual of"
             f" {compact(before.residual_rms_rad, unit)} rms agrees with the noise"
             f" ({compact(noise_rms, unit)}), and no effect of the catalogue improves the fit more"
             f" than chance would ({printed(unexplained)})."
