@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring
     from pendpipe.analysis.free_decay import FreeDecay
     from pendpipe.analysis.turning_points import TurningPoints
-    from pendpipe.diagnosis import Outcome
+    from pendpipe.diagnosis.run import Outcome
     from pendpipe.diagnosis.several import JointOutcome
     from pendpipe.formats import Inspection
 
@@ -381,7 +381,7 @@ def diagnose(
             own=own,
             same_sensor=same_sensor,
         )
-    from pendpipe.diagnosis import diagnose_recording
+    from pendpipe.diagnosis.run import diagnose_recording
 
     return diagnose_recording(
         _motion(recording, volts_per_radian),

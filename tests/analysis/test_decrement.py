@@ -290,7 +290,7 @@ def test_fit_and_diagnosis_print_the_same_baseline(
     decay: Callable[[FloatArray], FloatArray], noise: float, method: str
 ) -> None:
     from pendpipe.analysis.free_decay import measure_recording
-    from pendpipe.diagnosis import diagnose_recording
+    from pendpipe.diagnosis.run import diagnose_recording
 
     time = np.arange(0.0, 60.0, 0.05)
     recording = recorded(decay(time), time, noise)

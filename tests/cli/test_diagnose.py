@@ -282,7 +282,7 @@ def test_what_snakemake_deletes_after_a_kill_is_no_damage(tmp_path: Path) -> Non
 
 
 def test_the_python_call_gives_the_same_answer(linear: Path, tmp_path: Path) -> None:
-    from pendpipe.diagnosis import diagnose_recording
+    from pendpipe.diagnosis.run import diagnose_recording
     from pendpipe.recording import read_plain
 
     cli.main(["diagnose", str(linear), "--out", str(tmp_path), "--no-figures", "--seed", "3"])

@@ -11,9 +11,9 @@ from scipy.fft import idct
 from scipy.stats import binom
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis import diagnose_recording
 from pendpipe.diagnosis.forensics.colour import wander_note
 from pendpipe.diagnosis.noise import estimate_noise
+from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.recording import Recording
 
 from .records import (

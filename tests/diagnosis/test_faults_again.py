@@ -9,13 +9,14 @@ import pytest
 
 from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis import diagnose_recording, silent
+from pendpipe.diagnosis import silent
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.forensics import TESTS
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Finding, nothing
+from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.state import Fault, State
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model

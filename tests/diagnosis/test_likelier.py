@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pendpipe.diagnosis import diagnose_recording, weighing
+from pendpipe.diagnosis import weighing
 from pendpipe.diagnosis.refine import refine
-from pendpipe.diagnosis.run import Outcome
+from pendpipe.diagnosis.run import Outcome, diagnose_recording
 from pendpipe.diagnosis.search import Search
 from pendpipe.diagnosis.state import Step
 from pendpipe.diagnosis.weighing import Weighed, swap_in_likelier, weigh

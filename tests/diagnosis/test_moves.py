@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from pendpipe.analysis.turning_points.measure import prepare as prepare_samples
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis import diagnose_recording, silent
+from pendpipe.diagnosis import silent
 from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, lines
 from pendpipe.diagnosis.faults import Forensics
@@ -23,6 +23,7 @@ from pendpipe.diagnosis.moves import describe, improve
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import Finding
+from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.state import CHOICE, FURTHER, State, Step, price
 from pendpipe.diagnosis.task import Task
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier

@@ -15,12 +15,12 @@ import pytest
 from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis import diagnose_recording
 from pendpipe.diagnosis.begin import Beginning, begin
 from pendpipe.diagnosis.cycles import small_swings
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.location import beat_of
 from pendpipe.diagnosis.refine import Fit, fit_in_growing_window
+from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.state import first_noise
 from pendpipe.effects.baseline import A, C
 from pendpipe.effects.catalogue import by_identifier

@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
-from pendpipe.diagnosis import diagnose_recording
+from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.values import effect_parameters
 from pendpipe.effects.baseline import OFFSET, OMEGA, B, pendulum_of
 from pendpipe.effects.catalogue import by_identifier

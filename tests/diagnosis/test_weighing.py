@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pendpipe.diagnosis import diagnose_recording
 from pendpipe.diagnosis.detect import Chance, Lead, Trials
 from pendpipe.diagnosis.evidence import Rival, Scale, class_width, evidence, probabilities
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Finding
-from pendpipe.diagnosis.run import Outcome
+from pendpipe.diagnosis.run import Outcome, diagnose_recording
 from pendpipe.diagnosis.state import Fault
 from pendpipe.diagnosis.weighing import fault_named, law_of, weigh
 from pendpipe.effects import Effect

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pendpipe.diagnosis import diagnose_recording
-from pendpipe.diagnosis.run import Outcome
+from pendpipe.diagnosis.run import Outcome, diagnose_recording
 from pendpipe.effects.baseline import A, B, C
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model

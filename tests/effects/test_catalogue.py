@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pendpipe.commands.effects import manual
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OFFSET, OMEGA, START, TIME, A, B, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
 from pendpipe.effects.effect import enters
-from pendpipe.effects.manual import page
 from pendpipe.effects.model import Model, jacobian, responses
 from pendpipe.errors import InputError
 
@@ -109,7 +109,7 @@ def test_every_declaration_is_whole() -> None:
 def test_the_page_is_the_catalogues() -> None:
     """Made by `pendpipe effects > docs/effects.md`; whoever changes an effect makes it anew."""
     committed = Path(__file__).parents[2] / "docs/effects.md"
-    assert committed.read_text(encoding="utf-8") == page()
+    assert committed.read_text(encoding="utf-8") == manual()
 
 
 def test_units_follow_the_displacements() -> None:

@@ -14,8 +14,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from scipy.integrate import solve_ivp
 
 from pendpipe import diagnose
-from pendpipe.diagnosis import diagnose_recording
 from pendpipe.diagnosis.cycles import cycles
+from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES, diagnosis
 from pendpipe.figures.data import NothingToDrawError
 from pendpipe.figures.diagnosis import Shown, draw_diagnosis, shown

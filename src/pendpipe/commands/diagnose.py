@@ -25,8 +25,8 @@ from pendpipe.arguments import (
     shared,
     tell,
 )
-from pendpipe.diagnosis import Outcome, diagnose_decay, diagnose_recording
 from pendpipe.diagnosis.result import FILE_NAME, not_analysable
+from pendpipe.diagnosis.run import Outcome, diagnose_decay, diagnose_recording
 from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
 from pendpipe.files import distinct_names, make_folder, write_json, write_whole

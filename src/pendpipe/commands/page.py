@@ -31,7 +31,7 @@ def run(arguments: Arguments) -> None:
     result = replace(api.fit(recording, name=arguments.file), provenance=provenance)
     statement = None
     if not arguments.no_diagnosis:
-        from pendpipe.diagnosis import diagnose_recording
+        from pendpipe.diagnosis.run import diagnose_recording
 
         statement = diagnose_recording(recording, place=arguments.file).diagnosis.statement
     page = render_recording(name, recording, result, statement)

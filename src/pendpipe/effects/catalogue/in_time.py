@@ -51,16 +51,6 @@ def plane_band_hz(span: Span) -> float:
     return min(10.0 / span.duration_s, 0.3 / span.period_s)
 
 
-def _dying_tone(frequency_hz: float, decay_time_s: float) -> tuple[float, float] | None:
-    return None if math.isinf(decay_time_s) else (frequency_hz, decay_time_s)
-
-
-def _above_the_pendulum(span: Span) -> list[tuple[float, ...]]:
-    """A rough grid of frequencies above the pendulum's, and three times of decay."""
-    lasts = span.duration_s * np.array([0.02, 0.1, 0.5])
-    return rows(tried_frequencies(span, 1.5 / span.period_s), lasts)
-
-
 @enters(
     "reading",
     identifier="second-mode",
@@ -79,8 +69,12 @@ def _above_the_pendulum(span: Span) -> list[tuple[float, ...]]:
     discriminating_test=(
         "a second sensor on the stand, or another point of the rod; another release"
     ),
-    tone=_dying_tone,
-    shapes=_above_the_pendulum,
+    tone=lambda frequency_hz, decay_time_s: (
+        None if math.isinf(decay_time_s) else (frequency_hz, decay_time_s)
+    ),
+    shapes=lambda span: rows(
+        tried_frequencies(span, 1.5 / span.period_s), span.duration_s * np.array([0.02, 0.1, 0.5])
+    ),
 )
 def second_mode(
     sampled: Sampled, pendulum: Pendulum, cosine: float, sine: float, f_2: float, tau_2: float
@@ -153,12 +147,6 @@ class SteadyTone(Effect):
         return (frequency_hz,) if math.isinf(decay_time_s) else None
 
 
-def _about_the_pendulum(span: Span) -> list[tuple[float, ...]]:
-    """A rough grid of frequencies about the pendulum's."""
-    own = 1.0 / span.period_s
-    return rows([*np.linspace(0.3, 0.97, 8) * own, *np.geomspace(1.03, 4.0, 8) * own])
-
-
 @enters(
     "acceleration",
     SteadyTone,
@@ -174,7 +162,9 @@ def _about_the_pendulum(span: Span) -> list[tuple[float, ...]]:
     discriminating_test=(
         "record the pendulum at rest: the tone must stay, and fall off above resonance"
     ),
-    shapes=_about_the_pendulum,
+    shapes=lambda span: rows(
+        np.array([*np.linspace(0.3, 0.97, 8), *np.geomspace(1.03, 4.0, 8)]) / span.period_s
+    ),
 )
 def periodic_drive(
     motion: Motion, pendulum: Pendulum, cosine: float, sine: float, f_d: float
@@ -245,14 +235,6 @@ def _crept_at_the_end(values: FloatArray, duration_s: float) -> float:
     return float(abs(size * _crept(np.asarray(duration_s / tau), exponential)))
 
 
-def _times_of_both_forms(span: Span) -> list[tuple[float, ...]]:
-    lasts = span.duration_s
-    return [
-        *rows(lasts * np.array([0.03, 0.3, 3.0]), (0.0,)),
-        *rows(lasts * np.array([0.05, 0.2]), (1.0,)),
-    ]
-
-
 @enters(
     "acceleration",
     identifier="equilibrium-creep",
@@ -269,7 +251,10 @@ def _times_of_both_forms(span: Span) -> list[tuple[float, ...]]:
     example=(1e-3, 10.0, 0.5),
     discriminating_test="a second sensor or a level on the stand: a sensor's drift leaves it still",
     displacement=_crept_at_the_end,
-    shapes=_times_of_both_forms,
+    shapes=lambda span: [
+        *rows(span.duration_s * np.array([0.03, 0.3, 3.0]), (0.0,)),
+        *rows(span.duration_s * np.array([0.05, 0.2]), (1.0,)),
+    ],
 )
 def equilibrium_creep(
     motion: Motion, pendulum: Pendulum, size: float, tau: float, exponential: float
@@ -280,10 +265,6 @@ def equilibrium_creep(
     """
     crept = _crept(since_release(motion, pendulum) / tau, exponential)
     return np.asarray(size * pendulum.angular_frequency**2 * crept)
-
-
-def _new_equilibrium(sampled: Sampled, _: Pendulum, values: FloatArray) -> FloatArray:
-    return np.asarray(values[0] * (sampled.time_s > values[1]))
 
 
 @enters(
@@ -300,7 +281,7 @@ def _new_equilibrium(sampled: Sampled, _: Pendulum, values: FloatArray) -> Float
         "look at amplitude and phase about the jump: they change by -J cos(psi) and "
         "J sin(psi)/y only if the pendulum itself jumped"
     ),
-    reading=_new_equilibrium,
+    reading=lambda sampled, _, values: np.asarray(values[0] * (sampled.time_s > values[1])),
 )
 def equilibrium_step(jump: float, instant_s: float) -> Kick:
     """The equilibrium jumps by J (mesoanelastic): amplitude and phase jump with it."""
@@ -383,16 +364,6 @@ FADES: Final = 0.12
 """Part of the record within which the transient of a release has to fade."""
 
 
-def _before_it_is_a_drift(duration_s: float = math.inf) -> list[tuple[float, float]]:
-    """Release means the first swings: what takes longer is a drift of the damping."""
-    return [(-10.0, 10.0), (1e-2, max(min(1e5, FADES * duration_s), 0.1))]
-
-
-def _from_two_periods(span: Span) -> list[tuple[float, ...]]:
-    """To an eighth of the record."""
-    return rows(between(2.0 * span.period_s, FADES * span.duration_s, 4))
-
-
 @enters(
     "acceleration",
     identifier="release-transient",
@@ -402,8 +373,12 @@ def _from_two_periods(span: Span) -> list[tuple[float, ...]]:
     local=True,
     example=(0.01, 5.0),
     discriminating_test="leave the first swings out: the rest must agree without it",
-    bounds=_before_it_is_a_drift,
-    shapes=_from_two_periods,
+    # What fades later is a drift.
+    bounds=lambda duration_s=math.inf: [
+        (-10.0, 10.0),
+        (1e-2, max(min(1e5, FADES * duration_s), 0.1)),
+    ],
+    shapes=lambda span: rows(between(2.0 * span.period_s, FADES * span.duration_s, 4)),
 )
 def release_transient(motion: Motion, pendulum: Pendulum, gamma: float, tau: float) -> FloatArray:
     """Damping gamma e^(-t/tau) on top, after the release: hand, wake, other modes."""

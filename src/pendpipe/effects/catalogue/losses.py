@@ -99,11 +99,6 @@ def envelope_factor(exponent: float) -> float:
     return gamma(0.5 * exponent + 1.0) / (math.sqrt(math.pi) * gamma(0.5 * exponent + 1.5))
 
 
-def _other_exponents(_: Span) -> list[tuple[float, ...]]:
-    """Off those of Eq. 8 (0, 1, 2) and of the cubic law."""
-    return rows((0.5, 1.5, 2.5, 4.0), (0.0,))
-
-
 @enters(
     "acceleration",
     identifier="power-law-damping",
@@ -121,7 +116,8 @@ def _other_exponents(_: Span) -> list[tuple[float, ...]]:
     discriminating_test=(
         "release it with other amplitudes at once after another: time and amplitude part"
     ),
-    shapes=_other_exponents,
+    # Off those of Eq. 8 (0, 1, 2) and of the cubic law.
+    shapes=lambda _: rows((0.5, 1.5, 2.5, 4.0), (0.0,)),
 )
 def power_law_damping(
     motion: Motion, pendulum: Pendulum, size: float, exponent: float, energy: float
@@ -138,10 +134,6 @@ def power_law_damping(
         speed = pendulum.angular_frequency * motion.amplitude
         law = law + energy * alike * (speed / SPEED) ** exponent
     return np.asarray(-size * motion.direction * law)
-
-
-def _both_forms(_: Span) -> list[tuple[float, ...]]:
-    return rows((0.0, 1.0))
 
 
 @enters(
@@ -161,7 +153,7 @@ def _both_forms(_: Span) -> list[tuple[float, ...]]:
         "release it with twice the amplitude: the sign of the third harmonic in quadrature "
         "distinguishes v^3 from x^2 v"
     ),
-    shapes=_both_forms,
+    shapes=lambda _: rows((0.0, 1.0)),
 )
 def cubic_damping(motion: Motion, pendulum: Pendulum, size: float, position: float) -> FloatArray:
     """dr/dt = -d r^3/8 by v^3 (`position_form` 0) or by x^2 v (1): van der Pol, Rayleigh.
@@ -200,11 +192,6 @@ def stribeck_friction(motion: Motion, pendulum: Pendulum, size: float, v_s: floa
     return np.asarray(-size * motion.direction * np.exp(-((motion.velocity / v_s) ** 2)))
 
 
-def _breakaway_angles(span: Span) -> list[tuple[float, ...]]:
-    """From far below the smallest amplitude to the largest."""
-    return rows(np.geomspace(0.2 * span.last_amplitude, span.first_amplitude, 4))
-
-
 @enters(
     "acceleration",
     identifier="presliding-friction",
@@ -216,7 +203,8 @@ def _breakaway_angles(span: Span) -> list[tuple[float, ...]]:
         "swing it at ever smaller amplitudes: the frequency must rise, and the damping fall, "
         "below z_c"
     ),
-    shapes=_breakaway_angles,
+    # From far below the smallest amplitude to the largest.
+    shapes=lambda span: rows(np.geomspace(0.2 * span.last_amplitude, span.first_amplitude, 4)),
 )
 def presliding_friction(
     motion: Motion, pendulum: Pendulum, stiffness: float, breakaway: float
@@ -308,11 +296,6 @@ def history_force(motion: Motion, pendulum: Pendulum, size: float) -> FloatArray
     return -size * half_derivative(motion, half_cycle_of_release(motion, pendulum))
 
 
-def _onsets(span: Span) -> list[tuple[float, ...]]:
-    """Amplitudes within the record, and a short and a long burst."""
-    return rows(span.amplitudes(12), (0.4, 1.2))
-
-
 @enters(
     "acceleration",
     identifier="vortex-shedding",
@@ -330,7 +313,8 @@ def _onsets(span: Span) -> list[tuple[float, ...]]:
     discriminating_test=(
         "change the fluid's viscosity: the kink in the damping must move, in amplitude"
     ),
-    shapes=_onsets,
+    # Amplitudes within the record, and a short and a long burst.
+    shapes=lambda span: rows(span.amplitudes(12), (0.4, 1.2)),
 )
 def vortex_shedding(
     motion: Motion, pendulum: Pendulum, loss: float, critical: float, lasts: float

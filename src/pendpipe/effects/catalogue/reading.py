@@ -143,11 +143,6 @@ def _decayed_at_the_end(values: FloatArray, duration_s: float) -> float:
     return float(abs(level * math.expm1(-duration_s / tau)))
 
 
-def _to_half_the_record(span: Span) -> list[tuple[float, ...]]:
-    """From a period."""
-    return rows(between(span.period_s, 0.5 * span.duration_s, 4))
-
-
 @enters(
     "reading",
     identifier="ac-coupling",
@@ -157,7 +152,7 @@ def _to_half_the_record(span: Span) -> list[tuple[float, ...]]:
     example=(1e-3, 5.0),
     discriminating_test="tilt the sensor and hold it: behind a capacitor the reading goes back",
     displacement=_decayed_at_the_end,
-    shapes=_to_half_the_record,
+    shapes=lambda span: rows(between(span.period_s, 0.5 * span.duration_s, 4)),
 )
 def ac_coupling(sampled: Sampled, pendulum: Pendulum, level: float, tau: float) -> FloatArray:
     """A first-order high-pass: the level that its capacitor holds at the start decays.
@@ -166,10 +161,6 @@ def ac_coupling(sampled: Sampled, pendulum: Pendulum, level: float, tau: float) 
     which no free decay shows; they are left out.
     """
     return np.asarray(level * np.exp(-elapsed(sampled.time_s) / tau))
-
-
-def _rough_grid(span: Span) -> list[tuple[float, ...]]:
-    return rows(tried_frequencies(span, 0.2 / span.period_s))
 
 
 @enters(
@@ -187,7 +178,7 @@ def _rough_grid(span: Span) -> list[tuple[float, ...]]:
     discriminating_test=(
         "record with the pendulum held, and at another sampling rate: an alias moves"
     ),
-    shapes=_rough_grid,
+    shapes=lambda span: rows(tried_frequencies(span, 0.2 / span.period_s)),
 )
 def tone_pickup(
     sampled: Sampled, pendulum: Pendulum, cosine: float, sine: float, f_a: float
@@ -247,10 +238,6 @@ _WIDTHS: Final = (0.01, 0.03, 0.1)
 _HARD: Final = 30.0
 
 
-def _widths(span: Span) -> list[tuple[float, ...]]:
-    return rows(span.first_amplitude * np.array(_WIDTHS))
-
-
 @enters(
     "reading",
     identifier="clipping",
@@ -264,7 +251,7 @@ def _widths(span: Span) -> list[tuple[float, ...]]:
     ),
     sizes=2,
     discriminating_test="widen the range, or release it with less amplitude",
-    shapes=_widths,
+    shapes=lambda span: rows(span.first_amplitude * np.array(_WIDTHS)),
 )
 def soft_clipping(
     sampled: Sampled, pendulum: Pendulum, upper: float, lower: float, width: float
