@@ -4,70 +4,74 @@ Every function takes numbers or arrays that broadcast and returns a number or an
 The equations are used in their corrected forms; each docstring names its number.
 """
 
-from pendpipe.physics.confinement import (
-    Confined,
-    sphere_between_planes,
-    sphere_in_tank,
-)
-from pendpipe.physics.decay import amplitude, amplitude_and_gradient, stopping_time, time_at
-from pendpipe.physics.fluid import (
-    POTENTIAL_FLOW_ADDED_MASS,
-    added_mass_coefficient,
-    cylinder_drag,
-    free_decay_root,
-    harmonic_drag,
-    penetration_depth,
-    quadratic_drag_rate,
-    rotation_of_sphere,
-    stokes_drag,
-    viscous_quality_factor,
-    water_density,
-    water_viscosity,
-)
-from pendpipe.physics.pendulum import (
-    STANDARD_GRAVITY_M_PER_S2,
-    Fluid,
-    Lengthening,
-    Part,
-    PointMass,
-    Rod,
-    Sphere,
-    Swing,
-    added_inertia,
-    bearing_friction_rate,
-    displaced_moment,
-    inertia_from_frequency,
-    moment_of_inertia,
-    period_lengthening,
-    restoring_torque,
-    sphere_volume,
-    static_moment,
-    swing,
-)
-from pendpipe.physics.quality import (
-    QualityFactors,
-    amplitude_of_largest_quality_factor,
-    amplitude_rate,
-    damping_coefficient,
-    decay_rates,
-    driven_pendulum_acceleration,
-    energy_power_friction,
-    energy_power_quality_factor,
-    hysteretic_frequency_shift,
-    hysteretic_quality_factor,
-    largest_quality_factor,
-    logarithmic_decrement,
-    net_quality_factor,
-    quality_factor,
-    quality_factor_limit,
-    quality_factors,
-    rates_from_energy_constants,
-    structural_quality_factor,
-    universal_acceleration,
-    viscous_acceleration,
-    viscous_frequency_shift,
-    without_hysteresis,
-)
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pendpipe.physics.confinement import (
+        Confined,
+        sphere_between_planes,
+        sphere_in_tank,
+    )
+    from pendpipe.physics.decay import amplitude, amplitude_and_gradient, stopping_time, time_at
+    from pendpipe.physics.fluid import (
+        POTENTIAL_FLOW_ADDED_MASS,
+        added_mass_coefficient,
+        cylinder_drag,
+        free_decay_root,
+        harmonic_drag,
+        penetration_depth,
+        quadratic_drag_rate,
+        rotation_of_sphere,
+        stokes_drag,
+        viscous_quality_factor,
+        water_density,
+        water_viscosity,
+    )
+    from pendpipe.physics.pendulum import (
+        STANDARD_GRAVITY_M_PER_S2,
+        Fluid,
+        Lengthening,
+        Part,
+        PointMass,
+        Rod,
+        Sphere,
+        Swing,
+        added_inertia,
+        bearing_friction_rate,
+        displaced_moment,
+        inertia_from_frequency,
+        moment_of_inertia,
+        period_lengthening,
+        restoring_torque,
+        sphere_volume,
+        static_moment,
+        swing,
+    )
+    from pendpipe.physics.quality import (
+        QualityFactors,
+        amplitude_of_largest_quality_factor,
+        amplitude_rate,
+        damping_coefficient,
+        decay_rates,
+        driven_pendulum_acceleration,
+        energy_power_friction,
+        energy_power_quality_factor,
+        hysteretic_frequency_shift,
+        hysteretic_quality_factor,
+        largest_quality_factor,
+        logarithmic_decrement,
+        net_quality_factor,
+        quality_factor,
+        quality_factor_limit,
+        quality_factors,
+        rates_from_energy_constants,
+        structural_quality_factor,
+        universal_acceleration,
+        viscous_acceleration,
+        viscous_frequency_shift,
+        without_hysteresis,
+    )
 
 __all__ = [
     "POTENTIAL_FLOW_ADDED_MASS",
@@ -130,3 +134,18 @@ __all__ = [
     "water_viscosity",
     "without_hysteresis",
 ]
+
+_MODULES = ("confinement", "decay", "fluid", "pendulum", "quality")
+
+
+def __getattr__(name: str) -> Any:
+    """Import an equation when it is first used: most programs need a few of them."""
+    if name not in __all__:
+        raise AttributeError(f"module 'pendpipe.physics' has no attribute {name!r}")
+    modules = (importlib.import_module(f"{__name__}.{module}") for module in _MODULES)
+    return next(vars(module)[name] for module in modules if name in vars(module))
+
+
+def __dir__() -> list[str]:
+    """List the public names, imported or not."""
+    return sorted({*__all__, *globals()})
