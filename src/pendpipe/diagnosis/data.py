@@ -79,6 +79,10 @@ class Data:
         origin, noise = self.lattice
         return self.values - reading - rounding_bias(reading - origin, self.step, noise)
 
+    def each(self) -> list[Data]:
+        """Return each recording's readings: these are of one."""
+        return [self]
+
     def first(self, count: int) -> Data:
         """Return the first `count` readings."""
         return replace(

@@ -8,7 +8,6 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.stacked import StackedData
 from pendpipe.dynamics.any_law import Sampled
 from pendpipe.effects.model import Evaluated
 
@@ -149,7 +148,7 @@ def unwrapped(data: Data, at: Evaluated) -> tuple[FloatArray, float]:
     max_phase_error_rad
         The largest phase difference of model and readings; 0 where it is obviously small.
     """
-    if isinstance(data, StackedData):
+    if at.parts:
         parts = [unwrapped(one, part.at) for one, part in zip(data.each(), at.parts, strict=True)]
         return np.concatenate([part for part, _ in parts]), max(slip for _, slip in parts)
     difference = data.residual(at.reading)
