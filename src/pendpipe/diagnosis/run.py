@@ -48,33 +48,10 @@ LEVEL: Final = 0.01
 
 
 @dataclass(frozen=True, repr=False)
-class Outcome:
-    """A diagnosis with the fits and readings behind it. It prints as one paragraph.
-
-    Parameters
-    ----------
-    diagnosis
-        The answer.
-    search, beginning
-        The fits, and the readings with the start values: what the figures are drawn from.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from pendpipe.recording import Recording
-    >>> time_s = np.arange(900) / 15.0
-    >>> noise = 1e-4 * np.random.default_rng(1).standard_normal(900)
-    >>> angle_rad = 0.2 * np.exp(-0.02 * time_s) * np.cos(5.6 * time_s) + noise
-    >>> found = diagnose_recording(Recording(time_s, angle_rad, "angle_rad"))
-    >>> found.verdict
-    'consistent'
-    >>> print(str(found)[:33])
-    Eq. 8 describes this recording: t
-    """
+class Answer:
+    """A diagnosis as it is shown: it prints as one paragraph."""
 
     diagnosis: Diagnosis
-    search: Search
-    beginning: Beginning
 
     @property
     def verdict(self) -> str:
@@ -98,6 +75,35 @@ class Outcome:
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``diagnosis.json``."""
         return self.diagnosis.to_dict()
+
+
+@dataclass(frozen=True, repr=False)
+class Outcome(Answer):
+    """A diagnosis with the fits and readings behind it. It prints as one paragraph.
+
+    Parameters
+    ----------
+    diagnosis
+        The answer.
+    search, beginning
+        The fits, and the readings with the start values: what the figures are drawn from.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pendpipe.recording import Recording
+    >>> time_s = np.arange(900) / 15.0
+    >>> noise = 1e-4 * np.random.default_rng(1).standard_normal(900)
+    >>> angle_rad = 0.2 * np.exp(-0.02 * time_s) * np.cos(5.6 * time_s) + noise
+    >>> found = diagnose_recording(Recording(time_s, angle_rad, "angle_rad"))
+    >>> found.verdict
+    'consistent'
+    >>> print(str(found)[:33])
+    Eq. 8 describes this recording: t
+    """
+
+    search: Search
+    beginning: Beginning
 
     def save(self, folder: str | Path, *, figures: bool = True) -> dict[str, Any]:
         """Write ``diagnosis.json`` and the figures.

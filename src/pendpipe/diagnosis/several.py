@@ -36,7 +36,7 @@ from pendpipe.diagnosis.result import (
     FoundEffect,
     Location,
 )
-from pendpipe.diagnosis.run import LEVEL, Outcome, diagnose_recording
+from pendpipe.diagnosis.run import LEVEL, Answer, Outcome, diagnose_recording
 from pendpipe.diagnosis.search import LESS_FRICTION, Search, grown
 from pendpipe.diagnosis.state import State, Step, loses_phase, price
 from pendpipe.diagnosis.statement import DOUBTFUL, listed, statement
@@ -57,6 +57,7 @@ from pendpipe.effects.model import Model, jacobian
 from pendpipe.effects.stack import MAY_DIFFER, Differs, Stack
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.estimate import Estimate
+from pendpipe.files import write_json
 from pendpipe.quantities import compact
 from pendpipe.recording import Recording
 
@@ -69,44 +70,31 @@ _MOST_EFFECTS: Final = 4
 
 
 @dataclass(frozen=True, repr=False)
-class JointOutcome:
+class JointOutcome(Answer):
     """The diagnosis of several recordings of one pendulum. It prints as one paragraph.
 
     Parameters
     ----------
-    content
-        What ``diagnosis.json`` holds.
-    effects
-        What is missing, and what the recordings do not share.
+    diagnosis
+        The answer: what is missing, and what the recordings do not share.
+    recordings
+        What is said of each recording (``recordings`` of ``diagnosis.json``).
     outcomes
         Each recording's own diagnosis.
     """
 
-    content: dict[str, Any]
-    effects: tuple[FoundEffect, ...]
+    recordings: list[dict[str, Any]]
     outcomes: tuple[Outcome, ...]
-
-    @property
-    def verdict(self) -> str:
-        """``"consistent"`` or ``"missing-physics"``."""
-        return str(self.content["verdict"])
-
-    def __str__(self) -> str:
-        return str(self.content["statement"])
-
-    __repr__ = __str__
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``diagnosis.json``."""
-        return self.content
+        return {**super().to_dict(), "recordings": self.recordings}
 
     def save(self, folder: str | Path) -> dict[str, Any]:
         """Write ``diagnosis.json`` into a folder, which is made if it is not there."""
-        from pendpipe.files import make_folder, write_json
-
-        make_folder(Path(folder))
-        write_json(Path(folder) / FILE_NAME, self.content)
-        return self.content
+        content = self.to_dict()
+        write_json(Path(folder) / FILE_NAME, content)
+        return content
 
 
 @np.errstate(over="ignore", divide="ignore", invalid="ignore")
@@ -241,8 +229,7 @@ def diagnose_several(
         remainder=found.remainder,
         provenance=dict(provenance or {}),
     )
-    content = {**diagnosis.to_dict(), "recordings": told}
-    return JointOutcome(content, effects, tuple(outcomes))
+    return JointOutcome(diagnosis, told, tuple(outcomes))
 
 
 class _TestedAlone(Forensics):
