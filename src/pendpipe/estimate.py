@@ -3,7 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, nan, pi
-from typing import Any, Self
+from typing import Any, Final, Self
+
+Z95: Final = 1.959963984540054
+"""Half the width of a 95 % interval, in standard deviations of a normal distribution."""
 
 
 def number(value: float | None) -> float:
@@ -47,7 +50,7 @@ class Estimate:
     @property
     def bounds95(self) -> tuple[float, float]:
         """The ends of the 95 % interval: `interval95`, else value -+ 1.96 sd."""
-        half = 1.959963984540054 * self.sd
+        half = Z95 * self.sd
         return self.interval95 or (self.value - half, self.value + half)
 
     def as_json(self) -> dict[str, Any]:

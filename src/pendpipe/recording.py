@@ -8,7 +8,7 @@ anything else that swings (counts, pixels, m/s^2, light), in the unit that ``# u
 gives: Q, period and relative decay need no constant of the sensor.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -19,7 +19,7 @@ from typing import Final, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pendpipe.arrays import BoolArray, ByteArray, FloatArray
+from pendpipe.arrays import AnyArray, BoolArray, ByteArray, FloatArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import read_text, replaced
 
@@ -302,8 +302,18 @@ def _column(name: str, values: ArrayLike) -> FloatArray:
     return column
 
 
+def table_lines(
+    told: Iterable[tuple[str, object]], columns: Mapping[str, AnyArray]
+) -> Iterator[str]:
+    """Give the lines of a table of ours: what is told of it, its header, and rows, all digits."""
+    yield from (f"# {key}: {' '.join(str(value).split())}\n" for key, value in told)
+    yield ",".join(columns) + "\n"
+    for row in zip(*(map(repr, values.tolist()) for values in columns.values()), strict=True):
+        yield ",".join(row) + "\n"
+
+
 def plain_lines(recording: Recording) -> Iterator[str]:
-    """Give the lines of the plain CSV form: metadata, header, a row a sample, all digits."""
+    """Give the lines of the plain CSV form."""
     columns = {
         "time_s": recording.time_s,
         recording.quantity: recording.values,
@@ -313,10 +323,7 @@ def plain_lines(recording: Recording) -> Iterator[str]:
     there = {name: values for name, values in columns.items() if values is not None}
     guesses = enumerate(recording.weak_guesses, start=1)
     told = [*recording.metadata.items(), *((f"{_WEAK}{number}", said) for number, said in guesses)]
-    yield from (f"# {key}: {' '.join(str(value).split())}\n" for key, value in told)
-    yield ",".join(there) + "\n"
-    for row in zip(*(map(repr, values.tolist()) for values in there.values()), strict=True):
-        yield ",".join(row) + "\n"
+    return table_lines(told, there)
 
 
 def write_plain(path: str | Path, recording: Recording) -> None:

@@ -16,7 +16,7 @@ from scipy.special import fdtrc, stdtrit
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.estimate import Estimate, chi_square_p_value
+from pendpipe.estimate import Z95, Estimate, chi_square_p_value
 from pendpipe.files import read_text
 
 ANGLES: Final = ("angle_rad", "angle_deg", "displacement_m")
@@ -278,7 +278,7 @@ def calibrate(
     residual = volts - offset - slope * angle_rad
     chi2 = float(np.sum(weights * residual**2))
     scale = 1.0 if known else chi2 / (count - 2)
-    reach = 1.959963984540054 if known else float(stdtrit(count - 2, 0.975))
+    reach = Z95 if known else float(stdtrit(count - 2, 0.975))
     variances = scale * covariance
     slope_sd = float(np.hypot(np.sqrt(variances[1, 1]), relative_scale_sd * slope))
     return Calibration(

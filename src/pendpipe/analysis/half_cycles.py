@@ -146,21 +146,25 @@ def _median(values: FloatArray, ordered: FloatArray, known: int) -> float:
     return middle
 
 
-def without_ripples(values: FloatArray, turns: IntArray, share: float = 0.15) -> IntArray:
+_SMALL: Final = 0.15
+"""Of both neighbours: a swing below is a ripple."""
+
+
+def without_ripples(values: FloatArray, turns: IntArray) -> IntArray:
     """Take out swings that are small beside both neighbours.
 
     In a free decay each swing is at least as large as the next, so none is small beside
     both; a wiggle within a swing is.
     """
     swing = np.abs(np.diff(values[turns]))
-    if np.all(swing[1:-1] >= share * np.minimum(swing[:-2], swing[2:])):
+    if np.all(swing[1:-1] >= _SMALL * np.minimum(swing[:-2], swing[2:])):
         return turns
     kept: list[int] = []
     for turn in turns.tolist():
         kept.append(turn)
         while len(kept) >= 4:
             a, b, c, d = (float(values[at]) for at in kept[-4:])
-            if abs(c - b) >= share * min(abs(b - a), abs(d - c)):
+            if abs(c - b) >= _SMALL * min(abs(b - a), abs(d - c)):
                 break
             del kept[-3:-1]
     return np.array(kept, dtype=np.int64)

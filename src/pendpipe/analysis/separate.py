@@ -12,7 +12,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.estimate import Estimate, chi_square_p_value, over, quality_of_rate
+from pendpipe.estimate import Z95, Estimate, chi_square_p_value, over, quality_of_rate
 from pendpipe.physics import hysteretic_quality_factor
 
 
@@ -245,7 +245,7 @@ def _widened(estimate: Estimate, relative_sd: float) -> Estimate:
     added = relative_sd * abs(estimate.value)
     interval = estimate.interval95
     if interval is not None:
-        half = 1.959963984540054 * added
+        half = Z95 * added
         below, above = estimate.value - interval[0], interval[1] - estimate.value
         interval = (
             estimate.value - float(np.hypot(below, half)),

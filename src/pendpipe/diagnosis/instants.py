@@ -15,10 +15,9 @@ from pendpipe.diagnosis.refine import Fit, best_fit, better
 from pendpipe.diagnosis.scores import scores_and_lengths
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.reading import DroppedSamples, OffsetStep
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Z95, Estimate
 
 _TAILS: Final = (0.025, 0.975)
-_SD_PER_HALF_WIDTH: Final = 1.959963984540054
 _NEAR_CHI2: Final = 24.0
 """Largest deficit in chi^2 of scanned instants between which more are computed."""
 _PER_CYCLE: Final = 16
@@ -105,7 +104,7 @@ def _quantiles(values: FloatArray, weights: FloatArray) -> tuple[float, float]:
 def _widened(estimate: Estimate, interval: tuple[float, float]) -> Estimate:
     """Return the estimate with this interval, and a larger standard deviation if it is wider."""
     low, high = min(interval[0], estimate.value), max(interval[1], estimate.value)
-    sd = max(estimate.sd, 0.5 * (high - low) / _SD_PER_HALF_WIDTH)
+    sd = max(estimate.sd, 0.5 * (high - low) / Z95)
     return replace(estimate, sd=sd, interval95=(low, high))
 
 

@@ -21,7 +21,7 @@ from pendpipe.diagnosis.forensics.codes import with_true_step
 from pendpipe.diagnosis.forensics.colour import level_note, wander_note
 from pendpipe.diagnosis.forensics.corrections import loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
-from pendpipe.diagnosis.held_out import HeldOut, held_out
+from pendpipe.diagnosis.held_out import held_out
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of
@@ -125,10 +125,9 @@ class Outcome(Answer):
         InputError
             If the folder can't be written.
         """
-        from pendpipe.files import make_folder, write_json
+        from pendpipe.files import write_json
 
         target, diagnosis = Path(folder), self.diagnosis
-        make_folder(target)
         if figures:
             from pendpipe.figures.diagnosis import draw_diagnosis
 
@@ -292,7 +291,8 @@ def diagnose_decay(
     missing = any(effect.identifier != COLOURED_NOISE for effect in effects)
     if missing:
         progress("predicting cycles that are left out of the fit")
-    held = _held_out(found, beginning) if missing else None
+    models = found.baseline, found.improved, found.data, found.noise
+    held = held_out(*models, beginning.held, found.held) if missing else None
     swings = _small_swings(law, found)
     diagnosis = Diagnosis(
         baseline,
@@ -399,10 +399,4 @@ def _fitted_model(fit: Fit, found: Search, law: Fit | None = None) -> FittedMode
     dof = max(data.used - len(fit.free), 1)
     return FittedModel(
         parameters_of(law or fit, data.unit), float(np.sqrt(np.mean(residual**2))), fit.chi2 / dof
-    )
-
-
-def _held_out(found: Search, beginning: Beginning) -> HeldOut:
-    return held_out(
-        found.baseline, found.improved, found.data, found.noise, beginning.held, found.held
     )

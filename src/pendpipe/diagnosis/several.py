@@ -56,14 +56,13 @@ from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model, jacobian
 from pendpipe.effects.stack import MAY_DIFFER, Differs, Stack
 from pendpipe.errors import InputError, NotAnalysableError
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Z95, Estimate
 from pendpipe.files import write_json
 from pendpipe.quantities import compact
 from pendpipe.recording import Recording
 
 _HEAD: Final = 0.25
 """Part of a predicted recording to which its own values (its start) are fitted."""
-_Z95: Final = 1.959963984540054
 _NOT_ZERO_SD: Final = 2.0
 """Standard deviations, with all that widens them, from which a size is not zero."""
 _MOST_EFFECTS: Final = 4
@@ -650,7 +649,7 @@ class _Answer:
             "predicted_readings": len(tail),
             "rms_rad": _rms(off),
             "expected_rms_rad": float(np.sqrt(band.mean())),
-            "within_95": float(np.mean(np.abs(off) < _Z95 * np.sqrt(band))),
+            "within_95": float(np.mean(np.abs(off) < Z95 * np.sqrt(band))),
         }
 
     def opening(self) -> str:

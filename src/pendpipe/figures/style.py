@@ -120,9 +120,9 @@ def level(y: float, colour: str = INK, width: float = 0.9, **look: Any) -> Mark:
     return methodcaller("axhline", y, color=colour, linewidth=width, **look)
 
 
-def strip(low: float, high: float, colour: str = GREY, alpha: float = 0.18) -> Mark:
+def strip(low: float, high: float) -> Mark:
     """The uncertainty of a level, across the panel."""
-    return methodcaller("axhspan", low, high, color=colour, alpha=alpha, linewidth=0.0)
+    return methodcaller("axhspan", low, high, color=GREY, alpha=0.18, linewidth=0.0)
 
 
 def words(text: str, at: tuple[Any, Any], off: tuple[float, float], **look: Any) -> Mark:

@@ -385,7 +385,7 @@ def envelope_and_period(
     baseline: Baseline,
     restoring: Restoring,
     tolerance: float = 1e-5,
-) -> tuple[EnvelopeFit, Period]:
+) -> tuple[EnvelopeFit, Period, float | None]:
     """Fit the amplitudes of turning points, and then their times."""
     if restoring == "linear":
         envelope = fit_envelope(points, held, tolerance=tolerance)
@@ -395,9 +395,10 @@ def envelope_and_period(
     a, b, c = (float(rate) for rate in envelope.value[:3])
     share = share_of(parts, b, baseline)
     omega = 2.0 * math.pi * fixed["frequency"] if "frequency" in fixed else None
-    return envelope, fit_period(
+    period = fit_period(
         points, envelope.amplitude, a, b, c, share=share, held=omega, restoring=restoring
     )
+    return envelope, period, share
 
 
 def clear(points: TurningPoints, least: float = 0.0) -> TurningPoints:
@@ -438,10 +439,9 @@ def fit_points(
     fixed = fixed or {}
     points = points if restoring == "linear" else clear(points)
     held, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
-    envelope, period = envelope_and_period(points, held, parts, fixed, baseline, restoring)
+    envelope, period, share = envelope_and_period(points, held, parts, fixed, baseline, restoring)
     a, b, c = (float(rate) for rate in envelope.value[:3])
     stretched = misfit(envelope.chi2_per_dof, len(points) - 4.0)
-    share = share_of(parts, b, baseline)
     hysteretic = (0.5 if share is None else share) * b
     said = []
     if period.chi2_per_dof > _LATE:

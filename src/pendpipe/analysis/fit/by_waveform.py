@@ -270,11 +270,10 @@ def start_values(
     points = points if restoring == "linear" else clear(points)
     omega = 2.0 * math.pi * fixed["frequency"] if "frequency" in fixed else None
     parts = loss_rates_of(fixed, points.apparent_frequency_hz)
-    envelope, period = envelope_and_period(
+    envelope, period, share = envelope_and_period(
         points, held, parts, fixed, baseline, restoring, tolerance=0.3
     )
     a, b, c, y0, level = (float(number) for number in envelope.value)
-    share = share_of(parts, b, baseline)
     # What is not known to a fraction of a radian accuses nobody.
     late = period.late_rad[period.angular_frequency * points.time_sd_s < 0.2]
     slipped = omega is None and np.max(np.abs(late), initial=0.0) > _SLIP

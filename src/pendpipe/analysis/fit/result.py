@@ -17,7 +17,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Estimate, number, quality_of_rate
-from pendpipe.files import make_folder, read_json, write_json
+from pendpipe.files import read_json, write_json
 from pendpipe.quantities import compact, in_columns, with_error
 
 if TYPE_CHECKING:
@@ -190,7 +190,6 @@ class FitResult:
         Returns the folder, which is made where it does not exist.
         """
         target = Path(folder)
-        make_folder(target)
         write_json(target / "fit.json", self.to_dict())
         if self.points is not None and self.decay is not None:
             from pendpipe.figures.style import save

@@ -70,10 +70,9 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
     index, first = find_extremes(samples.values, least, start=start, stride=stride)
     time, value = samples.time_s[index], samples.values[index]
     side = first * (1 - 2 * (np.arange(len(index)) % 2))
-    if len(index) < 3:
-        return Rough(np.arange(len(index)), time, side, float(np.median(piece))), stride
-    whole, gap_before = _beside_gaps(samples.time_s, index)
-    time, value, side, gap_before = time[whole], value[whole], side[whole], gap_before[whole]
+    if len(index) >= 3:
+        whole, gap_before = _beside_gaps(samples.time_s, index)
+        time, value, side, gap_before = time[whole], value[whole], side[whole], gap_before[whole]
     if len(time) < 3:
         return Rough(np.arange(len(time)), time, side, float(np.median(piece))), stride
     begin = 0

@@ -327,14 +327,17 @@ class Measured(NamedTuple):
         return np.clip(self.sine / np.maximum(smoothed(self.amplitude), floor), -1.0, 1.0)
 
 
-def smoothed(amplitude: FloatArray, window: int = 3) -> FloatArray:
+_SEVEN: Final = np.ones(7)
+"""A half cycle and three neighbours to each side."""
+
+
+def smoothed(amplitude: FloatArray) -> FloatArray:
     """Geometric-like local mean that leaves a strong decay alone: over y where noise is small."""
     filled = np.where(np.isfinite(amplitude), amplitude, 0.0)
-    ones = np.isfinite(amplitude).astype(np.float64)
-    kernel = np.ones(2 * window + 1)
-    if len(filled) < len(kernel):
+    if len(filled) < len(_SEVEN):
         return filled
-    mean = np.convolve(filled, kernel, "same") / np.maximum(np.convolve(ones, kernel, "same"), 1.0)
+    known = np.convolve(np.isfinite(amplitude).astype(np.float64), _SEVEN, "same")
+    mean = np.convolve(filled, _SEVEN, "same") / np.maximum(known, 1.0)
     return np.maximum(filled, mean)
 
 
@@ -467,8 +470,6 @@ def _peak(
     best: FloatArray, inverse: FloatArray, by_level: FloatArray, side: FloatArray
 ) -> FloatArray:
     """Value at the turning point: the amplitude and the free harmonics add up there."""
-    if best.shape[1] == 2:
-        return np.stack([best[:, 0] * side, inverse[:, 0, 0], by_level[:, 0]], axis=1)
     even = np.ones(best.shape[1])
     even[1] = 0.0
     variance = np.einsum("kpq,p,q->k", inverse, even, even)

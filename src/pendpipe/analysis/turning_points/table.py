@@ -12,7 +12,7 @@ import numpy as np
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import read_text, replaced
-from pendpipe.recording import whole_lines
+from pendpipe.recording import table_lines, whole_lines
 
 COLUMNS: Final = (
     "half_cycle",
@@ -145,17 +145,13 @@ def write_turning_points(path: str | Path, points: TurningPoints) -> None:
         "samples": str(points.samples),
         **points.metadata,
     }
-    columns = [getattr(points, name).tolist() for name in COLUMNS]
+    told = [
+        *head.items(),
+        *(("cut", f"{float(c.start_s)!r} {float(c.stop_s)!r} {c.reason}") for c in points.cuts),
+        *(("note", note) for note in points.notes),
+    ]
     with replaced(path) as stream:
-        for key, value in head.items():
-            stream.write(f"# {key}: {' '.join(str(value).split())}\n")
-        for cut in points.cuts:
-            reason = " ".join(cut.reason.split())
-            stream.write(f"# cut: {float(cut.start_s)!r} {float(cut.stop_s)!r} {reason}\n")
-        for note in points.notes:
-            stream.write(f"# note: {' '.join(note.split())}\n")
-        stream.write(",".join(COLUMNS) + "\n")
-        stream.writelines(",".join(map(repr, row)) + "\n" for row in zip(*columns, strict=True))
+        stream.writelines(table_lines(told, {name: getattr(points, name) for name in COLUMNS}))
 
 
 def read_turning_points(path: str | Path) -> TurningPoints:

@@ -37,9 +37,9 @@ def tone_at(cosine: float, sine: float, phase: FloatArray) -> FloatArray:
     return sum((size * wave(phase) for size, wave in asked if size), np.zeros_like(phase))
 
 
-def tried_frequencies(span: Span, low: float, count: int = 16) -> FloatArray:
+def tried_frequencies(span: Span, low: float) -> FloatArray:
     """Return frequencies in Hz for a scan, in equal ratios up to near half the sampling rate."""
-    return np.geomspace(low, 0.45 / span.interval_s, count)
+    return np.geomspace(low, 0.45 / span.interval_s, 16)
 
 
 def plane_band_hz(span: Span) -> float:
