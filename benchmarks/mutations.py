@@ -163,7 +163,9 @@ def matching_tests(tree: Path, module: str) -> list[str]:
     """The test files named like the module or its package."""
     _, *rooms, name = module.split(".")
     words = [word.rstrip("s") for word in (*rooms[1:], name)]
-    files = sorted((tree / "tests" / (rooms[0] if rooms else "core")).glob("test_*.py"))
+    folder = tree / "tests" / (rooms[0] if rooms else "core")
+    # Commands and stages have no folder of their own.
+    files = sorted((folder if folder.is_dir() else tree / "tests").rglob("test_*.py"))
     named = [path for path in files if any(word in path.stem for word in words)]
     return [path.relative_to(tree).as_posix() for path in named]
 

@@ -213,6 +213,19 @@ def test_a_bad_table_is_one_line_and_status_2(
     assert not out.exists()
 
 
+def test_a_constant_that_is_given_is_exact_and_comes_before_the_caliper_run(tmp_path: Path) -> None:
+    recording, out, run = (tmp_path / name for name in ("r.csv", "out.json", "sensor.json"))
+    recording.write_text("time_s,volts\n" + "".join(f"{k},{k % 3}\n" for k in range(9)))
+    measured = {"value": 3.85, "sd": 0.01, "unit": "V/rad"}
+    run.write_text(json.dumps({"volts_per_radian": measured, "points": [{"angle_rad": 9.0}]}))
+    words = ["calibrate", str(recording), "--record", "one", "--out", str(out)]
+    assert main([*words, "--sensor", str(run)]) == 0
+    assert json.loads(out.read_text())["volts_per_radian"] == measured
+    assert main([*words, "--sensor", str(run), "--volts-per-radian", "2"]) == 0
+    given = json.loads(out.read_text())["volts_per_radian"]
+    assert given == {"value": 2.0, "sd": 0.0, "unit": "V/rad"}
+
+
 def test_a_point_far_beyond_the_others_ends_in_no_traceback() -> None:
     points = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 1e12])
     assert calibrate(points, points).volts_per_radian.value == pytest.approx(1.0)

@@ -174,6 +174,21 @@ def test_a_wandering_level_is_followed() -> None:
     assert np.all(np.abs(points.amplitude_rad - amplitude)[inner] < 1.5e-4)
 
 
+@pytest.mark.parametrize("unit", [1e-4, 1e4])
+def test_whether_the_level_wanders_does_not_hang_on_the_unit(unit: float) -> None:
+    """Angles in radians, degrees or counts: the level and its error are larger by as much."""
+    recording = record(FIG_8, START, np.arange(30000) * 0.01, 1e-4)
+    for wander in (0.0, 4e-5, 4e-3):
+        moved = recording.values + wander * np.sin(2.0 * math.pi * recording.time_s / 170.0)
+        one, other = (
+            find_turning_points(Recording(recording.time_s, scale * moved, "displacement_m"))
+            for scale in (1.0, unit)
+        )
+        assert other.wanders == one.wanders
+        assert other.level_sd_rad == pytest.approx(unit * one.level_sd_rad, rel=1e-6)
+        assert other.level_rad == pytest.approx(unit * one.level_rad, rel=1e-6)
+
+
 def test_a_still_level_is_one_number() -> None:
     points = find_turning_points(record(FIG_8, START, np.arange(30000) * 0.01, 1e-4))
     assert not points.wanders
