@@ -245,11 +245,16 @@ class FaultyDevice(SimulatedDevice):
         **options: Any,
     ) -> None:
         self._path = FaultyPath(faults)
+        self._offset_s = 0.0  # of the stream, on the signal's clock
         if link is None or isinstance(link, str):
             terminal = link == "pty" or (link is None and hasattr(os, "openpty"))
             link = ReplaceableTerminal() if terminal else ReplaceableSocket()
         super().__init__(
-            kind, signal, link=link, rate_error=self._path.rate_factor - 1.0, **options
+            kind,
+            lambda time_s: signal(time_s + self._offset_s),
+            link=link,
+            rate_error=self._path.rate_factor - 1.0,
+            **options,
         )
         self._first_start_s: float | None = None
         self._until_s = 0.0  # the end of a stall or a silence
@@ -283,11 +288,12 @@ class FaultyDevice(SimulatedDevice):
             self._outbox += self._path.stream(due, self._stream.scan_bytes)
         self._send()
 
-    def _begin(self, offset_s: float = 0.0) -> None:
+    def _begin(self) -> None:
         now_s = self.clock.now()
         if self._first_start_s is None:
             self._first_start_s = now_s
-        super()._begin(now_s - self._first_start_s + offset_s)
+        self._offset_s = now_s - self._first_start_s
+        super()._begin()
 
     def _rest_s(self) -> float:
         return super()._rest_s() if self._stream else 0.005

@@ -403,7 +403,7 @@ def run_answers(case: Case) -> bool:
         driver.identify()
         driver.configure((1, 2), 50.0)
         driver.start()
-        driver.decoder(2).feed(driver.receive(0.0))
+        driver.decoder(2).feed(driver.line.receive(0.0))
         driver.stop()
     except InputError as fault:
         _one_line(fault)

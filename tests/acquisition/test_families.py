@@ -97,7 +97,7 @@ def test_di149_session(script: Any) -> None:
     assert driver.identify().serial_number == "12345601"
     assert driver.configure([3, 1], 100.0).rate_hz == 100.0
     driver.start()
-    assert driver.decoder(2).feed(driver.receive(1.0)).counts.tolist() == [[12, 1024]]
+    assert driver.decoder(2).feed(driver.line.receive(1.0)).counts.tolist() == [[12, 1024]]
     driver.stop()
     assert line.finished
 
@@ -134,7 +134,7 @@ def test_di245_session(script: Any) -> None:
     setup = driver.configure([1, 4], 10.0, range_volts=3.0)
     assert (setup.rate_hz, setup.range_volts) == (10.0, 5.0)
     driver.start()
-    assert driver.decoder(2).feed(driver.receive(1.0)).counts.tolist() == [[1, 4096]]
+    assert driver.decoder(2).feed(driver.line.receive(1.0)).counts.tolist() == [[1, 4096]]
     driver.stop()
     assert line.finished
 

@@ -153,7 +153,7 @@ def test_a_stale_stream_of_a_crashed_run_is_ended_first(kind: str) -> None:
             crashed.identify()
             crashed.configure([1], 100.0)
             crashed.start()
-            assert crashed.receive(1.0) + crashed.receive(1.0)
+            assert crashed.line.receive(1.0) + crashed.line.receive(1.0)
         recording = record(device.port, kind, rate_hz=60.0, duration_s=30.0, clock=device.clock)
     assert np.abs(recording.values - swing(recording.time_s)).max() <= 0.6 * step_volts(recording)
 

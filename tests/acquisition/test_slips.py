@@ -117,7 +117,7 @@ def test_a_whole_stream_is_left_alone(
     random = np.random.default_rng(5)
     motion = amplitude * np.sin(rate * np.arange(3000)) + random.normal(0.0, noise, 3000)
     codes = np.rint(np.clip(motion, -clip, clip) / step).astype(np.int64) * step
-    assert find_slips(stream(np.clip(codes, -32768, 32768 - step)[:, None]), 1) == []
+    assert not list(find_slips(stream(np.clip(codes, -32768, 32768 - step)[:, None]), 1))
 
 
 @pytest.mark.parametrize(
@@ -133,11 +133,11 @@ def test_a_whole_stream_is_left_alone(
     ids=["white", "square", "multiples of 256", "clipped", "spikes", "still"],
 )
 def test_odd_signals_are_no_slips(codes: NDArray[np.float64]) -> None:
-    assert find_slips(stream(np.rint(codes).astype(np.int64)[:, None]), 1) == []
+    assert not list(find_slips(stream(np.rint(codes).astype(np.int64)[:, None]), 1))
 
 
 def test_whole_words_and_short_streams_are_not_told() -> None:
     data = stream(swing())
-    assert find_slips(data[:3000] + data[3002:], 1) == []
-    assert find_slips(data[:60], 1) == []
-    assert find_slips(b"", 1) == []
+    assert not list(find_slips(data[:3000] + data[3002:], 1))
+    assert not list(find_slips(data[:60], 1))
+    assert not list(find_slips(b"", 1))

@@ -146,11 +146,7 @@ def decode_recording(
         f"choose from {', '.join(map(str, channels))}",
     )
     driver = find_driver(raw.header["model"])
-    segments = split(raw, driver)
-    kept = raw.event("stopped").get("keep_scans")
-    if kept is not None and len(segments) == 1:
-        gone = _lost([loss for loss in segments[0].losses if loss.reason == "damage"])
-        segments = [replace(segments[0], counts=segments[0].counts[: max(1, int(kept) - gone)])]
+    segments = _wanted(raw, split(raw, driver))
     refuse_if(
         not segments,
         place,
@@ -177,6 +173,15 @@ def decode_recording(
         resolution=step,
         notes=_notes(raw, segments, time_base, time_s),
     )
+
+
+def _wanted(raw: RawRecording, segments: list[Segment]) -> list[Segment]:
+    """Leave out what arrived beyond the number of scans that was asked for."""
+    kept = raw.event("stopped").get("keep_scans")
+    if kept is None or len(segments) != 1:
+        return segments
+    gone = _lost([loss for loss in segments[0].losses if loss.reason == "damage"])
+    return [replace(segments[0], counts=segments[0].counts[: max(1, int(kept) - gone)])]
 
 
 def _check_description(place: str, raw: RawRecording) -> None:
@@ -439,7 +444,7 @@ def _scans_of(
         parts += [fed.counts, ended.counts]
         # A decoder of words tells of a stop code whenever it ends: once is enough.
         losses += [*fed.losses, *ended.losses] if marked or not cut else []
-        scans += len(fed) + len(ended)
+        scans += len(fed.counts) + len(ended.counts)
         if not cut:
             break
         thrown = cut.next_byte - cut.last_byte
@@ -544,10 +549,7 @@ def measure_rate(
         return nothing
     slope = (arrival_s[-1] - arrival_s[0]) / (scans[-1] - scans[0])
     late = arrival_s - slope * scans
-    first = [
-        stretch[np.argmin(late[stretch])]
-        for stretch in np.array_split(np.arange(len(scans)), _RATE_STRETCHES)
-    ]
+    first = _least_late(late, _RATE_STRETCHES)
     (interval, _), covariance = np.polyfit(scans[first], arrival_s[first], 1, cov=True)
     if interval <= 0:
         return nothing
@@ -592,22 +594,44 @@ def find_clock_losses(
     stretches = min(_LOSS_STRETCHES, len(scans) // _IN_STRETCH)
     if stretches < 4 * _BESIDE:
         return [], math.inf
-    parts = np.array_split(np.arange(len(scans)), stretches)
     late = arrival_s - scans / nominal_hz
-    first = np.array([part[np.argmin(late[part])] for part in parts])
+    first = _least_late(late, stretches)
     # The drift of a wrong rate, per scan: a median is not moved by a few steps.
     slope = float(np.median(np.diff(late[first]) / np.maximum(1.0, np.diff(scans[first]))))
     late = late - slope * scans
-    level = late[first]
-    steps = np.diff(level)
+    steps = np.diff(late[first])
     spread = 1.4826 * float(np.median(np.abs(steps - np.median(steps))))
     interval_s = slope + 1.0 / nominal_hz
     limit_s = max(_FEWEST_SCANS * interval_s, _HOST_S * clock_scale, _SPREADS * spread)
-    found: list[tuple[int, int]] = []
+    found = _lasting_steps(late, first, limit_s)
+    return [(at, max(1, round(rise / interval_s))) for at, rise in found], limit_s
+
+
+def _least_late(late: FloatArray, stretches: int) -> IntArray:
+    """Return which arrival was least late in each of so many stretches."""
+    parts = np.array_split(np.arange(len(late)), stretches)
+    return np.array([part[np.argmin(late[part])] for part in parts])
+
+
+def _lasting_steps(
+    late: FloatArray, first: IntArray, limit_s: float
+) -> Iterator[tuple[int, float]]:
+    """Find steps of the lateness that all later stretches keep up: the arrival after each, height.
+
+    Parameters
+    ----------
+    late
+        Lateness of each arrival, s, shape (n,).
+    first
+        The least late arrival of each stretch.
+    limit_s
+        What a step must exceed.
+    """
+    level = late[first]
     before = np.maximum.accumulate(level)
     after = np.minimum.accumulate(level[::-1])[::-1]
     index = _BESIDE - 1
-    while index < stretches - _BESIDE - 1:
+    while index < len(first) - _BESIDE - 1:
         # The stretch in which it happens may show a part of the step: it is passed over.
         rise = float(after[index + 2] - before[index])
         if rise <= limit_s:
@@ -622,9 +646,8 @@ def find_clock_losses(
         begin, end = int(first[index]), int(first[index + 2])
         least_after = np.minimum.accumulate(late[begin : end + 1][::-1])[::-1]
         at = begin + 1 + int(np.argmax(np.diff(least_after)))
-        found.append((at, max(1, round(rise / interval_s))))
+        yield at, rise
         index += _BESIDE
-    return found, limit_s
 
 
 _STAMP: Final = r"\d{8}T\d{6}\.\d{6}Z-[0-9a-f]{8}"

@@ -87,14 +87,12 @@ class Line(AbstractContextManager["Line"]):
 
     def read(self, size: int, limit_s: float) -> bytes:
         """Return `size` bytes, or the fewer that came within `limit_s`."""
-        with self._watched():
-            self._serial.timeout = limit_s
+        with self._watched(limit_s):
             return bytes(self._serial.read(size))
 
     def read_until(self, end: bytes, limit_s: float) -> bytes:
         """Return everything up to and with `end`, or what came within `limit_s`."""
-        with self._watched():
-            self._serial.timeout = limit_s
+        with self._watched(limit_s):
             return bytes(self._serial.read_until(end))
 
     def discard(self, quiet_s: float, limit_s: float = 1.0) -> bytes:
@@ -116,9 +114,10 @@ class Line(AbstractContextManager["Line"]):
             connection.close()
 
     @contextmanager
-    def _watched(self) -> Iterator[None]:
-        """Turn a fault of the line into one line."""
+    def _watched(self, limit_s: float = 0.0) -> Iterator[None]:
+        """Let a read take so long, and turn a fault of the line into one line."""
         try:
+            self._serial.timeout = limit_s
             yield
         except (OSError, termios_error) as fault:
             # pyserial's messages wrap one another.

@@ -46,21 +46,24 @@ class AcquisitionRequest:
 
     Parameters
     ----------
-    channels
-        Channels as printed on the box, from 1.
     rate_hz
         Scans a second; the nearest that the device can do is taken.
     duration_s
-        Seconds of the recorder's clock.
+        Length in s of the recorder's clock: as many scans as it holds at the device's nominal
+        rate. A device that is faster than it claims is recorded for the whole time.
+    channels
+        Channels as printed on the box, from 1; `record` returns the first of them (the others are
+        decoded by `decode_recording` from the raw file).
     range_volts
-        The signal stays within plus and minus it; the box's usual range when not given.
+        The signal stays within plus and minus it: the smallest range that holds it is taken.
     reconnect_s
-        Seconds of the host for which a lost or silent device is waited for.
+        For so many seconds of the host a device that was unplugged, fell silent or
+        overflowed is looked for again; what was missed is a gap.
     """
 
-    channels: tuple[int, ...]
     rate_hz: float
     duration_s: float
+    channels: Sequence[int] = (1,)
     range_volts: float | None = None
     reconnect_s: float = 30.0
 
@@ -109,9 +112,9 @@ class ProgressLine:
         """Show further scans, by `elapsed_s` of the recorder's clock."""
         if not self._stream.isatty():
             return
-        self._scans += len(scans)
+        self._scans += len(scans.counts)
         self._lost += sum(loss.lost_scans for loss in scans.losses if loss.after_scan)
-        if len(scans):
+        if len(scans.counts):
             self._recent.append((elapsed_s, scans.counts[:, 0]))
         while len(self._recent) > 1 and self._recent[0][0] < elapsed_s - _MEMORY_S:
             self._recent.popleft()
@@ -180,11 +183,27 @@ class Session:
         """Close the line."""
         self._line.close()
 
+    def description(self) -> dict[str, object]:
+        """What instrument this is, and how it records."""
+        return {
+            "model": self.identity.model,
+            "firmware": self.identity.firmware or None,
+            "serial_number": self.identity.serial_number or None,
+            "channels": list(self.setup.channels),
+            "bits": self._driver.bits,
+            "range_volts": self.setup.range_volts,
+            "rate_hz": self.setup.rate_hz,
+            "requested_rate_hz": self._request.rate_hz,
+            "duration_s": self._request.duration_s,
+            "clock_scale": self._clock.scale,
+            "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
+        }
+
     def run(self, stream: IO[bytes], header: Mapping[str, object]) -> None:
         """Keep everything from start to end, with its time; a break ends or resumes it."""
-        writer = RawWriter(
-            stream, header, bytes_per_s=self.setup.rate_hz * self._decoder.bytes_per_scan
-        )
+        known = {key: value for key, value in header.items() if value is not None}
+        bytes_per_s = self.setup.rate_hz * self._decoder.bytes_per_scan
+        writer = RawWriter(stream, known, bytes_per_s=bytes_per_s)
         # Taken before the start, so that a device can only seem late, never early.
         self._origin_s = self._clock.now()
         reason = ""
@@ -242,7 +261,7 @@ class Session:
         silence_s = _SILENCE_S + 64 / self.setup.rate_hz / scale
         while True:
             try:
-                data = self._instrument.receive(silence_s)
+                data = self._line.receive(silence_s)
             except LineLostError as fault:
                 return fault.problem
             elapsed_s = self._elapsed_s()
@@ -295,16 +314,12 @@ def record(
     port: str,
     driver: str | None = None,
     *,
-    channels: Sequence[int] = (1,),
-    rate_hz: float,
-    duration_s: float,
     clock: ScaledClock | None = None,
     raw_path: str | Path | None = None,
     volts_per_radian: float | None = None,
     source: str | None = None,
     progress: ProgressLine | None = None,
-    range_volts: float | None = None,
-    reconnect_s: float = 30.0,
+    **wanted: Any,
 ) -> Recording:
     """Record from the device on a port, and decode.
 
@@ -314,14 +329,6 @@ def record(
         A device file, a COM port, or a URL of pyserial.
     driver
         The model, a key of `drivers.DRIVERS`; the device is asked when not given.
-    channels
-        Channels as printed on the box, from 1; the first of them is returned (the others
-        by `decode_recording` from the raw file).
-    rate_hz
-        Scans a second; the nearest that the device can do is taken.
-    duration_s
-        Length in s: as many scans as it holds at the device's nominal rate. A device that is
-        faster than it claims is recorded for the whole time.
     clock
         The recorder's clock; real time by default, a simulated device's ``clock`` for one.
     raw_path
@@ -333,11 +340,8 @@ def record(
         What to call the source in the metadata; model and port by default.
     progress
         A display to keep up to date.
-    range_volts
-        The signal stays within plus and minus it: the smallest range that holds it is taken.
-    reconnect_s
-        For so many seconds of the host a device that was unplugged, fell silent or
-        overflowed is looked for again; what was missed is a gap.
+    **wanted
+        Rate, length, channels, ...: see `AcquisitionRequest`.
 
     Returns
     -------
@@ -351,35 +355,16 @@ def record(
         impossible, nothing was received, the raw file exists, or it can't be written: what it
         holds by then is good.
     """
-    request = AcquisitionRequest(
-        tuple(channels), rate_hz, duration_s, range_volts, max(0.0, reconnect_s)
-    )
-    clock = clock or ScaledClock()
+    request, clock = AcquisitionRequest(**wanted), clock or ScaledClock()
     kind = find_driver(driver or identify(port).model)
     with (
         Line(port, kind.baudrate) as line,
         closing(Session(line, kind, request, clock, progress)) as session,
         _opened(raw_path) as stream,
     ):
-        told = {
-            "model": session.identity.model,
-            "firmware": session.identity.firmware or None,
-            "serial_number": session.identity.serial_number or None,
-            "port": port,
-            "channels": list(session.setup.channels),
-            "bits": kind.bits,
-            "range_volts": session.setup.range_volts,
-            "rate_hz": session.setup.rate_hz,
-            "requested_rate_hz": request.rate_hz,
-            "duration_s": request.duration_s,
-            "clock_scale": clock.scale,
-            "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
-            "volts_per_radian": volts_per_radian,
-            "source": source,
-        }
-        kept = {key: value for key, value in told.items() if value is not None}
+        own = {"port": port, "volts_per_radian": volts_per_radian, "source": source}
         try:
-            session.run(stream, kept)
+            session.run(stream, session.description() | own)
         except OSError as fault:
             raise _cannot_write(raw_path or "memory", fault) from None
         content = stream.getvalue() if isinstance(stream, BytesIO) else None
@@ -473,11 +458,9 @@ def acquire_simulated(
     InputError
         As `recorder.record`; and whatever `signal` raises.
     """
-    request = AcquisitionRequest(tuple(channels), rate_hz, duration_s)
-    fastest = min(
-        _LINE_BYTES_PER_S / (2 * len(request.channels or (1,)) * rate_hz),
-        duration_s / _SHORTEST_S,
-    )
+    AcquisitionRequest(rate_hz, duration_s)
+    bytes_per_s = 2 * max(1, len(channels)) * rate_hz
+    fastest = min(_LINE_BYTES_PER_S / bytes_per_s, duration_s / _SHORTEST_S)
     scale = min(clock_scale, max(1.0, fastest))
     with SimulatedDevice(
         device_kind, signal, clock_scale=scale, link=link, rate_error=rate_error

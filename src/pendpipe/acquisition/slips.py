@@ -6,6 +6,7 @@ of the full scale, and what is read one byte later becomes smooth. Only that *ch
 to the other, is believed: a signal that looks odd throughout is left alone.
 """
 
+from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -46,7 +47,7 @@ class Cut(NamedTuple):
     bytes_missing: int = 0
 
 
-def find_slips(data: bytes, channels: int, begin: int = 0) -> list[Cut]:
+def find_slips(data: bytes, channels: int, begin: int = 0) -> Iterator[Cut]:
     """Find where a stream of little-endian 16-bit words slips by an odd number of bytes.
 
     Parameters
@@ -58,19 +59,16 @@ def find_slips(data: bytes, channels: int, begin: int = 0) -> list[Cut]:
     begin
         From here on the words are held to be in step.
 
-    Returns
-    -------
-    list of Cut
+    Yields
+    ------
+    Cut
         In order. What slips by an even number (whole words: the channels change places), a
         signal that changes by more than some 2000 codes from scan to scan, or that stands
         still to the last bit, can't be found so.
     """
-    size = 2 * channels
-    slips: list[Cut] = []
-    while found := _next_slip(data, begin, size):
-        slips.append(found)
+    while found := _next_slip(data, begin, 2 * channels):
+        yield found
         begin = found.next_byte
-    return slips
 
 
 def _next_slip(data: bytes, begin: int, size: int) -> Cut | None:

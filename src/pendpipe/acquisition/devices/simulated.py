@@ -135,9 +135,7 @@ class Stream:
         dialect: Dialect,
         signal: Signal | Mapping[int, Signal],
         rate_error: float,
-        offset_s: float,
     ) -> None:
-        self._offset_s = offset_s
         self._dialect = dialect
         channels = dialect.channels
         self._signals = [
@@ -176,7 +174,6 @@ class Stream:
         """Sample, convert and encode the next block."""
         block = min(_BLOCKS[1], max(_BLOCKS[0], self._computed))
         time_s = np.arange(self._computed, self._computed + block) / self._rate_hz
-        time_s += self._offset_s
         codes: IntArray = np.zeros((block, len(self._signals)), dtype=np.int64)
         for column, signal in enumerate(self._signals):
             if signal is not None:
@@ -185,11 +182,6 @@ class Stream:
                 )
         self._ready += self._dialect.encode(codes)
         self._computed += block
-
-
-def _wait(read: int, write: int | None, timeout_s: float) -> None:
-    """Wait until there is something to read, or room to write."""
-    select.select([read], [] if write is None else [write], [], max(0.0, timeout_s))
 
 
 class PseudoTerminal:
@@ -211,7 +203,7 @@ class PseudoTerminal:
 
     def wait(self, timeout_s: float, *, sending: bool) -> None:
         """Wait until there is something to read (or room to write)."""
-        _wait(self._device, self._device if sending else None, timeout_s)
+        select.select([self._device], [self._device] * sending, [], max(0.0, timeout_s))
 
     def receive(self) -> bytes:
         """Return what the host has sent; nothing when it has sent nothing."""
@@ -249,9 +241,8 @@ class LoopbackSocket:
 
     def wait(self, timeout_s: float, *, sending: bool) -> None:
         """Wait until there is something to read (or room to write)."""
-        end = self._host or self._listener
-        writing = self._host is not None and sending
-        _wait(end.fileno(), end.fileno() if writing else None, timeout_s)
+        end, sending = self._host or self._listener, self._host is not None and sending
+        select.select([end], [end] * sending, [], max(0.0, timeout_s))
 
     def receive(self) -> bytes:
         """Return what the host has sent; accept a host that has come, drop one that left."""
@@ -410,9 +401,9 @@ class SimulatedDevice:
         if not self.dialect.streaming:
             self._stream = None
 
-    def _begin(self, offset_s: float = 0.0) -> None:
-        """Begin a stream, whose first scan reads the signal at `offset_s`."""
-        self._stream = Stream(self.dialect, self._signal, self._rate_error, offset_s)
+    def _begin(self) -> None:
+        """Begin a stream, whose first scan reads the signal at 0 s."""
+        self._stream = Stream(self.dialect, self._signal, self._rate_error)
         self._stream.begin(self.clock)
 
     def _rest_s(self) -> float:

@@ -1,6 +1,6 @@
 """What all drivers have in common: one instrument on an open line.
 
-A session is ``identify``, ``configure``, ``start``, any number of ``receive``, and ``stop``. What
+A session is ``identify``, ``configure``, ``start``, reading the line, and ``stop``. What
 is wrong with the line or the setting is an `InputError`, with the port as place. A family
 defines how its commands are sent; every model is entered into `DRIVERS` where its class is defined.
 
@@ -20,8 +20,8 @@ signed number, zero at 0 V.
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, Final, TypeAlias
+from dataclasses import dataclass
+from typing import Any, ClassVar, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -59,8 +59,7 @@ class Loss:
     reason: str = ""
 
 
-@dataclass(frozen=True)
-class Scans:
+class Scans(NamedTuple):
     """What a decoder made of some bytes.
 
     Parameters
@@ -72,10 +71,7 @@ class Scans:
     """
 
     counts: AnyArray
-    losses: tuple[Loss, ...] = field(default=())
-
-    def __len__(self) -> int:
-        return len(self.counts)
+    losses: tuple[Loss, ...] = ()
 
 
 class SyncBitDecoder:
@@ -405,10 +401,6 @@ class Driver(ABC):
         """
         self.line.discard(self.patience_s if self._doubt else self.quiet_s, 2.0 * self.patience_s)
         self._doubt = False
-
-    def receive(self, limit_s: float) -> bytes:
-        """Return what has arrived, waiting at most `limit_s` (of the host's clock)."""
-        return self.line.receive(limit_s)
 
     @classmethod
     def decoder(cls, channels: int) -> Decoder:
