@@ -13,7 +13,7 @@ of tails.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import itemgetter
 from typing import Any, NamedTuple
 
@@ -21,7 +21,7 @@ import numpy as np
 
 from pendpipe import physics
 from pendpipe.analysis.fit.by_points import fit_envelope, fit_points
-from pendpipe.analysis.separate import SeparatedRecord
+from pendpipe.analysis.separate import Line, SeparatedRecord
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
@@ -210,38 +210,19 @@ class SharedEstimate:
     p_value: float
 
 
-class Line(NamedTuple):
-    """Points through which a line from the origin is drawn, each of shape (n,)."""
-
-    regressor: FloatArray
-    response: FloatArray
-    sd: FloatArray
-
-    def slope(self) -> float:
-        """The slope of weighted least squares."""
-        x, y = self.regressor / self.sd, self.response / self.sd
-        return float(np.sum(x * y) / np.sum(x * x))
-
-    def off(self, slope: float) -> FloatArray:
-        """What a slope leaves of the response."""
-        return self.response - slope * self.regressor
-
-
 def fit_line(losses: Columns, ends: Ends, line_of: Callable[[Columns], Line]) -> SharedEstimate:
     """Fit the slope with the records' own weights; follow the shared errors into it."""
     line = line_of(losses)
-    value = line.slope()
-    effects = shared_effects(lambda moved: line_of(moved).slope(), ends)
+    slope, dof = line.slope(), len(line.sd) - 1
+    effects = shared_effects(lambda moved: line_of(moved).slope().value, ends)
     shared = {source: float(effect) for source, effect in effects.items()}
-    sd_own = float(np.sum((line.regressor / line.sd) ** 2) ** -0.5)
-    sd_common = float(np.sqrt(sum(effect**2 for effect in shared.values())))
+    sd_common = math.hypot(*shared.values())
     # The records are judged about their own best line, found with the same covariance.
-    spread = shared_effects(lambda moved: line_of(moved).off(value), ends)
-    chi2 = chi_square(line.off(value), line.sd, spread, line.regressor)
-    dof = len(line.sd) - 1
+    spread = shared_effects(lambda moved: line_of(moved).off(slope.value), ends)
+    chi2 = chi_square(line.off(slope.value), line.sd, spread, line.regressor)
     return SharedEstimate(
-        estimate=Estimate(value, float(np.hypot(sd_own, sd_common)), ""),
-        sd_own=sd_own,
+        estimate=replace(slope, sd=math.hypot(slope.sd, sd_common)),
+        sd_own=slope.sd,
         sd_common=sd_common,
         shared=shared,
         chi2=chi2,
@@ -348,30 +329,6 @@ def _log_quality(branch: Columns, moved: float = 0.0) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class ModelCheck:
-    """What one theory says of the limiting Q of every record, beside what was measured.
-
-    Parameters
-    ----------
-    history, hysteresis
-        Whether the theory has Eq. 2's history term, and the internal friction.
-    quality_factor_limit
-        Its limits, shape (n,).
-    ratio
-        Those over the measured ones, shape (n,): above one where theory forgets a loss.
-    chi2, degrees_of_freedom
-        Of the measured rates about it, errors of k included.
-    """
-
-    history: bool
-    hysteresis: bool
-    quality_factor_limit: FloatArray
-    ratio: FloatArray
-    chi2: float
-    degrees_of_freedom: int
-
-
-@dataclass(frozen=True)
 class Comparison:
     """All that `compare` finds.
 
@@ -392,7 +349,7 @@ class Comparison:
     steady_stokes_percent
         How much the steady law underestimates the damping, least and most, per cent.
     checks
-        The theories with and without history term and hysteresis.
+        The theories with and without history term and hysteresis, as in comparison.json.
     budget
         Relative error of `theory_factor` by source, the records' own first.
     """
@@ -402,7 +359,7 @@ class Comparison:
     history_coefficient: SharedEstimate
     exponents: dict[str, Exponent]
     steady_stokes_percent: tuple[float, float]
-    checks: tuple[ModelCheck, ...]
+    checks: list[dict[str, Any]]
     budget: dict[str, float]
 
 
@@ -430,11 +387,6 @@ def compare(
     losses = viscous_losses(records, surroundings)
     ends = shifted(losses, errors, 1.0), shifted(losses, errors, -1.0)
     factor = fit_line(losses, ends, _drag_over_theory)
-    checks = tuple(
-        check_model(losses, ends, history=history, hysteresis=hysteresis)
-        for history in (True, False)
-        for hysteresis in (True, False)
-    )
     variances = [effect**2 for effect in shared_effects(quality_factor_theory, ends).values()]
     table = losses | {
         "quality_factor_theory": quality_factor_theory(losses),
@@ -442,7 +394,7 @@ def compare(
         "quality_factor_steady": quality_factor_theory(losses, 0.0),
         "radius_over_depth": radius_over_depth(losses),
         "drag_over_theory": _drag_over_theory(losses).response,
-        "quality_factor_limit": checks[0].quality_factor_limit,
+        "quality_factor_limit": np.pi * losses["frequency_hz"] / exponential_rates(losses)[1],
     }
     # Of the drag measured over that of the steady law, less 1.
     excess = 100.0 * _excess_over_steady(losses).response
@@ -460,7 +412,11 @@ def compare(
         history_coefficient=fit_line(losses, ends, _excess_over_steady),
         exponents={name: found for name, found in fitted.items() if found is not None},
         steady_stokes_percent=(float(np.min(excess)), float(np.max(excess))),
-        checks=checks,
+        checks=[
+            check_model(losses, ends, history=history, hysteresis=hysteresis)
+            for history in (True, False)
+            for hysteresis in (True, False)
+        ],
         budget={"the records themselves": factor.sd_own / abs(factor.estimate.value)}
         | {
             source: abs(effect / factor.estimate.value)
@@ -470,27 +426,31 @@ def compare(
     )
 
 
-def check_model(losses: Columns, ends: Ends, *, history: bool, hysteresis: bool) -> ModelCheck:
-    """Compare the measured limits of Q with a theory that has or lacks two of its terms."""
-
-    def rates(moved: Columns) -> tuple[FloatArray, FloatArray]:
-        """The whole exponential loss: measured, and predicted."""
-        frequency, viscous, other = _columns(
-            moved, "frequency_hz", "rate_per_s", "hysteretic_rate_per_s"
-        )
-        predicted = np.pi * frequency / quality_factor_theory(moved, float(history))
-        return viscous + other, predicted + hysteresis * other
-
-    effects = shared_effects(lambda moved: np.subtract(*rates(moved)), ends)
-    measured, predicted = rates(losses)
-    return ModelCheck(
-        history=history,
-        hysteresis=hysteresis,
-        quality_factor_limit=np.pi * losses["frequency_hz"] / predicted,
-        ratio=measured / predicted,
-        chi2=chi_square(measured - predicted, drag_sd_per_s(losses), effects),
-        degrees_of_freedom=len(measured),
+def exponential_rates(
+    losses: Columns, history: bool = True, hysteresis: bool = True
+) -> tuple[FloatArray, FloatArray]:
+    """Return the whole exponential loss b: measured, and of a theory with or without two terms."""
+    frequency, viscous, other = _columns(
+        losses, "frequency_hz", "rate_per_s", "hysteretic_rate_per_s"
     )
+    predicted = np.pi * frequency / quality_factor_theory(losses, float(history))
+    return viscous + other, predicted + hysteresis * other
+
+
+def check_model(losses: Columns, ends: Ends, **theory: bool) -> dict[str, Any]:
+    """Compare the measured limits of Q with a theory that has or lacks two of its terms.
+
+    Returns
+    -------
+    dict
+        ``history`` and ``hysteresis``: whether the theory has them; ``ratio`` of its limits over
+        the measured ones, above one where it forgets a loss; ``chi2`` of the measured rates about
+        it, errors of k included, and ``dof``.
+    """
+    effects = shared_effects(lambda moved: np.subtract(*exponential_rates(moved, **theory)), ends)
+    measured, predicted = exponential_rates(losses, **theory)
+    chi2 = chi_square(measured - predicted, drag_sd_per_s(losses), effects)
+    return {**theory, "chi2": chi2, "dof": len(measured), "ratio": measured / predicted}
 
 
 def _drag_over_theory(losses: Columns, history_coefficient: float = 1.0) -> Line:
@@ -535,18 +495,17 @@ def theory_curve(
         Columns of shape (n,) under the names of comparison.json, with Eq. 16's Q_v (C_H = 1) and
         the steady Stokes law's (C_H = 0); ``None`` where nothing is submerged.
     """
-    spheres = [part for part in parts if isinstance(part, physics.Sphere) and part.submerged]
-    if not spheres:
+    sphere = next((part for part in parts if part.wet_radius_m is not None), None)
+    if sphere is None:
         return None
-    sphere = spheres[0]
     moving = physics.swing(parts, fluid, gravity_m_per_s2, plain_added_mass=plain_added_mass)
     density, viscosity = fluid
     oscillating, steady = (
         physics.viscous_quality_factor(
             moving.moment_of_inertia_kg_m2,
             moving.angular_frequency_per_s,
-            sphere.radius_m,
-            sphere.centre_m,
+            sphere.wet_radius_m,
+            sphere.position_m,
             viscosity,
             density,
             history,
@@ -562,7 +521,7 @@ def theory_curve(
         "moment_of_inertia_kg_m2": moving.moment_of_inertia_kg_m2,
         "quality_factor_viscous_theory": oscillating,
         "quality_factor_viscous_steady": steady,
-        "a_over_delta": np.divide(sphere.radius_m, depth),
+        "a_over_delta": np.asarray(sphere.wet_radius_m) / depth,
         "lengthening_buoyancy": longer.buoyancy,
         "lengthening_added_mass": longer.added_mass,
         "lengthening_both": longer.both,

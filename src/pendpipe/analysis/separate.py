@@ -7,13 +7,32 @@ through Q against f^2 would weigh the records by errors that grow with Q itself.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.errors import InputError, refuse_if
+from pendpipe.errors import refuse_if
 from pendpipe.estimate import Z95, Estimate, chi_square_p_value, over, quality_of_rate
 from pendpipe.physics import hysteretic_quality_factor
+
+
+class Line(NamedTuple):
+    """Points through which a line from the origin is drawn, each of shape (n,)."""
+
+    regressor: FloatArray
+    response: FloatArray
+    sd: FloatArray
+
+    def slope(self) -> Estimate:
+        """The slope of weighted least squares, with its error."""
+        x, y = self.regressor / self.sd, self.response / self.sd
+        information = float(x @ x)
+        return Estimate(float(x @ y) / information, information**-0.5, "")
+
+    def off(self, slope: float) -> FloatArray:
+        """What a slope leaves of the response."""
+        return self.response - slope * self.regressor
 
 
 @dataclass(frozen=True)
@@ -127,34 +146,35 @@ def fit_benchmark(records: Sequence[MeasuredRecord]) -> Benchmark:
     refuse_if(
         not records, "air benchmark", "no record in air can be used", "add records with fluid air"
     )
-    frequency = np.array([record.frequency.value for record in records])
-    rate = np.array([record.linear.value for record in records])
-    per_inverse = np.pi / frequency
-    rate_sd = np.array([record.linear.sd for record in records])
-    frequency_sd = np.array([record.frequency.sd for record in records])
+    frequency, frequency_sd, rate, rate_sd = np.array(
+        [
+            (each.frequency.value, each.frequency.sd, each.linear.value, each.linear.sd)
+            for each in records
+        ]
+    ).T
     sd = np.hypot(rate_sd, rate / frequency * frequency_sd)
-    if not (np.isfinite(sd).all() and np.all(sd > 0.0)):
-        bad = records[int(np.flatnonzero(~(sd > 0.0) | ~np.isfinite(sd))[0])]
-        raise InputError(f"record {bad.record}", "b has no usable error", "look at its fit")
-    weights = sd**-2
-    information = float(np.sum(weights * per_inverse**2))
-    inverse = float(np.sum(weights * per_inverse * rate)) / information
+    for record, usable in zip(records, np.isfinite(sd) & (sd > 0.0), strict=True):
+        name = f"record {record.record}"
+        refuse_if(not usable, name, "b has no usable error", "look at its fit")
+    line = Line(np.pi / frequency, rate, sd)
+    inverse = line.slope()
     refuse_if(
-        not inverse > 0.0, "air benchmark", "the losses in air are not positive", "check the fits"
+        not inverse.value > 0.0,
+        "air benchmark",
+        "the losses in air are not positive",
+        "check the fits",
     )
-    inverse_sd = information**-0.5
-    chi2 = float(np.sum(weights * (rate - inverse * per_inverse) ** 2))
-    exponent, chi2_free = _free_exponent(frequency, rate, sd, inverse)
-    free = np.isfinite(exponent.value)
+    chi2 = float(np.sum((line.off(inverse.value) / sd) ** 2))
+    exponent, chi2_free = _free_exponent(frequency, rate, sd, inverse.value)
     return Benchmark(
-        coefficient=over(1.0, Estimate(inverse, inverse_sd, "1/s^2"), "s^2"),
-        inverse=inverse,
-        inverse_sd=inverse_sd,
+        coefficient=over(1.0, inverse, "s^2"),
+        inverse=inverse.value,
+        inverse_sd=inverse.sd,
         chi2=chi2,
         degrees_of_freedom=len(records) - 1,
         p_value=chi_square_p_value(chi2, len(records) - 1),
         free_exponent=exponent,
-        exponent_p_value=chi_square_p_value(chi2 - chi2_free, 1) if free else float("nan"),
+        exponent_p_value=chi_square_p_value(chi2 - chi2_free, 1),
         records=tuple(record.record for record in records),
     )
 
@@ -190,13 +210,11 @@ def _separate_one(
     viscous = linear.value + slope * benchmark.inverse
     own_variance = linear.sd**2 + (slope * benchmark.inverse / frequency * record.frequency.sd) ** 2
     common_variance = (slope * benchmark.inverse_sd) ** 2
-    if record.record in benchmark.records:
-        # 1/k was made from this record among others: their errors are correlated, and what
-        # is left of b scatters by less than its own error (least squares' residual).
-        total_sd = np.sqrt(max(own_variance - common_variance, 0.0))
-    else:
-        total_sd = np.sqrt(own_variance + common_variance)
-    rate = Estimate(float(viscous), float(total_sd), "1/s")
+    # Where 1/k was made from this record among others, their errors are correlated, and what
+    # is left of b scatters by less than its own error (least squares' residual).
+    sign = -1.0 if record.record in benchmark.records else 1.0
+    total_variance = max(own_variance + sign * common_variance, 0.0)
+    rate = Estimate(float(viscous), float(np.sqrt(total_variance)), "1/s")
     hysteretic = float(hysteretic_quality_factor(frequency, benchmark.coefficient.value))
     low, high = benchmark.coefficient.interval95 or (np.nan, np.nan)
     return SeparatedRecord(

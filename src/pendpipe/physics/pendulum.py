@@ -5,8 +5,8 @@ an array (a weight moved from record to record); everything broadcasts.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,27 +17,32 @@ STANDARD_GRAVITY_M_PER_S2 = 9.80665
 
 
 @dataclass(frozen=True)
-class PointMass:
-    """A weight that is small beside its distance from the axis.
+class Part:
+    """A part of the pendulum; by itself, a weight that is small beside its distance from the axis.
 
     Parameters
     ----------
     mass_kg, position_m
-        Mass in kg; position below the axis in m (negative above).
+        Mass in kg; position of its centre below the axis in m (negative above).
     own_inertia_kg_m2
         Its moment of inertia about its own centre in kg m^2, if that counts.
     displaced_m3
         The volume of fluid that it displaces in m^3 (a screw under water).
+    wet_radius_m
+        Radius in m of a sphere with which fluid swings along; None for anything else.
     """
 
     mass_kg: Numbers
     position_m: Numbers
     own_inertia_kg_m2: Numbers = 0.0
     displaced_m3: Numbers = 0.0
+    wet_radius_m: Numbers | None = None
 
 
-@dataclass(frozen=True)
-class Rod:
+PointMass = Part
+
+
+def Rod(mass_kg: Numbers, length_m: Numbers, centre_m: Numbers = 0.0) -> Part:  # noqa: N802 - a kind of part
     """A thin uniform rod: ``I = m (l^2/12 + z^2)``.
 
     Parameters
@@ -47,14 +52,12 @@ class Rod:
     centre_m
         Position of its centre below the axis in m.
     """
-
-    mass_kg: Numbers
-    length_m: Numbers
-    centre_m: Numbers = 0.0
+    return Part(mass_kg, centre_m, np.multiply(mass_kg, np.square(length_m) / 12.0))
 
 
-@dataclass(frozen=True)
-class Sphere:
+def Sphere(  # noqa: N802 - a kind of part
+    mass_kg: Numbers, radius_m: Numbers, centre_m: Numbers, submerged: bool = False
+) -> Part:
     """A solid sphere, ``I = m (2 a^2/5 + L^2)``; under water where `submerged`.
 
     Parameters
@@ -64,14 +67,10 @@ class Sphere:
     submerged
         Whether the fluid buoys it and swings along with it.
     """
-
-    mass_kg: Numbers
-    radius_m: Numbers
-    centre_m: Numbers
-    submerged: bool = False
-
-
-Part: TypeAlias = PointMass | Rod | Sphere
+    ball = Part(mass_kg, centre_m, 0.4 * np.multiply(mass_kg, np.square(radius_m)))
+    if not submerged:
+        return ball
+    return replace(ball, displaced_m3=sphere_volume(radius_m), wet_radius_m=radius_m)
 
 
 class Fluid(NamedTuple):
@@ -89,17 +88,19 @@ def sphere_volume(radius_m: Numbers) -> FloatArray:
 
 def moment_of_inertia(parts: Sequence[Part]) -> FloatArray:
     """Moment of inertia of the parts about the axis in kg m^2, without any fluid."""
-    return sum(map(_inertia, parts), start=np.zeros(()))
+    own = (np.asarray(part.own_inertia_kg_m2) for part in parts)
+    of_mass = (np.multiply(part.mass_kg, np.square(part.position_m)) for part in parts)
+    return sum((*own, *of_mass), start=np.zeros(()))
 
 
 def static_moment(parts: Sequence[Part]) -> FloatArray:
     """Return the sum of mass times position, M Delta of Eq. 7, in kg m."""
-    return sum(np.multiply(part.mass_kg, _position(part)) for part in parts)
+    return sum(np.multiply(part.mass_kg, part.position_m) for part in parts)
 
 
 def displaced_moment(parts: Sequence[Part]) -> FloatArray:
     """Return the sum of displaced volume times position in m^4."""
-    return sum(np.multiply(_displaced(part), _position(part)) for part in parts)
+    return sum(np.multiply(part.displaced_m3, part.position_m) for part in parts)
 
 
 def restoring_torque(
@@ -142,42 +143,16 @@ def added_inertia(
     if fluid is None:
         return total
     density, viscosity = fluid
-    for part in parts:
-        if isinstance(part, Sphere) and part.submerged:
-            coefficient = (
-                np.float64(POTENTIAL_FLOW_ADDED_MASS)
-                if plain_added_mass
-                else added_mass_coefficient(
-                    part.radius_m, angular_frequency_per_s, viscosity, density
-                )
+    for part in (part for part in parts if part.wet_radius_m is not None):
+        coefficient = (
+            np.float64(POTENTIAL_FLOW_ADDED_MASS)
+            if plain_added_mass
+            else added_mass_coefficient(
+                part.wet_radius_m, angular_frequency_per_s, viscosity, density
             )
-            displaced = density * sphere_volume(part.radius_m)
-            total = total + coefficient * displaced * np.square(part.centre_m)
+        )
+        total = total + coefficient * density * part.displaced_m3 * np.square(part.position_m)
     return total
-
-
-def _inertia(part: Part) -> FloatArray:
-    """Moment of inertia of one part about the axis."""
-    mass, squared = np.asarray(part.mass_kg), np.square(_position(part))
-    if isinstance(part, Rod):
-        return mass * (np.square(part.length_m) / 12.0 + squared)
-    if isinstance(part, Sphere):
-        return mass * (0.4 * np.square(part.radius_m) + squared)
-    return mass * squared + np.asarray(part.own_inertia_kg_m2)
-
-
-def _position(part: Part) -> Numbers:
-    """Where a part's centre of mass lies."""
-    return part.position_m if isinstance(part, PointMass) else part.centre_m
-
-
-def _displaced(part: Part) -> Numbers:
-    """The volume of fluid that a part displaces."""
-    if isinstance(part, PointMass):
-        return part.displaced_m3
-    if isinstance(part, Sphere) and part.submerged:
-        return sphere_volume(part.radius_m)
-    return 0.0
 
 
 _ROUNDS = 60

@@ -278,16 +278,7 @@ def _campaign_numbers(found: Comparison | None) -> dict[str, Any]:
         },
         "theory_factor": _shared(found.theory_factor),
         "history_coefficient": _shared(found.history_coefficient),
-        "checks": [
-            {
-                "history": check.history,
-                "hysteresis": check.hysteresis,
-                "chi2": check.chi2,
-                "dof": check.degrees_of_freedom,
-                "ratio": check.ratio,
-            }
-            for check in found.checks
-        ],
+        "checks": found.checks,
         "budget": [{"source": name, "relative_sd": sd} for name, sd in found.budget.items()],
         "steady_stokes_percent": list(found.steady_stokes_percent),
     }
