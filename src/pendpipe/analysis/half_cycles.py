@@ -232,8 +232,10 @@ def _without_wild(values: FloatArray, turn: float) -> FloatArray:
     Where a cycle has few samples, `turn` rad apart, the topmost stands out of the next by up
     to A (1 - cos turn), A the motion's amplitude: it is no wild reading.
     """
-    beside = np.lib.stride_tricks.sliding_window_view(np.pad(values, 1, mode="edge"), 3)
-    middle = np.median(beside, axis=1)
+    edged = np.pad(values, 1, mode="edge")
+    # The median of three, in a tenth of the time that np.median takes.
+    lower, upper = np.minimum(edged[:-2], values), np.maximum(edged[:-2], values)
+    middle = np.maximum(lower, np.minimum(upper, edged[2:]))
     # The range of each cycle; a cycle that is cut at its edges turns in one beside it.
     starts = np.arange(0, len(values), math.ceil(2.0 * math.pi / turn))
     swing = np.maximum.reduceat(middle, starts) - np.minimum.reduceat(middle, starts)
