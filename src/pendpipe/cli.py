@@ -133,13 +133,9 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--version", action="version", version=f"pendpipe {__version__}")
     parser.add_argument("command", nargs="?", metavar="COMMAND", help="see below")
     arguments = parser.parse_args(argv)
-    arguments.run = _first_steps
+    # Whoever gave no command sees where to begin.
+    arguments.run = lambda _: print(FIRST_STEPS)
     return arguments
-
-
-def _first_steps(_: argparse.Namespace) -> None:
-    """Show somebody who gave no command where to begin."""
-    print(FIRST_STEPS)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -113,10 +113,12 @@ class Manifest:
         if self.own_damage or not self.path.is_file():
             return [self.own_damage] if self.own_damage else []
         since = None if hash_all else self.path.stat().st_mtime_ns
-        outputs = [_compare(self.home / name, made, since) for name, made in self.outputs.items()]
-        extras = [_compare(self.home / name, made, since) for name, made in self.extras.items()]
-        there = [damage for damage in outputs if damage and damage.found != "missing"]
-        return there + [damage for damage in extras if damage]
+        return [
+            damage
+            for name, made in (self.outputs | self.extras).items()
+            if (damage := _compare(self.home / name, made, since)) is not None
+            and (name in self.extras or damage.found != "missing")
+        ]
 
 
 def read_manifest(home: Path, stage: str) -> Manifest:

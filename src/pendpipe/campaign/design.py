@@ -371,11 +371,13 @@ def terms_of(design: Design, inputs: Inputs) -> Terms:
     sphere, spheres, wet = design.apparatus.sphere, design.spheres, design.wet
     places, masses = inputs.positions_m, inputs.masses_kg
     sizes = [design.apparatus.weights[name].radius_m for name in design.weights]
-    inertia = (masses * (places**2 + 0.4 * np.square(sizes))).sum(axis=-1)
-    inertia = inertia + inputs.rod_mass_kg * inputs.rod_length_m**2 / 12.0
     radius, lever = inputs.radius_m, inputs.lever_m
     ball = inputs.sphere_mass_kg * spheres
-    inertia = inertia + ball * (0.4 * radius**2 + lever**2)
+    inertia = (
+        (masses * (places**2 + 0.4 * np.square(sizes))).sum(axis=-1)
+        + inputs.rod_mass_kg * inputs.rod_length_m**2 / 12.0
+        + ball * (0.4 * radius**2 + lever**2)
+    )
     density, viscosity = design.fluids(inputs.warmer_k)
     viscosity = viscosity * (1.0 + inputs.thicker)
     displaced = wet * spheres * density * physics.sphere_volume(radius)

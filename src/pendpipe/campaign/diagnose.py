@@ -210,19 +210,15 @@ def held_out(fit: JointFit) -> tuple[FloatArray, FloatArray]:
     with it: of whitened residuals r_i with hat matrix H_i, the prediction's are
     ``(1 - H_i)^-1 r_i`` with covariance ``(1 - H_i)^-1``.
     """
-    rows = fit.data.whitening.shape[1]
-    densities, pulls = [], []
-    for number, whitening in enumerate(fit.data.whitening):
-        part = slice(number * rows, (number + 1) * rows)
-        root, off = fit.jacobian[part] @ fit.root, fit.residuals[part]
-        left = (1.0 + 1e-12) * np.eye(rows) - root @ root.T
-        size = float(off @ np.linalg.solve(left, off))
-        scale = np.linalg.slogdet(whitening @ whitening.T)[1]
-        densities.append(
-            0.5 * (np.linalg.slogdet(left)[1] - size - rows * math.log(2.0 * math.pi) + scale)
-        )
-        pulls.append(math.copysign(math.sqrt(size / rows), float(off[-1])))
-    return np.array(densities), -np.array(pulls)
+    whitening = fit.data.whitening
+    records, rows, _ = whitening.shape
+    off = fit.residuals[: records * rows].reshape(records, rows)
+    root = (fit.jacobian[: records * rows] @ fit.root).reshape(records, rows, -1)
+    left = (1.0 + 1e-12) * np.eye(rows) - root @ root.mT
+    size = np.einsum("ri,ri->r", off, np.linalg.solve(left, off[..., None])[..., 0])
+    volume = np.linalg.slogdet(left)[1] + np.linalg.slogdet(whitening @ whitening.mT)[1]
+    densities = 0.5 * (volume - size - rows * math.log(2.0 * math.pi))
+    return densities, -np.copysign(np.sqrt(size / rows), off[:, -1])
 
 
 _CLAMPED_ANEW_M: Final = 1e-9
@@ -535,30 +531,14 @@ def causes(search: CampaignSearch) -> dict[str, Any]:
     ]
     best = min((rival.chi2 for rival in members), default=0.0)
     above = search.excluded | {rival.last.identifier: rival.chi2 - best for rival in members}
-    rows: dict[str, dict[str, Any]] = {}
-    for one in candidates(design):
-        moved = predict(design, (one,), np.append(free, _STEP))
-        pattern = (moved - plain)[wet, 1] / viscous / _STEP
-        square = float(pattern @ pattern)
-        if not square > 0.0:
-            continue
-        units = float(pattern @ excess) / square
-        left = float(np.sqrt(np.mean((excess - units * pattern) ** 2)))
-        name = one.effect.identifier
-        if name in rows and rows[name]["rms_left"] <= left:
-            continue
-        rows[name] = {
-            "id": name,
-            "name": one.effect.name,
-            "size": units * one.effect.expected,
-            "parameter": one.effect.parameter.name,
-            "unit": one.effect.parameter.unit,
-            "possible": one.bounds[0] <= units <= one.bounds[1],
-            "excess": (units * pattern).tolist(),
-            "rms_left": left,
-            "chi2_above_best": above.get(name),
-            "in_class": name in above and name not in search.excluded,
-        }
+    patterns = [
+        (one, (predict(design, (one,), np.append(free, _STEP)) - plain)[wet, 1] / viscous / _STEP)
+        for one in candidates(design)
+    ]
+    shapes = [_cause(one, each, excess) for one, each in patterns if float(each @ each) > 0.0]
+    worst_first = sorted(shapes, key=lambda row: -row["rms_left"])
+    # The best shape of an effect stands for it.
+    by_name = {row["id"]: row for row in worst_first}
     return {
         "records": [
             {
@@ -570,5 +550,27 @@ def causes(search: CampaignSearch) -> dict[str, Any]:
             }
             for number, value, spread in zip(wet, excess, sd, strict=True)
         ],
-        "causes": sorted(rows.values(), key=lambda row: row["rms_left"]),
+        "causes": [
+            row
+            | {
+                "chi2_above_best": above.get(name),
+                "in_class": name in above and name not in search.excluded,
+            }
+            for name, row in sorted(by_name.items(), key=lambda item: item[1]["rms_left"])
+        ],
+    }
+
+
+def _cause(one: Candidate, pattern: FloatArray, excess: FloatArray) -> dict[str, Any]:
+    """What a cause predicts at the size that follows the measured excess best."""
+    units = float(pattern @ excess / (pattern @ pattern))
+    return {
+        "id": one.effect.identifier,
+        "name": one.effect.name,
+        "size": units * one.effect.expected,
+        "parameter": one.effect.parameter.name,
+        "unit": one.effect.parameter.unit,
+        "possible": one.bounds[0] <= units <= one.bounds[1],
+        "excess": (units * pattern).tolist(),
+        "rms_left": float(np.sqrt(np.mean((excess - units * pattern) ** 2))),
     }

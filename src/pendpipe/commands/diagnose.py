@@ -9,6 +9,7 @@ Several FILEs are recordings of one pendulum: physics shared, start and noise ea
 (docs/several.md).
 """
 
+from itertools import product
 from pathlib import Path
 from typing import Any, Final
 
@@ -232,9 +233,8 @@ def _write(arguments: Arguments, outcome: Outcome) -> dict[str, Any]:
 
 def _remove_figures(folder: Path) -> None:
     """Remove the figures of an earlier diagnosis."""
-    for name in (*OF_EVERY_DIAGNOSIS, *OF_SOME_DIAGNOSES):
-        for form in (".svg", ".png"):
-            folder.joinpath(name).with_suffix(form).unlink(missing_ok=True)
+    for name, form in product((*OF_EVERY_DIAGNOSIS, *OF_SOME_DIAGNOSES), (".svg", ".png")):
+        folder.joinpath(name).with_suffix(form).unlink(missing_ok=True)
 
 
 def _write_placeholders(arguments: Arguments, reason: str) -> None:

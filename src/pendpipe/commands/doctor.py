@@ -85,42 +85,33 @@ def examine(results: Path) -> list[Finding]:
         raise InputError(results, "there is no such folder", "name a folder of results")
     homes = [results, *sorted(path for path in results.iterdir() if path.is_dir())]
     homes = [home for home in homes if home.name not in _NO_RESULTS]
-    known = {home: list(manifest.manifests(home)) for home in homes}
-    found += [finding for home in homes for finding in _of_manifests(home, known[home])]
-    found += [finding for home in homes for finding in _stale(home)]
+    stages = [stage for home in homes for stage in manifest.manifests(home)]
+    found += [finding for stage in stages for finding in _of_manifest(stage)]
     listed = {
-        (home / name).resolve()
-        for home in homes
-        for entry in known[home]
-        for name in (*entry.outputs, *entry.extras)
+        (stage.home / name).resolve()
+        for stage in stages
+        for name in (*stage.outputs, *stage.extras)
     }
     return [*found, *_of_files(results, listed)]
 
 
-def _of_manifests(home: Path, known: list[manifest.Manifest]) -> Iterator[Finding]:
-    """Results that are not what their stages wrote, or that were never finished."""
-    for stage in known:
-        damages = stage.damages(hash_all=True)
-        for damage in damages:
-            yield Finding("altered", str(damage.path), damage.problem, _RUN)
-        for path in (home / name for name in stage.outputs if not (home / name).is_file()):
+def _of_manifest(stage: manifest.Manifest) -> Iterator[Finding]:
+    """Results that are not what their stage wrote, from other files, or never finished."""
+    damages, index = stage.damages(hash_all=True), manifest.Index()
+    for damage in damages:
+        yield Finding("altered", str(damage.path), damage.problem, _RUN)
+    for path in (stage.home / name for name in stage.outputs):
+        if not path.is_file():
             yield Finding("incomplete", str(path), "it is missing", _RUN)
-        if not stage.outputs and not damages:
-            yield Finding(
-                "incomplete",
-                str(home),
-                f"stage {stage.stage} began and did not end",
-                "snakemake runs it again",
-            )
-
-
-def _stale(home: Path) -> Iterator[Finding]:
-    """Results that were made from other files than those that are there."""
-    index = manifest.Index()
-    for entry in manifest.manifests(home):
-        for name in entry.outputs:
-            if (home / name).is_file() and (damage := index.made_from_others(home / name, entry)):
-                yield Finding("stale", str(damage.path), damage.problem, _RUN)
+        elif stale := index.made_from_others(path, stage):
+            yield Finding("stale", str(path), stale.problem, _RUN)
+    if not stage.outputs and not damages:
+        yield Finding(
+            "incomplete",
+            str(stage.home),
+            f"stage {stage.stage} began and did not end",
+            "snakemake runs it again",
+        )
 
 
 def _of_files(results: Path, listed: set[Path]) -> Iterator[Finding]:

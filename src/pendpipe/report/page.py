@@ -343,28 +343,21 @@ def render_recording(
     str
         One HTML document that refers to nothing outside itself.
     """
-    unit = result["amplitude"].unit
+    unit, has_law = result["amplitude"].unit, result.light != "red"
     period = small_period(result)
-    numbers = [("Period", with_error(period.value, period.sd, "s"))]
-    if result.light == "red":
-        rows = [
-            (compact(amplitude, unit), with_error(seen.value, seen.sd), WITHOUT_LAW)
-            for amplitude, seen in seen_qualities(result)
-        ]
-    else:
-        titles = {"a": "quadratic", "b": "linear", "c": "Coulomb"}
-        numbers += [
-            (f"{letter} ({titles[letter]})", rate_with_error(result[letter], short=False))
-            for letter in titles
-        ]
-        rows = [
-            (
-                compact(each.amplitude_rad, unit),
-                with_error(each.quality_factor.value, each.quality_factor.sd),
-                each.cause,
-            )
-            for each in qualities(result)
-        ]
+    titles = {"a": "quadratic", "b": "linear", "c": "Coulomb"} if has_law else {}
+    numbers = [
+        ("Period", with_error(period.value, period.sd, "s")),
+        *(
+            (f"{letter} ({title})", rate_with_error(result[letter], short=False))
+            for letter, title in titles.items()
+        ),
+    ]
+    rows = (
+        [(each.amplitude_rad, each.quality_factor, each.cause) for each in qualities(result)]
+        if has_law
+        else [(amplitude, seen, WITHOUT_LAW) for amplitude, seen in seen_qualities(result)]
+    )
     drawn, title = io.StringIO(), "The decay with its fit"
     result.plot().savefig(drawn, format="svg", metadata={"Date": None, "Creator": "pendpipe"})
     return fill_template(
@@ -375,7 +368,10 @@ def render_recording(
         light=(result.light, *LIGHTS[result.light]),
         reason=result.light_reason,
         numbers=numbers,
-        qualities=rows,
+        qualities=[
+            (compact(amplitude, unit), with_error(quality.value, quality.sd), cause)
+            for amplitude, quality, cause in rows
+        ],
         advice=quotable(result),
         checks=[check.sentence(unit) for check in result.decrement_check],
         figures=[(title, inline_svg(drawn.getvalue(), "figure0", title, title))],

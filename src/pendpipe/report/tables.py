@@ -200,7 +200,8 @@ def health(entry: Mapping[str, Any]) -> Health:
     not run
         The record was refused, so nothing was fitted.
     """
-    missing = [each for each in ("frequency", "a", "b", "c") if not _known(entry.get(each))]
+    needed = ("frequency", "a", "b", "c")
+    missing = [each for each in needed if not math.isfinite(number(entry.get(each)))]
     chi2 = number(entry.get("chi2_per_dof"))
     states = (
         ("not run", entry.get("refused"), "refused"),
@@ -219,17 +220,13 @@ def health(entry: Mapping[str, Any]) -> Health:
         ),
         (
             "look",
-            not _known(entry.get("quality_factor_limit")),
+            not math.isfinite(number(entry.get("quality_factor_limit"))),
             "b came out as zero: there is no limiting Q",
         ),
         ("ok", True, "the noise explains the misfit"),
     )
     word, reason = next((word, reason) for word, holds, reason in states if holds)
     return Health(word, *STATES[word], reason)
-
-
-def _known(quantity: Any) -> bool:
-    return math.isfinite(number(quantity))
 
 
 Comparison = Mapping[str, Any]
@@ -344,10 +341,20 @@ def headline(comparison: Comparison, truth: Mapping[str, Any]) -> list[Row]:
 
 def as_text(rows: list[Row]) -> str:
     """The same table for a terminal, a line a number."""
-    beside = [(("paper", row.paper), ("truth", row.truth)) for row in rows]
-    others = ["; ".join(f"{whose} {value}" for whose, value in each if value) for each in beside]
-    names, found = [row.name for row in rows], [row.found for row in rows]
-    return in_columns([*zip(names, found, others, strict=True)])
+    return in_columns(
+        [
+            (
+                row.name,
+                row.found,
+                "; ".join(
+                    f"{whose} {value}"
+                    for whose, value in (("paper", row.paper), ("truth", row.truth))
+                    if value
+                ),
+            )
+            for row in rows
+        ]
+    )
 
 
 def _row(name: str, found: Any, key: str, truth: float | None = None) -> Row | None:
