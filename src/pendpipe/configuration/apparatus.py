@@ -8,17 +8,18 @@ import numpy as np
 from pendpipe import physics
 from pendpipe.arrays import FloatArray
 from pendpipe.configuration.load import Campaign, Record
-from pendpipe.configuration.models import Apparatus, Fluid
+from pendpipe.configuration.models import Apparatus, Fluid, Geometry
 from pendpipe.errors import InputError, refuse_if
 
 
 class Pendulum(NamedTuple):
     """One record's pendulum, from distances and masses alone."""
 
+    apparatus: Apparatus
+    geometry: Geometry
     parts: list[physics.Part]
     fluid: physics.Fluid
-    submerged: bool
-    """Whether the fluid acts on a sphere (and not on the weights)."""
+    """It acts on the sphere; where the geometry has none, on the weights."""
     swing: physics.Swing
 
 
@@ -49,7 +50,7 @@ def pendulum(campaign: Campaign, record: Record) -> Pendulum:
         "the pendulum turns over",
         "move a weight down",
     )
-    return Pendulum(parts, fluid, geometry.sphere, moving)
+    return Pendulum(settings.apparatus, geometry, parts, fluid, moving)
 
 
 def pendulum_parts(
@@ -90,22 +91,18 @@ def fluid_at(fluid: Fluid, temperature_c: float | FloatArray | None) -> physics.
 
 def quadratic_rate(campaign: Campaign, record: Record, built: Pendulum) -> float:
     """Eq. 13's a from the drag coefficient: of the sphere, without one of the weights."""
-    settings = campaign.configuration
-    geometry, apparatus = campaign.geometry(record), settings.apparatus
-    assert geometry is not None
-    assert apparatus is not None
-    coefficient = settings.fluids[record.fluid].drag_coefficient
-    if built.submerged and apparatus.sphere:
+    apparatus = built.apparatus
+    if built.geometry.sphere and apparatus.sphere:
         bodies = [(apparatus.sphere.diameter_m / 2, apparatus.sphere.distance_m)]
     else:
         # A body of any shape counts as the disc of its frontal area.
         bodies = [
             (float(np.sqrt(apparatus.weights[name].frontal_area_m2 / np.pi)), abs(position))
-            for name, position in geometry.weights_m.items()
+            for name, position in built.geometry.weights_m.items()
         ]
     radii, distances = np.array(bodies).T
     rates = physics.quadratic_drag_rate(
-        coefficient,
+        campaign.configuration.fluids[record.fluid].drag_coefficient,
         built.swing.moment_of_inertia_kg_m2,
         built.swing.angular_frequency_per_s,
         radii,

@@ -32,17 +32,16 @@ def equation_of_motion(campaign: Campaign, record: Record) -> Eq8:
     drag factor, the hysteretic part from Q_hys = k f^2.
     """
     settings = campaign.configuration
-    apparatus, truth = settings.apparatus, settings.simulated
-    assert apparatus is not None
+    truth, built = settings.simulated, pendulum(campaign, record)
     assert truth is not None
-    built = pendulum(campaign, record)
+    apparatus = built.apparatus
     omega = float(built.swing.angular_frequency_per_s)
     inertia = float(built.swing.moment_of_inertia_kg_m2)
     hysteretic = physics.hysteretic_quality_factor(
         built.swing.frequency_hz, truth.hysteretic_coefficient_s2
     )
     viscous = 0.0
-    if built.submerged and apparatus.sphere and settings.fluids[record.fluid].boundary_layer:
+    if built.geometry.sphere and apparatus.sphere and settings.fluids[record.fluid].boundary_layer:
         quality = physics.viscous_quality_factor(
             inertia,
             omega,
