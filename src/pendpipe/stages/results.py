@@ -92,14 +92,9 @@ def campaign_data(
     design = design_of(campaign, [result.record for result in used])
     if design.wet.sum() < 2.0:
         return None
-    values, covariances = [], []
-    for result in used:
-        fit = result.fit
-        assert fit is not None
-        order = [fit.covariance_order.index(name) for name in ("frequency", "b")]
-        values.append([fit.parameters[name].value for name in ("frequency", "b")])
-        covariances.append(np.asarray(fit.covariance)[np.ix_(order, order)])
-    return design, measured(np.array(values), np.array(covariances))
+    fits = [result.fit for result in used if result.fit is not None]
+    values = np.array([(fit.value("frequency"), fit.value("b")) for fit in fits])
+    return design, measured(values, np.array([fit.covariance_of("frequency", "b") for fit in fits]))
 
 
 def record_theory(campaign: Campaign, record: Record) -> dict[str, Any] | None:

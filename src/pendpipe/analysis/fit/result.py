@@ -202,6 +202,11 @@ class FitResult:
         """Value of one parameter."""
         return self.parameters[name].value
 
+    def covariance_of(self, *names: str) -> FloatArray:
+        """Covariance of some parameters, in their order."""
+        place = [self.covariance_order.index(name) for name in names]
+        return self.covariance[np.ix_(place, place)]
+
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``fit.json``."""
         limit = self.quality_factor_limit
@@ -340,31 +345,32 @@ def misfit(chi2_per_dof: float, dof: float) -> float:
 
 def _warnings(result: FitResult, stretched: float) -> list[str]:
     """What the reader of these numbers should know, a clause each."""
-    said = []
-    for name, estimate in result.parameters.items():
-        if estimate.at_bound:
-            said.append(f"{name} lies at its bound 0; its interval is one-sided")
-    if result.quality_factor_limit is None:
-        said.append("quality_factor_limit has no finite value, since b = 0")
-    if stretched > 1.0:
-        seen = (
-            "chi^2 of the readings is"
-            if result.chi2_per_dof > 0.9 * stretched
-            else ("the half cycles scatter, in the square,")
-        )
-        said.append(
-            f"{seen} {stretched:.3g} times what the noise explains: the standard deviations are"
-            " enlarged by its root; see pendpipe diagnose"
-        )
     a, b, c = (result.parameters[name] for name in ("a", "b", "c"))
     y0 = result.parameters["amplitude"].value
     rate = a.value * y0 + b.value + c.value / y0
-    if result.baseline == "eq8" and a.sd * y0 > _UNDETERMINED * rate:
-        said.append(
+    slow = result.chi2_per_dof <= 0.9 * stretched
+    seen = "the half cycles scatter, in the square," if slow else "chi^2 of the readings is"
+    warnings = (
+        *(
+            (estimate.at_bound, f"{name} lies at its bound 0; its interval is one-sided")
+            for name, estimate in result.parameters.items()
+        ),
+        (
+            result.quality_factor_limit is None,
+            "quality_factor_limit has no finite value, since b = 0",
+        ),
+        (
+            stretched > 1.0,
+            f"{seen} {stretched:.3g} times what the noise explains: the standard deviations are"
+            " enlarged by its root; see pendpipe diagnose",
+        ),
+        (
+            result.baseline == "eq8" and a.sd * y0 > _UNDETERMINED * rate,
             "a can't be told from b here: the record holds too little of large amplitudes (a tail);"
-            " a, b, c of a tail depend on where it begins"
-        )
-    return said
+            " a, b, c of a tail depend on where it begins",
+        ),
+    )
+    return [warning for is_so, warning in warnings if is_so]
 
 
 def read_fit(path: str | Path) -> FitResult:
@@ -431,12 +437,14 @@ def qualities(result: FitResult) -> list[Quality]:
 
 def seen_qualities(result: FitResult) -> list[tuple[float, Estimate]]:
     """Amplitudes and the quality factors there that the turning points show without a law."""
-    found = []
-    for check in result.decrement_check:
-        if check.seen > 0.0:
-            q = math.pi / (period_of(result, check.amplitude_rad) * check.seen)
-            found.append((check.amplitude_rad, Estimate(q, q * check.seen_sd / check.seen, "")))
-    return found
+    found = [
+        (check, math.pi / (period_of(result, check.amplitude_rad) * check.seen))
+        for check in result.decrement_check
+        if check.seen > 0.0
+    ]
+    return [
+        (check.amplitude_rad, Estimate(q, q * check.seen_sd / check.seen, "")) for check, q in found
+    ]
 
 
 def _quality(result: FitResult, amplitude: float) -> Quality:
@@ -470,11 +478,10 @@ def _sd(weights: FloatArray, covariance: FloatArray) -> float:
 
 def _covariance_of_losses(result: FitResult, amplitude: float) -> FloatArray:
     """Return the covariance of a y, b and c/y, over their sum squared, shape (3, 3)."""
-    place = [result.covariance_order.index(name) for name in "abc"]
     slope = np.array([amplitude, 1.0, 1.0 / amplitude])
     loss = float(slope @ [result.value(name) for name in "abc"])
     relative = slope / loss if loss > 0.0 else np.full(3, math.inf)
-    return relative[:, None] * result.covariance[np.ix_(place, place)] * relative
+    return relative[:, None] * result.covariance_of("a", "b", "c") * relative
 
 
 def period_of(result: FitResult, amplitude: float) -> float:
@@ -540,39 +547,40 @@ def lines(result: FitResult, *, law: bool | None = None) -> list[str]:
     law
         Whether to print a, b, c; by default unless the light is red.
     """
-    found = [f"{result.light}: {result.light_reason}"]
     unit = result.parameters["amplitude"].unit
-    found.append(
-        f"  {result.equation} fitted to {result.turning_points} turning points"
-        if result.method == "turning-points"
-        else f"  {result.equation} fitted to {result.samples} readings"
-    )
-    for cut in result.cuts:
-        when = f"{cut['start_s']:.4g} to {cut['stop_s']:.4g} s"
-        found.append(_line("left out", f"{when}: {cut['reason']}"))
+
+    def quality(amplitude: float, found: Estimate, cause: str) -> str:
+        q = with_error(found.value, found.sd, short=True)
+        return _line(f"Q at {compact(amplitude, unit)}", f"{q}, {cause}")
+
+    by_points = result.method == "turning-points"
+    count = result.turning_points if by_points else result.samples
+    head = [
+        f"{result.light}: {result.light_reason}",
+        f"  {result.equation} fitted to {count} {'turning points' if by_points else 'readings'}",
+        *(
+            _line("left out", f"{cut['start_s']:.4g} to {cut['stop_s']:.4g} s: {cut['reason']}")
+            for cut in result.cuts
+        ),
+    ]
     if not (result.light != "red" if law is None else law):
-        found += [f"  {check.sentence(unit)}" for check in result.decrement_check]
-        for amplitude, seen in seen_qualities(result):
-            q = with_error(seen.value, seen.sd, short=True)
-            found.append(_line(f"Q at {compact(amplitude, unit)}", f"{q}, {WITHOUT_LAW}"))
-        return [*found, "  " + quotable(result)]
-    period = small_period(result)
+        checks = (f"  {check.sentence(unit)}" for check in result.decrement_check)
+        seen = (quality(*each, WITHOUT_LAW) for each in seen_qualities(result))
+        return [*head, *checks, *seen, "  " + quotable(result)]
+    period, limit = small_period(result), result.quality_factor_limit
     name = "period, small amplitude" if result.restoring == "sine" else "period"
-    found.append(_line(name, with_error(period.value, period.sd, "s", short=True)))
-    for letter in "abc":
-        found.append(_line(letter, rate_with_error(result[letter])))
-    for each in qualities(result):
-        q = with_error(each.quality_factor.value, each.quality_factor.sd, short=True)
-        found.append(
-            _line(
-                f"Q at {compact(each.amplitude_rad, unit)}",
-                f"{q}, {each.cause}",
-            )
-        )
-    limit = result.quality_factor_limit
-    if limit is not None and limit.value > 3.0 * limit.sd:
-        found.append(_line("Q limit πf/b", with_error(limit.value, limit.sd, short=True)))
-    return [*found, "  " + quotable(result)]
+    told = [limit] if limit is not None and limit.value > 3.0 * limit.sd else []
+    return [
+        *head,
+        _line(name, with_error(period.value, period.sd, "s", short=True)),
+        *(_line(letter, rate_with_error(result[letter])) for letter in "abc"),
+        *(
+            quality(each.amplitude_rad, each.quality_factor, each.cause)
+            for each in qualities(result)
+        ),
+        *(_line("Q limit πf/b", with_error(each.value, each.sd, short=True)) for each in told),
+        "  " + quotable(result),
+    ]
 
 
 def _line(name: str, value: str) -> str:

@@ -662,13 +662,11 @@ def _usual(coverage: FloatArray) -> FloatArray:
 
 
 def _notes(samples: Samples, keep: BoolArray, level: Level) -> tuple[str, ...]:
-    notes = []
     inner = keep[int(np.argmax(keep)) : len(keep) - int(np.argmax(keep[::-1]))]
     lost = int(np.count_nonzero(~inner))
-    if lost:
-        notes.append(f"{lost} half cycle(s) are left out for lack of readings")
-    if level.wanders:
-        notes.append("the offset wanders; it is followed by local lines")
-    if samples.counts:
-        notes.append("one row a count: the times of the counts are the data")
-    return tuple(notes)
+    notes = (
+        (lost, f"{lost} half cycle(s) are left out for lack of readings"),
+        (level.wanders, "the offset wanders; it is followed by local lines"),
+        (samples.counts, "one row a count: the times of the counts are the data"),
+    )
+    return tuple(note for is_so, note in notes if is_so)
