@@ -294,9 +294,13 @@ def test_a_step_taken_on_trust_ends_at_the_optimum() -> None:
         points = turning_points_of(prepare(Recording(fine, values, "angle_rad"), "record"))
         problem = Waveform(fine, values, points.noise_rms_rad, {})
         first = start_values(points, {}, {}, "eq8").value
-        predict_remaining = problem.predict_remaining
         soon = minimise(
-            problem.evaluate, first, BOUNDS, predict_remaining=predict_remaining, most=2
+            problem.evaluate,
+            first,
+            BOUNDS,
+            predict_remaining=problem.predict_remaining,
+            curved=problem.curved,
+            most=2,
         )
         if not soon.converged:
             continue
@@ -309,3 +313,43 @@ def test_a_step_taken_on_trust_ends_at_the_optimum() -> None:
     assert trusted > 20
     assert np.max(np.array(off)[:, :3]) < 0.01
     assert np.max(off) < 0.1
+
+
+@pytest.mark.parametrize("quadratic", [0.0, 0.45])
+def test_a_long_step_of_the_share_of_b_keeps_the_period_that_its_derivative_promises(
+    quadratic: float,
+) -> None:
+    """The period is a parabola in the hysteretic share; omega takes up what bends it."""
+    problem = Waveform(TIME, np.zeros_like(TIME), 1e-4, {})
+    begin = np.array([quadratic, 0.1, 0.0, 0.5, OMEGA, 0.3, -0.3, 0.0])
+
+    def period(value: FloatArray) -> float:
+        return float(turning_points(*problem.model(value), count=3).time_s[2])
+
+    tiny = np.zeros(8)
+    tiny[3], tiny[4] = 1e-4, 1e-9
+    slope = (period(begin + tiny) - period(begin - tiny)) / 2e-4
+    for change in (-0.5, 0.5):
+        step = np.zeros(8)
+        step[3], step[4] = change, 1e-12
+        promised = period(begin) + slope * change
+        straight, curved = begin + step, problem.curved(begin, step)
+        missed = [abs(period(end) - promised) for end in (straight, curved)]
+        assert missed[1] < 0.1 * missed[0]
+    held = np.array([0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0])
+    assert problem.curved(begin, held)[4] == OMEGA
+
+
+def test_a_record_whose_loss_is_all_viscous_takes_two_looks_at_its_readings(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The search begins half way to hysteretic, far from the truth at so little noise."""
+    looks, evaluate = [], Waveform.evaluate
+    monkeypatch.setattr(
+        Waveform, "evaluate", lambda self, value: looks.append(1) or evaluate(self, value)
+    )
+    law = Eq8(OMEGA, quadratic=0.002, viscous=OMEGA / 400.0, coulomb=1e-5)
+    values = noisy(sample(law, Release(-0.3, 0.3), TIME))
+    result = fit_recording(Recording(TIME, values, "angle_rad"), method="waveform")
+    assert result.light == "green"
+    assert len(looks) <= 3

@@ -129,6 +129,9 @@ PRIOR_INVERSE: Final = 12.0
 """Anything from 0 to 1 is as likely: mean 1/2, variance 1/12."""
 _SLIGHT: Final = 0.1
 """Of chi^2 in a half cycle: a smaller misfit is not seen in the noise."""
+_BY_SHARE: Final = 0.5 - 4.0 / 3.0 + math.pi**2 / 8.0
+"""(omega/b)^2 times the relative lengthening of the period by the square of b's hysteretic share
+(`by_points.period_excess`)."""
 _ENDS: Final = 10.0
 """By which the square of a phase's change is greater at the record's end than its mean."""
 
@@ -178,18 +181,25 @@ class Waveform:
         """Predict what chi^2 a Gauss-Newton step leaves to be gained (too high rather than low).
 
         The model is as linear as the motion stays what it was: where the step changes it by a part
-        e, rms, it is wrong by about e of itself. And b's share lengthens the period by
-        0.4 (b/omega)^2 times the square of its change, which the linear model does not know.
-        Infinite where the residuals from which the step begins would not do for those at its end.
+        e, rms, it is wrong by about e of itself. And what `curved` makes up for is known to first
+        order in b/omega. Infinite where the residuals from which the step begins would not do for
+        those at its end.
         """
         omega, b = float(trial[OMEGA]), float(trial[B])
         half_cycles = omega * float(self.time_s[-1] - self.time_s[0]) / np.pi
         if self.step != 0.0 or promised > _SLIGHT * half_cycles:
             return np.inf
         signal = len(self.values) * float(np.var(self.values)) / self.noise_rms**2
-        slower = 0.4 * b**2 / omega * float(trial[SHARE] - value[SHARE]) ** 2
+        slower = _BY_SHARE * b**3 / omega**2 * float(trial[SHARE] - value[SHARE]) ** 2
         at_ends = _ENDS * promised**2 / signal
         return at_ends + float(quadratic.normal[OMEGA, OMEGA]) * slower**2
+
+    def curved(self, value: FloatArray, step: FloatArray) -> FloatArray:
+        """Return where a step ends: omega makes up for the square of what b's share changes."""
+        end = value + step
+        if step[OMEGA] != 0.0:  # else it is held
+            end[OMEGA] += _BY_SHARE * value[B] ** 2 / value[OMEGA] * step[SHARE] ** 2
+        return end
 
     def evaluate(self, value: FloatArray) -> Quadratic:
         """chi^2, gradient and normal matrix, summed over pieces of the record."""
@@ -407,6 +417,7 @@ def fit_waveform(
         held=held,
         tolerance=_TOLERANCE,
         predict_remaining=problem.predict_remaining,
+        curved=problem.curved,
     )
     fitted = _refined(_Fitted(problem, minimum, held, start), samples)
     return _result(fitted, samples, points, baseline, fixed)
@@ -470,7 +481,14 @@ def _refined(fitted: _Fitted, samples: Samples) -> _Fitted:
     for _ in range(_ROUNDS):
         noise = best_noise(problem.residual(value), step, 0.1 * step)
         problem = replace(problem, noise_rms=noise, step=step)
-        minimum = minimise(problem.evaluate, value, BOUNDS, held=fitted.held, tolerance=_TOLERANCE)
+        minimum = minimise(
+            problem.evaluate,
+            value,
+            BOUNDS,
+            held=fitted.held,
+            tolerance=_TOLERANCE,
+            curved=problem.curved,
+        )
         if not math.isfinite(minimum.quadratic.chi2):
             return fitted
         value = minimum.value

@@ -160,6 +160,7 @@ def minimise(
     held: Sequence[int] = (),
     tolerance: float = 1e-5,
     predict_remaining: Callable[[FloatArray, FloatArray, Quadratic, float], float] | None = None,
+    curved: Callable[[FloatArray, FloatArray], FloatArray] = np.add,
     most: int = 60,
 ) -> Minimum:
     """Minimise chi^2 by Gauss-Newton steps that respect bounds, shortened where they overshoot.
@@ -178,6 +179,8 @@ def minimise(
     predict_remaining
         What a step leaves to be gained, from its two ends, the quadratic at the first and
         what that promises. Below 1e-2 the step is accepted unverified.
+    curved
+        Where a step from a point ends, where more is known of the model than its derivatives.
     most
         Greatest number of evaluations.
     """
@@ -186,13 +189,13 @@ def minimise(
     for _ in range(most):
         step = bounded_step(now.normal, now.gradient, bounds.about(value), held)
         promised = float(2.0 * now.gradient @ step - step @ now.normal @ step)
-        trial = bounds.clip(value + step)
+        trial = bounds.clip(curved(value, step))
         if promised < tolerance or (
             predict_remaining is not None
             and predict_remaining(value, trial, now, promised) < _PREDICTED
         ):
             return Minimum(trial, moved(now, step), True)
-        ways = (bounds.clip(value + part * step) for part in FRACTIONS)
+        ways = (bounds.clip(curved(value, part * step)) for part in FRACTIONS)
         tried = ((way, evaluate(way)) for way in ways)
         enough = now.chi2 + 0.1 * tolerance
         found = next((there for there in tried if there[1].chi2 <= enough), None)
