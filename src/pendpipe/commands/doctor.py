@@ -167,10 +167,7 @@ def _of_snakemake(folder: Path) -> Iterator[Finding]:
     """Locks, and results that Snakemake knows to be unfinished."""
     if any(folder.glob("locks/*")):
         problem, safe = "a run was killed", "snakemake --unlock, then run again"
-        if not Path("/proc/self").exists():
-            problem = "a run is alive, or was killed"
-            safe = f"if no snakemake is alive in this folder: {safe}"
-        elif alive := _alive(folder.parent):
+        if alive := _alive(folder.parent):
             problem, safe = f"Snakemake is at work (process {alive})", "wait until it ends"
         yield Finding("locked", str(folder / "locks"), problem, safe)
     unfinished = sum(1 for path in folder.glob("incomplete/**/*") if path.is_file())
@@ -184,13 +181,13 @@ def _of_snakemake(folder: Path) -> Iterator[Finding]:
 
 
 def _alive(project: Path) -> int | None:
-    """Find a living Snakemake of a project, where the system shows its processes."""
-    for process in Path("/proc").glob("[0-9]*"):
-        try:
-            words = (process / "cmdline").read_bytes().split(b"\0")
-            there = (process / "cwd").resolve()
-        except OSError:
-            continue  # it has ended, or is somebody else's
-        if any(b"snakemake" in word for word in words[:3]) and there == project.resolve():
-            return int(process.name)
+    """Find a living Snakemake of a project."""
+    import psutil
+
+    for process in psutil.process_iter(("cmdline", "cwd")):
+        # Of somebody else's processes the system says neither.
+        words, folder = process.info["cmdline"] or (), process.info["cwd"]
+        of_snakemake = any("snakemake" in word for word in words[:3])
+        if of_snakemake and folder and Path(folder) == project.resolve():
+            return int(process.pid)
     return None
