@@ -84,7 +84,10 @@ def table(design: Design, relative_sd: float, *, frequency: bool) -> str:
     plain = predict(design, (), nothing)
     sds = plain * np.array([3e-6, relative_sd])
     covariance = sds[:, :, None] * sds[:, None, :] * np.eye(2)
-    fit = joint_fit(design, measured(plain, covariance, frequency=frequency))
+    data = measured(plain, covariance)
+    if not frequency:  # b alone, the second row of each record
+        data = data._replace(whitening=data.whitening[:, 1:])
+    fit = joint_fit(design, data)
     basis, _ = np.linalg.qr(fit.jacobian)
     left = {
         letter: column - basis @ (basis.T @ column)

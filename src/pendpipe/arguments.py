@@ -206,7 +206,7 @@ def load(path: Path) -> Campaign:
 
 
 def tell(line: str) -> None:
-    """Print a line for whoever sits before the screen; results go to standard output."""
+    """Print a line to standard error; results go to standard output."""
     print(line, file=sys.stderr)
 
 

@@ -60,7 +60,7 @@ IN_A_CLONE: Final = {"challenge": "pip install --editable ./challenge"}
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says in one line, as of every fault, what of a call can't be understood."""
+    """Reports a usage error in one line, like every other user error."""
 
     def error(self, message: str) -> NoReturn:
         """End the program with status 2."""

@@ -1,4 +1,4 @@
-"""What a process of ours asks of its system: one thread, and memory that is kept."""
+"""What our processes ask of the system: one thread, and memory that is kept."""
 
 import os
 import sys
@@ -31,8 +31,8 @@ def keep_memory() -> None:
     """Let glibc keep what numpy's arrays leave.
 
     Without it each large array is mapped anew, page by page, and unmapped: up to a quarter of
-    the time of a diagnosis. For programs of ours, since it holds for the whole process; systems
-    without glibc do as they always do.
+    the time of a diagnosis. Only our own programs ask for it, since it holds for the whole process;
+    without glibc nothing changes.
     """
     if sys.platform != "linux":
         return

@@ -121,7 +121,7 @@ def test_the_frequency_is_eq_8s_and_not_the_shifted_one(
 ) -> None:
     model = Eq8(OMEGA, quadratic, share * linear, (1.0 - share) * linear, coulomb)
     points = engine_table(model, 60, 1e-9)
-    period = fit_period(points, points.amplitude_rad, quadratic, linear, coulomb, share=share)
+    period = fit_period(points, points.amplitude_rad, (quadratic, linear, coulomb), share=share)
     shift = (linear / OMEGA) ** 2 + (quadratic * 0.068 / OMEGA) ** 2
     assert period.angular_frequency / OMEGA - 1.0 == pytest.approx(0.0, abs=0.05 * shift)
 

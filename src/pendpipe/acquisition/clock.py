@@ -32,7 +32,7 @@ class ScaledClock:
 
 
 class SimulatedClock(ScaledClock):
-    """The clock of a simulated world, which can stand still.
+    """The clock of a simulated device and its recorder, which can be stopped.
 
     A simulated line that is full stops the world: else the data would come late, and the
     recorder would see a device slower than it is. Real lines do not wait; there the
@@ -50,12 +50,12 @@ class SimulatedClock(ScaledClock):
         return super().now() - self._held_s if held_at_s is None else held_at_s
 
     def hold(self) -> None:
-        """Stand still; once more changes nothing."""
+        """Stop the clock; stopping it again changes nothing."""
         if self._held_at_s is None:
             self._held_at_s = self.now()
 
     def release(self) -> None:
-        """Go on from where it stands; a running clock runs on."""
+        """Run on from where the clock stands."""
         if self._held_at_s is not None:
             # In this order a reader in another thread never sees time go back.
             self._held_s = super().now() - self._held_at_s

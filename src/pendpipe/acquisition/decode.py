@@ -77,7 +77,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class TimeBase:
-    """The scan rate of a recording, by the device's word and by the recorder's clock.
+    """The scan rate of a recording, as the device states it and as the recorder's clock shows it.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def _join(
 
 
 def _most_rows(scans: int) -> int:
-    """How many rows a gap may fill: of a longer one (a computer that slept) the ends do."""
+    """The most rows that fill a gap; a longer one (the computer slept) gets its first and last."""
     return max(1 << 20, scans)
 
 
@@ -288,7 +288,7 @@ def _metadata(
     range_volts: float,
     segments: Sequence[Segment],
 ) -> dict[str, str]:
-    """Say where the recording comes from, as text."""
+    """Where the recording comes from, as text."""
     header = raw.header
     told = ("firmware", "serial_number", "clock_scale", "volts_per_radian")
     return {
@@ -315,7 +315,7 @@ def _lost(losses: Sequence[Loss]) -> int:
 def _notes(
     raw: RawRecording, segments: Sequence[Segment], time_base: TimeBase, time_s: FloatArray
 ) -> tuple[str, ...]:
-    """Say what a user should know of the session, a clause each."""
+    """What a user should know about the session, one clause each."""
     losses = [loss for segment in segments for loss in segment.losses]
     met = [loss for loss in losses if loss.after_scan and not loss.reason]
     silent = [loss for loss in losses if loss.reason == "clock"]
@@ -430,7 +430,7 @@ def _decode(
 def _scans_of(
     data: bytes, holes: Sequence[Hole], decoder: Decoder
 ) -> tuple[AnyArray, tuple[Loss, ...]]:
-    """Decode a stream, put into step again behind every hole and, without marks, every slip."""
+    """Decode a stream, realigned after every hole and, where scans have no marks, every slip."""
     size = decoder.bytes_per_scan
     parts: list[AnyArray] = []
     losses: list[Loss] = []
@@ -616,7 +616,7 @@ def _least_late(late: FloatArray, stretches: int) -> IntArray:
 def _lasting_steps(
     late: FloatArray, first: IntArray, limit_s: float
 ) -> Iterator[tuple[int, float]]:
-    """Find steps of the lateness that all later stretches keep up: the arrival after each, height.
+    """Find steps of the lateness that last: the arrival after each, and its height in s.
 
     Parameters
     ----------
@@ -746,14 +746,14 @@ def decode_attempt(path: Path, folder: Path, channel: int | None = None) -> Reco
 
 
 def mark_saved(path: Path, out: Path) -> None:
-    """Note in a raw file that its recording was written; without a right to it, do not."""
+    """Note in a raw file, where it may be written to, that its recording was written."""
     with suppress(OSError):
         append_event(path, event="saved", file=out.name)
 
 
 @contextmanager
 def kept_in(raw_path: Path, out: Path) -> Iterator[None]:
-    """While a recording is written: if that fails, name the raw file that still holds it.
+    """Name the raw file that still holds a recording, if writing the recording fails.
 
     Raises
     ------

@@ -251,7 +251,7 @@ def uniform(terms: Terms, size: FloatArray) -> Terms:
     0.1,
 )
 def history(terms: Terms, size: FloatArray) -> Terms:
-    """The part of Eq. 2 that grows as the square root of the frequency, by itself."""
+    """Only the part of Eq. 2 that grows as the square root of the frequency."""
     return replace(terms, history=terms.history * (1.0 + size))
 
 
@@ -442,7 +442,7 @@ def inertia_scaling(inputs: Inputs, size: FloatArray) -> Inputs:
     0.2,
 )
 def other_hysteresis(inputs: Inputs, size: FloatArray, design: Design) -> Inputs:
-    """The pendulum in the fluid is another assembly than the benchmark's, and loses otherwise."""
+    """The pendulum in the fluid is assembled anew, with a loss torque unlike the benchmark's."""
     return replace(inputs, log_coefficient=inputs.log_coefficient - size * design.wet)
 
 
@@ -468,7 +468,7 @@ def air_drag(inputs: Inputs, size: FloatArray) -> Inputs:
     1e-4,
 )
 def grease(terms: Terms, size: FloatArray) -> Terms:
-    """A torque in proportion to the angular velocity, the same in every record."""
+    """A torque proportional to the angular velocity, the same in every record."""
     return replace(terms, steady=terms.steady + size)
 
 
@@ -481,7 +481,7 @@ def grease(terms: Terms, size: FloatArray) -> Terms:
     1e-3,
 )
 def support(terms: Terms, size: FloatArray) -> Terms:
-    """A stand that yields and rubs: its loss has 1/Q in proportion to f^2."""
+    """A support that flexes and dissipates: its 1/Q is proportional to f^2."""
     frequency = terms.angular_frequency / (2.0 * np.pi)
     return replace(terms, rate=terms.rate + size * frequency**3)
 

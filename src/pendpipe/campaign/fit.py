@@ -54,19 +54,16 @@ class Measured(NamedTuple):
     values
         Hz and 1/s, shape (records, 2).
     whitening
-        Whitening matrices, shape (records, rows, 2): the inverse Cholesky factor of each record's
-        covariance; one row where only b is used.
+        Whitening matrices, shape (records, 2, 2): the inverse Cholesky factor of each record's
+        covariance.
     """
 
     values: FloatArray
     whitening: FloatArray
 
 
-def measured(values: FloatArray, covariance: FloatArray, *, frequency: bool = True) -> Measured:
+def measured(values: FloatArray, covariance: FloatArray) -> Measured:
     """Whiten each record by its covariance of frequency and b, shape (records, 2, 2)."""
-    if not frequency:
-        sd = np.sqrt(covariance[:, 1, 1])
-        return Measured(values, np.stack([0.0 * sd, 1.0 / sd], axis=-1)[:, None, :])
     return Measured(values, np.linalg.inv(np.linalg.cholesky(covariance)))
 
 

@@ -25,14 +25,14 @@ from pendpipe.files import check_writable
 _SOURCES: Final[Flags] = {
     "--port": {"help": "serial port of a real instrument: /dev/ttyUSB0, COM3"},
     "--device": {"metavar": "simulated:MODEL", "help": "a simulated instrument"},
-    "--recover": {"metavar": "RAW", "help": "decode kept bytes, of a crash for one"},
+    "--recover": {"metavar": "RAW", "help": "decode a raw file, for instance after a crash"},
     "--serve": {
         "metavar": "MODEL",
-        "help": "be a simulated instrument for other programs: di2108, ...",
+        "help": "simulate an instrument for other programs: di2108, ...",
     },
 }
 _OWN: Final[Flags] = {
-    "--list": {"action": "store_true", "help": "list ports; with --port, ask it"},
+    "--list": {"action": "store_true", "help": "list ports; with --port, identify its device"},
     "--model": {"help": "the instrument on --port: di154rs, di2108, ..."},
     "--channel": {"type": int, "help": "as printed on the box (1)"},
     "--rate": {"type": float, "default": 60.0, "metavar": "HZ", "help": "scans a second (60)"},
@@ -253,7 +253,7 @@ def _from_device(arguments: Arguments, raw: Path) -> None:
 
 
 def _serve(arguments: Arguments) -> None:
-    """Be a simulated instrument for other programs until the end."""
+    """Simulate an instrument for other programs until interrupted."""
     from pendpipe.acquisition.devices.simulated import SimulatedDevice
     from pendpipe.acquisition.recorder import example_signal
 

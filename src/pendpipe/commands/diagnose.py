@@ -259,5 +259,5 @@ def _not_analysable(arguments: Arguments, reason: str, provenance: dict[str, Any
 
 
 def _print_progress(line: str) -> None:
-    """Progress goes to standard error."""
+    """Print progress to standard error."""
     tell(f"  {line}")

@@ -351,7 +351,7 @@ def _check_geometries(configuration: Configuration, place: str | Path) -> None:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Say which of the known names `name` may have meant, or all of them."""
+    """Suggest the known name that `name` may have meant, or list them all."""
     names = sorted(known)
     without_unit = [known_name for known_name in names if name and known_name.startswith(name)]
     close = difflib.get_close_matches(name, names, n=1, cutoff=0.6) or without_unit

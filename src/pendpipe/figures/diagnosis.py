@@ -96,7 +96,7 @@ class Shown:
         return np.where(self.data.weight > 0.0, left, math.nan)
 
     def rms(self, fit: Fit) -> str:
-        """The residual's root mean square, for people."""
+        """The residual's root mean square, with its unit."""
         return compact(math.sqrt(float(np.nanmean(self.residual(fit) ** 2))), self.data.unit)
 
     @cached_property
@@ -432,7 +432,7 @@ def _against_amplitude(
 
 
 def _power(values: FloatArray) -> tuple[str, float]:
-    """The power of a thousand that an axis of pure numbers is counted in."""
+    """The power of a thousand that scales an axis of pure numbers."""
     largest = float(np.nanmax(np.abs(values)))
     if largest >= 0.5 or largest == 0.0:
         return "1", 1.0
@@ -489,7 +489,7 @@ def _curves(effect: str, drawn: Mapping[str, Any]) -> Iterator[Panel]:
 
 
 def _scaled(at: object, argument: str) -> tuple[FloatArray, str]:
-    """Arguments in a handy unit, and the axis's name."""
+    """Arguments in a suitable unit, and the label of their axis."""
     values = np.asarray(at, dtype=np.float64)
     name, _, unit = argument.partition(", ")
     has_prefix = unit in ("rad", "m") and not name.startswith("phase")

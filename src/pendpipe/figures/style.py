@@ -83,7 +83,7 @@ BRANCHES: Final = {
 
 
 def branch(name: str) -> Branch:
-    """The look of a branch; one that the paper does not have is drawn in grey."""
+    """The style of a branch; one that is not in the paper is drawn in grey."""
     return BRANCHES.get(name, Branch(name or "no branch", GREY, "^"))
 
 

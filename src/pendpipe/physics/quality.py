@@ -149,7 +149,7 @@ def without_hysteresis(
 
 @equation
 def inverse(rate: Numbers) -> FloatArray:
-    """1/x, infinite (and silent) at zero."""
+    """1/x, infinite (without a warning) at zero."""
     with np.errstate(divide="ignore"):
         return 1.0 / rate
 
@@ -318,7 +318,7 @@ def universal_acceleration(
     quality_factors: QualityFactors | tuple[Numbers, Numbers, Numbers, Numbers],
     amplitude0_rad: Numbers,
 ) -> FloatArray:
-    """Acceleration of the free decay with every loss, Eq. 8 (its misprints mended).
+    """Acceleration of the free decay with every loss, Eq. 8 (its misprints corrected).
 
     ``x'' = -[pi omega^2 y0/(4 Q_c0) + (pi omega/(4 Q_h)) w + (pi/(4 y0 Q_f0)) w^2] sgn(x')
     - (omega/Q_v) x' - omega^2 x`` with ``w = sqrt(omega^2 x^2 + x'^2)``.

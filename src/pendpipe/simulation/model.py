@@ -252,7 +252,7 @@ class Instrument:
         return step * np.round(angle / step) if step else angle
 
     def given_codes(self, codes: FloatArray) -> FloatArray:
-        """Let some codes within the record's range never come: a neighbour comes instead."""
+        """Replace some codes within the record's range by a neighbour, wherever they occur."""
         number = round(self.settings.get("missing-codes", {}).get("number", 0.0))
         if not number:
             return codes

@@ -104,7 +104,7 @@ def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: P
 def _comparison(
     campaign: Campaign, separated: Separation, spread: dict[str, InertiaSds]
 ) -> Comparison | None:
-    """Eq. 16 beside what Eq. 17 has left; ``None`` where no record has a theory."""
+    """Compare Eq. 16 with what Eq. 17 leaves; ``None`` where no record has a theory."""
     apparatus = campaign.configuration.apparatus
     if apparatus is None or apparatus.sphere is None or separated.benchmark is None:
         return None
@@ -260,7 +260,7 @@ def _curves(campaign: Campaign, separated: Separation) -> dict[str, Any]:
 
 
 def _campaign_numbers(found: Comparison | None) -> dict[str, Any]:
-    """What is one number for the whole campaign."""
+    """The numbers that describe the whole campaign."""
     names = ("viscous_exponents", "theory_factor", "history_coefficient", "checks", "budget")
     if found is None:
         return dict.fromkeys((*names, "steady_stokes_percent"))

@@ -97,9 +97,9 @@ def _work_or_refuse(
 
 
 def within_results(error: InputError, refused: Path | None, sources: Iterable[Path] = ()) -> str:
-    """What is written of an error: a campaign's own files go by ``record/name``.
+    """The text of an error in the results: a campaign's own files appear as ``record/name``.
 
-    Results name no path of the machine they were made on: others go by their name alone.
+    Results name no path of the machine they were made on: other files appear by name alone.
     """
     if refused is None:
         return str(error)

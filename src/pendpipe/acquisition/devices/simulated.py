@@ -35,7 +35,7 @@ class Dialect(ABC):
     bits: ClassVar[int]
 
     def __init_subclass__(cls, **figures: Any) -> None:
-        """Enter a model by its figures."""
+        """Register a model by its specifications."""
         for name, value in figures.items():
             setattr(cls, name, value)
         if "model" in figures:
@@ -65,7 +65,7 @@ class Dialect(ABC):
 
     @property
     def packet_bytes(self) -> int:
-        """Data leave in pieces of so many bytes."""
+        """Bytes in each packet of data."""
         return 1
 
     @abstractmethod
@@ -149,7 +149,7 @@ class Stream:
         self._origin_s = 0.0
 
     def begin(self, clock: ScaledClock) -> None:
-        """Let scan 0 be taken now; the first block is computed before, and not late."""
+        """Take scan 0 now; the first block is computed beforehand, so that it is not late."""
         self._compute()
         self._origin_s = clock.now()
 
@@ -264,7 +264,7 @@ class LoopbackSocket:
         return data
 
     def send(self, data: memoryview) -> int:
-        """Send what there is room for; what nobody listens to is gone."""
+        """Send what there is room for; without a host, data are lost."""
         if self._host is None:
             return len(data)
         try:

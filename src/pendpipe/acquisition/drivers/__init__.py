@@ -81,7 +81,7 @@ _CDC: Final = (
 
 
 def without_port(devices: Path = Path("/sys/bus/usb/devices")) -> list[str]:
-    """Say of each of the vendor's devices without a serial port what to do (Linux only).
+    """List what to do about each of the vendor's devices that has no serial port (Linux only).
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def without_port(devices: Path = Path("/sys/bus/usb/devices")) -> list[str]:
 
 
 def no_ports(platform: str = sys.platform) -> str:
-    """Say where to look when there is no port at all."""
+    """Explain where to look when there is no port at all."""
     try_this = "to try without one: --device simulated:di2108"
     hints = {
         "win32": "a device with a warning in the Device Manager lacks its driver (Dataq's page"

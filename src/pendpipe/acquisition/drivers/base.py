@@ -141,7 +141,7 @@ class SyncBitDecoder:
         return Scans(self._counts(words), tuple(losses))
 
     def finish(self) -> Scans:
-        """Say what is left over at the end: no counts, perhaps a loss."""
+        """Return what is left over at the end: no counts, perhaps a loss."""
         nothing = np.empty((0, self.bytes_per_scan // 2), dtype=np.int16)
         left = self._discarded
         self._discarded, self._pending = 0, b""
@@ -199,7 +199,7 @@ class WordDecoder:
         return self._scans_of(data[:whole])
 
     def finish(self) -> Scans:
-        """Return what was held back, forget an unfinished scan; or tell of a stop code."""
+        """Return what was held back, without an unfinished scan; or report a stop code."""
         held = self._pending
         if self.ended:
             loss = Loss(self._scans, len(held), 0, reason=self.ended)
@@ -287,7 +287,7 @@ class Driver(ABC):
     """What to check where the device does not answer."""
 
     def __init_subclass__(cls, **figures: Any) -> None:
-        """Enter a model by its figures: ``class DI149(TextDriver, model="DI-149", bits=12)``."""
+        """Register a model: ``class DI149(TextDriver, model="DI-149", bits=12)``."""
         for name, value in figures.items():
             setattr(cls, name, value)
         if "model" in figures:

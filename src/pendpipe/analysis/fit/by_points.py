@@ -5,7 +5,7 @@ amplitude: they also tell which torque the half swings favour, and where fits of
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -113,9 +113,7 @@ def phases(
 def fit_period(
     points: TurningPoints,
     amplitude: FloatArray,
-    a: float,
-    b: float,
-    c: float,
+    rates: Sequence[float],
     *,
     share: float | None = None,
     held: float | None = None,
@@ -130,8 +128,8 @@ def fit_period(
     ----------
     points
         The turning points.
-    amplitude, a, b, c
-        What Eq. 14 made of them.
+    amplitude, rates
+        What Eq. 14 made of them, and its a, b, c.
     share
         The hysteretic share of b, where it is known.
     held
@@ -140,6 +138,7 @@ def fit_period(
         The restoring torque.
     """
     omega = 2.0 * math.pi * points.apparent_frequency_hz if held is None else held
+    a, b, c = rates
     middle = _line(
         points, amplitude, (a, b, c, 0.5 if share is None else share), omega, held, restoring
     )
@@ -289,7 +288,7 @@ def fit_energies(
     measured = points.amplitude_rad
     base = np.array([0.0, 0.0, 0.0, measured[0], 0.0])
     start, held = _with_held(points, fixed or {}, base)
-    free = fit_period(points, measured, 0.0, 0.0, 0.0, share=share, restoring=restoring)
+    free = fit_period(points, measured, (0.0, 0.0, 0.0), share=share, restoring=restoring)
     swings = np.diff(points.half_cycle) / free.angular_frequency
     sine = restoring == "sine"
     most = TOP if sine else None
@@ -392,11 +391,11 @@ def envelope_and_period(
     else:
         middle = share_of(parts, held.get("b", 0.0), baseline)
         envelope = fit_energies(points, held, share=0.5 if middle is None else middle)
-    a, b, c = (float(rate) for rate in envelope.value[:3])
-    share = share_of(parts, b, baseline)
+    rates = envelope.value[:3].tolist()
+    share = share_of(parts, rates[1], baseline)
     omega = 2.0 * math.pi * fixed["frequency"] if "frequency" in fixed else None
     period = fit_period(
-        points, envelope.amplitude, a, b, c, share=share, held=omega, restoring=restoring
+        points, envelope.amplitude, rates, share=share, held=omega, restoring=restoring
     )
     return envelope, period, share
 
@@ -443,20 +442,17 @@ def fit_points(
     a, b, c = (float(rate) for rate in envelope.value[:3])
     stretched = misfit(envelope.chi2_per_dof, len(points) - 4.0)
     hysteretic = (0.5 if share is None else share) * b
-    said = []
-    if period.chi2_per_dof > _LATE:
-        said.append(
-            "the period changes along the record as Eq. 8's does not"
-            f" (chi^2 of the times is {period.chi2_per_dof:.3g} per point):"
-            " the frequency is a mean"
-        )
+    late = (
+        "the period changes along the record as Eq. 8's does not (chi^2 of the times is"
+        f" {period.chi2_per_dof:.3g} per point): the frequency is a mean"
+    )
     return result_of(
         *_numbers(points, envelope, period, stretched),
         envelope.held,
         points,
         Eq8(period.angular_frequency, a, hysteretic, b - hysteretic, c, restoring),
         stretched=stretched,
-        said=said,
+        said=[late] if period.chi2_per_dof > _LATE else [],
         fixed=fixed,
         method="turning-points",
         baseline=baseline,
@@ -476,13 +472,12 @@ def _numbers(
     stretched: float,
 ) -> tuple[FloatArray, FloatArray, list[tuple[float, float]]]:
     """The seven parameters, their covariance (amplitudes and times are independent), intervals."""
-    normal = envelope.quadratic.normal / stretched
-    gradient = envelope.quadratic.gradient / stretched
+    _, gradient, normal = envelope.quadratic
+    gradient, normal = gradient / stretched, normal / stretched
     rates = covariance(normal, envelope.held)
     matrix = np.zeros((7, 7))
     # a, b, c, amplitude, and the level, which is what was used less its error.
-    place = np.array([0, 1, 2, 4, 6])
-    sign = np.array([1.0, 1.0, 1.0, 1.0, -1.0])
+    place, sign = [0, 1, 2, 4, 6], np.array([1.0, 1.0, 1.0, 1.0, -1.0])
     matrix[np.ix_(place, place)] = rates * sign[:, None] * sign
     level = float(np.mean(points.level_rad)) - float(envelope.value[4])
     lag = points.start_s - period.time_s
@@ -634,7 +629,7 @@ def _law_start(points: TurningPoints, restoring: Restoring) -> LawStart:
     part = clear(points) if restoring == "sine" else points
     found = fit_energies(part, restoring=restoring)
     rates = found.value[:3]
-    period = fit_period(part, found.amplitude, *rates.tolist(), share=0.5, restoring=restoring)
+    period = fit_period(part, found.amplitude, rates.tolist(), share=0.5, restoring=restoring)
     return LawStart(
         rates,
         period.angular_frequency,
