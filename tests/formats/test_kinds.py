@@ -148,6 +148,30 @@ def test_without_names_the_drive_is_not_the_pendulum(tmp_path: Path) -> None:
     assert "whose swing decays" in " ".join((*recording.notes, *recording.weak_guesses))
 
 
+def test_what_drifts_beside_a_slow_decay_is_not_its_pendulum(tmp_path: Path) -> None:
+    # A swing of one size and the height that a moving camera sees.
+    swing = 200 * np.exp(-0.002 * TIME) * np.cos(2.9 * TIME)
+    drift = 590 + 30 * np.cumsum(np.random.default_rng(3).normal(size=len(TIME))) / 40
+    recording = read_text(tmp_path, text(TIME, swing, drift)[: 6 * 4000])
+    np.testing.assert_allclose(recording.values, swing[: len(recording)], atol=1e-3)
+
+
+@pytest.mark.parametrize("names", ["posicao_x_px,posicao_y_px", "x1 (px),y1 (px)", "Bob X,Bob Y"])
+def test_the_place_of_a_bob_is_known_by_its_axes(tmp_path: Path, names: str) -> None:
+    x, y = 1288 + 1664 * np.sin(0.5 * ANGLE), -744 + 1664 * np.cos(0.5 * ANGLE)
+    same(read_text(tmp_path, text(TIME, x, y, head=f"tempo_s,{names}\n")), 0.5 * ANGLE)
+
+
+def test_a_letter_with_an_index_keeps_its_meaning(tmp_path: Path) -> None:
+    recording = read_text(tmp_path, text(0.01 * ANGLE, TIME, head="x_10s,t_10s\n"))
+    assert recording.quantity == "displacement_m"
+
+
+def test_clock_times_may_have_points(tmp_path: Path) -> None:
+    stamps = [f"10/01/2025 15.{9 + t // 60:02.0f}.{t % 60:06.3f}" for t in TIME]
+    same(read_text(tmp_path, "".join(f"{a};{x:.6f}\n" for a, x in zip(stamps, ANGLE, strict=True))))
+
+
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_without_names_the_derivative_is_not_the_pendulum(
     tmp_path: Path, order: tuple[int, int]
@@ -813,6 +837,10 @@ def test_readings_beside_gravity_are_an_accelerometers(tmp_path: Path) -> None:
         recording = read_text(tmp_path, text(TIME, *columns))
         assert recording.unit == "m/s^2"
         assert "accelerometer" in recording.weak_guesses[-1]
+    in_g = (np.sin(ANGLE), np.cos(ANGLE) + 0.05 * RATE**2)
+    recording = read_text(tmp_path, text(*in_g, TIME))
+    assert recording.unit == "m/s^2"
+    assert "taken to be in g" in recording.weak_guesses[-1]
 
 
 def test_a_column_that_counts_frames_gives_way_to_one_that_may_be_a_time(tmp_path: Path) -> None:

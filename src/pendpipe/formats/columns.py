@@ -205,7 +205,7 @@ def _settled(column: Column) -> Column:
     """Undo a clock's overflow; and "run1" counts nothing where it swings."""
     if column.role == "time":
         return replace(column, values=_counted_on(column.values))
-    swings = column.role == "index" and column.swing.clear and one_way(column.values) < 0.95
+    swings = column.role == "index" and column.swing.clear
     return replace(column, role="unknown") if swings else column
 
 
@@ -384,13 +384,14 @@ def _of_equals(equals: Sequence[tuple[Column, ...]]) -> tuple[tuple[Column, ...]
         return first, ""
     # A drive has one size from beginning to end; a free decay has all of them.
     own = first[0].swing
-    graded = [c for c in equals if c[0].swing.clear and c[0].swing.graded > 0.3]
-    if graded and own.graded < 0.1 and own.clear:
-        return graded[0], ", whose swing decays"
     for column in equals:
-        # Height, and the pull along the string, go through two cycles in one of the swing.
         cycle = column[0].swing.samples_per_cycle
         ratio = cycle / (own.samples_per_cycle or np.inf)
+        # The pendulum goes along with its drive; what only drifts does not.
+        graded = column[0].swing.clear and column[0].swing.graded > 0.3 and 0.7 < ratio < 1.4
+        if graded and own.graded < 0.1 and own.clear:
+            return column, ", whose swing decays"
+        # Height, and the pull along the string, go through two cycles in one of the swing.
         # Known to one cycle more or less in the whole.
         blur = max(0.05, min(1.01 * cycle / len(column[0].values), 0.2))
         if column[0].swing.clear and abs(ratio - 2.0) < blur:
@@ -433,15 +434,14 @@ def _moves(column: Column) -> bool:
 
 def _position_pair(columns: Sequence[Column]) -> tuple[Column, Column] | None:
     """Find x, y of something that moves on a circle, about the origin or another pivot."""
-    named = {column.name.lower(): column for column in columns}
-    silent = tuple(column for column in columns if not column.name)
-    pairs = [(named[a], named[b]) for a, b in ("xy", ("px", "py")) if {a, b} <= named.keys()]
+    silent = [column for column in columns if not column.name]
     bare = [(silent[0], silent[1])] if len(silent) > 1 else []
+    # x, y, z without a unit come from a phone's sensor: of a position it knows nothing.
+    sensed = any(column.name.lower() == "z" for column in columns)
     round_the_pivot = (
         (x, y)
-        for x, y in pairs or _bob_from_pivot(columns) or bare
-        # x, y, z without a unit come from a phone's sensor: of a position it knows nothing.
-        if not ("z" in named and not x.unit)
+        for x, y in _tracked(columns) or bare
+        if not (sensed and not x.unit)
         and (
             _on_a_circle(x.values, y.values, named=bool(x.name))
             or (x.name and x.swing.clear and _pivot(x.values, y.values) is not None)
@@ -450,26 +450,23 @@ def _position_pair(columns: Sequence[Column]) -> tuple[Column, Column] | None:
     return next(round_the_pivot, None)
 
 
-def _bob_from_pivot(columns: Sequence[Column]) -> list[tuple[Column, Column]]:
-    """Of two tracked points give the place of the one that moves, seen from the other."""
+def _tracked(columns: Sequence[Column]) -> list[tuple[Column, Column]]:
+    """Give the places of tracked points; of two the one that moves, seen from the other."""
     points: dict[str, dict[str, Column]] = {}
     for column in columns:
-        axis = re.fullmatch(r"([xy])[\s_]*(.+)|(.+?)[\s_.]*([xy])", column.name.lower())
-        if axis is not None:
-            points.setdefault(axis[2] or axis[3], {})[axis[1] or axis[4]] = column
-    both = [point for point in points.values() if len(point) == 2]
-    if len(both) != 2:
-        return []
-    pivot, bob = sorted(both, key=lambda point: float(np.nanstd(point["x"].values)))
-    if np.nanstd(pivot["x"].values) > 0.5 * np.nanstd(bob["x"].values):
+        axis = re.fullmatch(r"([xy])[\s_]*(.*)|(.+?)[\s_.]*([xy])", column.name.lower())
+        if axis is not None and column.role in ("length", "unknown"):
+            points.setdefault(axis[2] or axis[3] or "", {})[axis[1] or axis[4]] = column
+    both = [(point["x"], point["y"]) for point in points.values() if len(point) == 2]
+    both.sort(key=lambda point: float(np.nanstd(point[0].values)))
+    if len(both) != 2 or "" in points:
+        return both
+    still, bob = both
+    if np.nanstd(still[0].values) > 0.5 * np.nanstd(bob[0].values):
         return []
     x, y = (
-        replace(
-            bob[axis],
-            name=f"{bob[axis].name} - {pivot[axis].name}",
-            values=bob[axis].values - pivot[axis].values,
-        )
-        for axis in "xy"
+        replace(of, name=f"{of.name} - {pivot.name}", values=of.values - pivot.values)
+        for of, pivot in zip(bob, still, strict=True)
     )
     return [(x, y)]
 
@@ -878,7 +875,6 @@ def _keep_last(choice: Choice, base: TimeBase) -> None:
 _RADIAN = Unit("angle", 1.0, "rad")
 _DEGREE = Unit("angle", np.pi / 180, "rad")
 _UNKNOWN = Unit("own", 1.0, "1")
-_GRAVITY = Unit("own", 1.0, "m/s^2")
 _QUANTITIES: dict[str, Quantity] = {
     "angle": "angle_rad",
     "volts": "volts",
@@ -1014,10 +1010,13 @@ def _unit(
         metres = _Guess(Unit("length", 1.0, "m"), "has no unit: taken to be metres", weak=True)
         return grown if grown and not grown.weak else metres
     bare = [other.values for other in choice.channels if not other.name]
-    levels = [np.median(values) for values in bare if np.isfinite(values).all()]
-    if not column.name and any(9.6 < abs(level) < 10.1 for level in levels):
-        why = "stands beside 9.8, as an accelerometer's do: taken to be in m/s^2 (along the string"
-        return _Guess(_GRAVITY, f"{why} the pull swings twice in a period)", weak=True)
+    levels = [abs(float(np.median(values))) for values in bare if np.isfinite(values).all()]
+    for gravity, name, axes in ((9.8, "m/s^2", 1), (1.0, "g", 2)):
+        beside = any(abs(level / gravity - 1.0) < 0.03 for level in levels)
+        if not column.name and beside and len(bare) >= axes:
+            why = f"stands beside {gravity:g}, as an accelerometer's do: taken to be in {name}"
+            twice = " (along the string the pull swings twice in a period)"
+            return _Guess(unit_of(name) or _UNKNOWN, why + twice, weak=True)
     return _angle_unit(table, choice, column, time_s)
 
 

@@ -56,7 +56,9 @@ class Swing:
 def swing_of(values: FloatArray) -> Swing:
     """Find the strongest oscillation about the trend, from two cycles on."""
     finite = values[np.isfinite(values)]
-    if len(finite) < 8 or np.abs(finite).max() > _ABSURD:
+    steps = np.diff(finite)
+    # What goes one way only (a clock) turns nowhere, though its roundings do.
+    if len(finite) < 8 or np.abs(finite).max() > _ABSURD or not steps.min() < 0.0 < steps.max():
         return Swing()
     block = -(-len(finite) // _LOOKED_AT)
     some = finite[: len(finite) // block * block].reshape(-1, block).mean(axis=1)

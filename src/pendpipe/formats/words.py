@@ -259,7 +259,8 @@ def role_of(name: str) -> Role:
         for role, pattern in _PATTERNS
         if any(len(found[0]) > 1 or not found[0].isascii() for found in pattern.finditer(whole))
     )
+    # A letter with an index: "x_10s".
+    symbol = (role for role, pattern in _PATTERNS if pattern.fullmatch(words.partition("_")[0]))
     unit = unit_of(name)
-    return next(
-        chain(is_it, holds_it), "time" if unit is not None and unit.kind == "time" else "unknown"
-    )
+    named: Role = "time" if unit is not None and unit.kind == "time" else "unknown"
+    return next(chain(is_it, holds_it, symbol), named)
