@@ -130,6 +130,20 @@ def test_an_error_of_the_level_is_no_loss() -> None:
     assert amplitude == pytest.approx(0.5 * math.exp(-0.05 * np.mean(motion.time_s)), rel=0.01)
 
 
+def test_the_level_is_not_sought_in_turning_points_of_one_side() -> None:
+    """Where the others hardly stand out: there any level would do, and any amplitude."""
+    law = Eq8(OMEGA, viscous=0.02)
+    motion = turning_points(law, Release(0.0, 0.5), count=10)
+    sd = np.full(10, 0.05)
+    angle = motion.angle_rad + 0.05 * np.random.default_rng(3).standard_normal(10)
+    points = TurningPoints(
+        np.arange(10), motion.time_s, 1e-4 * np.ones(10), angle, sd, np.zeros(10)
+    )
+    amplitude, _, loss_sd = seen_loss(points.chosen(points.side > 0))
+    assert amplitude == pytest.approx(0.5 * math.exp(-0.02 * np.mean(motion.time_s)), rel=0.15)
+    assert loss_sd > 0.02
+
+
 def test_the_light_says_how_far_the_numbers_may_be_believed() -> None:
     law = Eq8(OMEGA, viscous=0.05)
     motion = turning_points(law, Release(0.0, 0.5), count=30)

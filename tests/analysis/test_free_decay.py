@@ -367,6 +367,17 @@ def test_a_decay_in_loud_noise_is_seen_by_all_its_readings() -> None:
     assert found.half_cycles > 180
 
 
+@pytest.mark.parametrize("wander", [0.0, 0.3])
+def test_many_half_cycles_are_a_decay_though_each_hardly_stands_out(wander: float) -> None:
+    """As those of a cheap accelerometer, 4.5 times the noise of a reading."""
+    time = np.arange(2000) / RATE
+    values = 0.1 * np.exp(-0.03 * time) * np.cos(OMEGA * time) + wander * time / time[-1]
+    noise = 0.1 / 4.5
+    assert find_free_decay(recording([values], noise=noise)).half_cycles > 25
+    with pytest.raises(NotAnalysableError, match="its noise and step hide"):
+        find_free_decay(recording([0.0 * values], noise=noise))
+
+
 def test_a_decay_that_can_not_be_seen_is_called_too_slow_and_not_driven() -> None:
     time = np.arange(3000) / RATE
     values = 0.1 * np.exp(-1e-3 * time / time[-1]) * np.cos(OMEGA * time)

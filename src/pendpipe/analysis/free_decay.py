@@ -287,6 +287,7 @@ def _runs_of_flags(flags: list[bool]) -> list[tuple[int, int]]:
 _BLOCKS: Final = 9
 _LEAST_HALF_CYCLES: Final = 3
 _MANY: Final = 18
+"""Half cycles that follow one another by no accident, however small they are."""
 _STEADY: Final = 0.2
 """By which the half periods of a beat may differ from the usual one, but at its nodes."""
 _COUNTED: Final = 0.25
@@ -354,7 +355,8 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     step = recording.resolution
     least = max(6.5 * noise_rms(values, step, quieter=0.1), 1.6 * (step or 0.0))
     half_period = usual_half_period(time, values)
-    if half_period is None or span < 3.0 * least:
+    # Noise alone spans about `least`. What hardly exceeds it many half cycles can prove.
+    if half_period is None or span < 1.5 * least:
         why = (
             f"no oscillation: the reading moves by {span:.3g}{after_number(recording.unit)},"
             f" its noise and step hide {least:.2g}"
@@ -384,7 +386,6 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
             "handling, a clamp or a drive can't be analysed",
         )
     if told.legs < _MANY and rivals >= max(2, told.legs // 3):
-        # Many half cycles that follow one another are no accident, however small they are.
         longer = [run for run in found if run.legs >= _MANY]
         refuse_if(
             not longer,
@@ -561,7 +562,7 @@ def _refuse_without_fall(
     """Refuse motion that does not decay, or that hardly stands out of noise and step."""
     swing = run.swing
     refuse_if(
-        float(swing[:3].max()) < 3.0 * least,
+        float(swing[:3].max()) < 3.0 * least and len(swing) < _MANY,
         place,
         f"the largest half cycle ({swing[:3].max():.2g}) hardly stands out of noise and step"
         f" ({least:.2g})",

@@ -298,10 +298,12 @@ def _of_one_run(
     Returns its time column and its others, and the names of the other runs' columns.
     """
     start = time.number if time is not None else len(channels) + 2
+    # A column without a name may repeat the clock, as far as it goes.
     clocks = [
         c
         for c in channels
-        if time is not None and _moves(c) and (c.role == "time" or _same(time, c))
+        if time is not None
+        if _moves(c) and (c.role == "time" or not np.any(np.abs(c.values - time.values) > 0.0))
     ]
     starts = [start, *(c.number for c in clocks if c.number > start)]
     ends = [*starts[1:], len(channels) + 2]
@@ -321,12 +323,6 @@ def _of_one_run(
     ]
     clock = next((c for c in clocks if c.number == starts[one]), time)
     return clock, runs[one], listed(others, 6)
-
-
-def _same(clock: Column, column: Column) -> bool:
-    """Say whether a column without a name repeats the clock, as far as it goes."""
-    filled = np.isfinite(column.values)
-    return bool(np.array_equal(column.values[filled], clock.values[filled]))
 
 
 def _evenness(finite: FloatArray) -> float:
@@ -385,16 +381,16 @@ def _of_equals(equals: Sequence[tuple[Column, ...]]) -> tuple[tuple[Column, ...]
     # A drive has one size from beginning to end; a free decay has all of them.
     own = first[0].swing
     for column in equals:
-        cycle = column[0].swing.samples_per_cycle
-        ratio = cycle / (own.samples_per_cycle or np.inf)
+        swing = column[0].swing
+        ratio = swing.samples_per_cycle / (own.samples_per_cycle or np.inf)
         # The pendulum goes along with its drive; what only drifts does not.
-        graded = column[0].swing.clear and column[0].swing.graded > 0.3 and 0.7 < ratio < 1.4
+        graded = swing.clear and swing.graded > 0.3 and 0.7 < ratio < 1.4
         if graded and own.graded < 0.1 and own.clear:
             return column, ", whose swing decays"
         # Height, and the pull along the string, go through two cycles in one of the swing.
         # Known to one cycle more or less in the whole.
-        blur = max(0.05, min(1.01 * cycle / len(column[0].values), 0.2))
-        if column[0].swing.clear and abs(ratio - 2.0) < blur:
+        blur = max(0.05, min(1.01 * swing.samples_per_cycle / len(column[0].values), 0.2))
+        if swing.clear and abs(ratio - 2.0) < blur:
             return column, f", of which '{first[0].label}' has twice the frequency"
     units = {(unit_of(c[0].unit) or c[0].unit) for c in equals if c[0].unit}
     if len(units) > 1 or not all(c[0].unit or c[0].name for c in equals):
@@ -435,12 +431,11 @@ def _moves(column: Column) -> bool:
 def _position_pair(columns: Sequence[Column]) -> tuple[Column, Column] | None:
     """Find x, y of something that moves on a circle, about the origin or another pivot."""
     silent = [column for column in columns if not column.name]
-    bare = [(silent[0], silent[1])] if len(silent) > 1 else []
     # x, y, z without a unit come from a phone's sensor: of a position it knows nothing.
     sensed = any(column.name.lower() == "z" for column in columns)
     round_the_pivot = (
         (x, y)
-        for x, y in _tracked(columns) or bare
+        for x, y in _tracked(columns) or pairwise(silent[:2])
         if not (sensed and not x.unit)
         and (
             _on_a_circle(x.values, y.values, named=bool(x.name))
@@ -530,10 +525,10 @@ class TimeBase:
     weak_guesses: list[str] = field(default_factory=list)
     metadata: dict[str, str] = field(default_factory=dict)
 
-    def keep(self, rows: slice | BoolArray | IntArray, note: str) -> None:
+    def keep(self, rows: slice | BoolArray | IntArray, *notes: str) -> None:
         """Keep some of the rows, or put them into another order, and say so."""
         self.time_s, self.rows = self.time_s[rows], self.rows[rows]
-        self.notes.append(note)
+        self.notes.extend(notes)
 
 
 def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
@@ -673,11 +668,9 @@ def _in_order(
         # What lies before --start, or behind --stop, need not be in order.
         start_s, stop_s = options.start_s, options.stop_s
         late = np.flatnonzero(base.time_s >= (np.inf if stop_s is None else stop_s))
-        asked = slice(0, late.min(initial=len(base.time_s)) + 1)
-        base.time_s, base.rows = base.time_s[asked], base.rows[asked]
+        base.keep(slice(late.min(initial=len(base.time_s)) + 1))
         early = np.flatnonzero(base.time_s <= (-np.inf if start_s is None else start_s))
-        asked = slice(early.max(initial=0), None)
-        base.time_s, base.rows = base.time_s[asked], base.rows[asked]
+        base.keep(slice(early.max(initial=0), None))
     for repaired in (_count_rows, _keep_last, _drop_repeats, _first_of_stacked, _lone_stamps):
         if np.diff(base.time_s).min(initial=1.0) <= 0:
             repaired(choice, base)
@@ -775,7 +768,7 @@ def _first_of_stacked(_choice: Choice, base: TimeBase) -> None:
         f"{len(lengths)} runs stand below one another: the first is read ({lengths[0]} rows);"
         " put each into a file of its own for the others"
     )
-    base.time_s, base.rows = base.time_s[: starts[0]], base.rows[: starts[0]]
+    base.keep(slice(starts[0]))
 
 
 def _lone_stamps(_choice: Choice, base: TimeBase) -> None:
@@ -1091,10 +1084,9 @@ def _by_size(column: Column, finite: FloatArray, time_s: FloatArray) -> _Guess:
         return _Guess(_RADIAN, "has no unit: taken to be radians", weak=True)
     # No pendulum of so many radians: a torsion pendulum, or another unit.
     odd = f"has no unit, and its period does not grow as that of a pendulum of {reach:.2g} rad"
-    taken, unit = ("taken to be radians of a torsion pendulum", _RADIAN)
-    if not named:
-        taken, unit = "analysed in its own", _UNKNOWN
-    return _Guess(unit, f"{odd}: {taken}", True)
+    if named:
+        return _Guess(_RADIAN, f"{odd}: taken to be radians of a torsion pendulum", True)
+    return _Guess(_UNKNOWN, f"{odd}: analysed in its own", True)
 
 
 def _by_period(column: Column, time_s: FloatArray, *, named: bool) -> _Guess | None:

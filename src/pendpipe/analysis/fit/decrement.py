@@ -140,7 +140,7 @@ def seen_loss(points: TurningPoints) -> tuple[float, float, float]:
     span = float(np.ptp(points.time_s))
     z = (points.time_s - centre) / span
     columns = [np.ones_like(z), z]
-    if len(points) > 4:
+    if len(points) > 4 and np.ptp(points.side):
         columns.append(points.side * float(np.mean(amplitude)) / amplitude)
     if len(points) > 5:
         columns.append(z**2)
