@@ -6,6 +6,7 @@ import functools
 import math
 from collections.abc import Callable
 from copy import copy
+from unittest.mock import patch
 
 import numpy as np
 
@@ -139,6 +140,13 @@ def diagnosed(name: str, seed: int = 1) -> Outcome:
     """The diagnosis of an effect's recording, or of one of the others above."""
     make = _READINGS.get(name, lambda: with_effects(name))
     return diagnose_recording(recording(make(), seed))
+
+
+@functools.cache
+def scanned(name: str) -> Outcome:
+    """The same by the scan alone: what the half swings ask for is not fitted first."""
+    with patch("pendpipe.diagnosis.search.known_law_first", lambda *_: None):
+        return diagnose_recording(recording(with_effects(name), 1))
 
 
 def classes_found(outcome: Outcome) -> list[set[str]]:

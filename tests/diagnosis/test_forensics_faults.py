@@ -15,7 +15,7 @@ from pendpipe.diagnosis.data import gather
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.forensics import TESTS
 from pendpipe.diagnosis.forensics.corrections import LostSamples, find_lost_samples
-from pendpipe.diagnosis.forensics.glitches import find_in_misfit
+from pendpipe.diagnosis.forensics.glitches import _smallest_p_value, find_in_misfit
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
@@ -86,6 +86,16 @@ def test_few_glitches_of_one_size_are_not_taken_for_a_tail(number: int, clean: F
     finding = found(fitted(AIR, readings))["glitches"]
     assert finding.mask is not None
     assert np.flatnonzero(finding.mask).tolist() == where.tolist()
+
+
+def test_more_glitches_are_more_certain() -> None:
+    """Of 600 readings: any number of equal ones is tested without one that thickens the tails."""
+    error = np.abs(generator(3).standard_normal(600))
+    chances = []
+    for number in range(1, 15):
+        error[number - 1] = 8.0
+        chances.append(_smallest_p_value(np.sort(error), 0.0))
+    assert all(np.diff(np.log(chances)) < 0.0)
 
 
 def test_glitches_stand_out_of_noise_with_memory(clean: FloatArray) -> None:

@@ -21,7 +21,7 @@ from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
 
-from .records import INTERVAL_S, TIME_S, TRUTH, beginning_of, recording
+from .records import INTERVAL_S, TIME_S, TRUTH, beginning_of, recording, white
 
 LARGE = np.array(TRUTH)
 LARGE[START] = 1.2 * np.sign(TRUTH[START])
@@ -62,6 +62,17 @@ def test_a_linear_torque_is_not_taken_for_a_pendulum() -> None:
     begun, state = searched(swinging())
     assert begun.known is None
     assert not state.steps
+
+
+def test_a_short_record_of_a_pendulum_is_a_pendulums_first() -> None:
+    """The linear law keeps the phase; a cubic torque takes up what a second plane changes too."""
+    time_s, values = TIME_S[:600], np.append(TRUTH, [1.0, 6e-3, 2e-3, 0.01])
+    values[[0, 1, 2, 3, START]] = 0.0, 0.02, 0.0, 0.0, 0.26
+    effects = by_identifier("circular-error"), by_identifier("plane-coupling")
+    readings = Model(time_s, INTERVAL_S, effects).reading(values) + white(1, 600, 1.4e-3)
+    found = diagnose_recording(Recording(time_s, readings, "angle_rad"))
+    assert found.effects[0].identifier == "circular-error"
+    assert found.effects[0].probability > 0.95
 
 
 def test_two_coupled_pendulums_are_two_modes_at_their_frequencies() -> None:

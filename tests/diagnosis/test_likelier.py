@@ -17,7 +17,7 @@ from pendpipe.diagnosis.state import Step
 from pendpipe.diagnosis.weighing import Weighed, swap_in_likelier, weigh
 from pendpipe.effects.baseline import B
 
-from .records import TRUTH, diagnosed, other_engine, recording
+from .records import TRUTH, diagnosed, other_engine, recording, scanned
 
 
 @functools.cache
@@ -59,12 +59,12 @@ def led(outcome: Outcome, name: str) -> tuple[Step, float, dict[str, float], Sea
 @pytest.mark.parametrize("taken", ["cubic-stiffness", "clock-drift", "unnamed-restoring"])
 def test_a_likelier_effect_replaces_the_one_that_was_added(taken: str) -> None:
     """All fit a pendulum whose torque is sin x; the prior knows that it is."""
-    step, own, mates, found = led(diagnosed("circular-error"), taken)
+    step, own, mates, found = led(scanned("circular-error"), taken)
     assert step.winner.identifier == "circular-error"
     assert own > max(mates.values())
     assert taken in mates
     assert [effect.identifier for effect in found.improved.model.effects] == ["circular-error"]
-    assert found.improved.chi2 == pytest.approx(diagnosed("circular-error").search.improved.chi2)
+    assert found.improved.chi2 == pytest.approx(scanned("circular-error").search.improved.chi2)
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
         return found._replace(mates=tuple(curve), weights=np.array([1.0, odds, 0.0]) / (1 + odds))
 
     monkeypatch.setattr(weighing, "weigh", weighed)
-    outcome = diagnosed("circular-error")
+    outcome = scanned("circular-error")
     found, _ = swap_in_likelier(outcome.search, outcome.beginning)
     assert [effect.identifier for effect in found.improved.model.effects] == [leads]
     assert found.steps[0].winner.identifier == leads
@@ -104,9 +104,9 @@ def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
 
 def test_no_second_curve_is_swapped_in() -> None:
     """One curve follows what no name explains; a second would only share it."""
-    found = diagnosed("circular-error").search
+    found = scanned("circular-error").search
     (step,) = found.steps
-    each = weigh(found, diagnosed("circular-error").beginning, step)
+    each = weigh(found, scanned("circular-error").beginning, step)
     curve = next(rival for rival in step.rivals if rival.drawn)
     each = each._replace(mates=(curve,), weights=np.array([0.0, 1.0, 0.0]))
     assert weighing._likelier(found, step, each) is curve

@@ -106,7 +106,7 @@ def test_a_curve_that_fits_better_does_not_lower_a_name() -> None:
 
 def test_a_curve_without_a_name_takes_nothing_from_the_law() -> None:
     """A pull that no entry of the catalogue describes: a, b, c and f are those of Eq. 8 alone."""
-    outcome = diagnose_recording(recording(pulled(0.5, 0.03), 3))
+    outcome = diagnose_recording(recording(pulled(0.5, 0.03), 3), linear=True)
     found, diagnosis = outcome.search, outcome.diagnosis
     assert [step.winner.drawn for step in found.steps] == [True]
     weighed = [weigh(found, outcome.beginning, step) for step in found.steps]

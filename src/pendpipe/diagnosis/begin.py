@@ -95,7 +95,8 @@ def begin(
         known = BEATING_MODE, np.append(value, second)
     elif not (fixed or linear) and samples.unit in ("rad", "rad/s"):
         laws = start_of(points if samples.unit == "rad" else _of_the_angle(points), stated=stated)
-        if laws.sine and laws.favoured == "sine" and laws.linear.slip_rad > LARGE_PHASE_ERROR:
+        asked = laws.coefficient.agrees or laws.linear.slip_rad > LARGE_PHASE_ERROR
+        if laws.sine and laws.favoured == "sine" and asked:
             # Both laws begin at the first turning point, so that they count the same half cycles.
             value, sine = laws.linear.value, laws.sine.value
             if samples.unit == "rad/s":

@@ -2,7 +2,9 @@
 
 Over a long record at large amplitude the linear law loses the phase by many turns, and where two
 modes beat one alone has no phase; what is fitted to them there means little. The half swings, which
-are counted, tell sin x and its start; the slow amplitude tells the modes.
+are counted, tell sin x and its start; the slow amplitude tells the modes. Where the linear law
+keeps the phase, an effect with more values, a second plane say, would take what sin x changes
+together with the rest.
 """
 
 from typing import Final
@@ -31,8 +33,8 @@ def known_law_first(beginning: Beginning, state: State, task: Task) -> None:
     Parameters
     ----------
     beginning
-        Its `known` is the effect and the start; None where the half swings ask for nothing, or
-        the linear law keeps the phase: then the scan finds sin x as it finds others.
+        Its `known` is the effect and the start; None where the half swings don't ask for it by
+        themselves and the linear law keeps the phase: the scan finds sin x as it finds others.
     state
         After the baseline's fit; updated.
     task
@@ -80,7 +82,7 @@ def _imitated(fit: Fit, effect: Effect, state: State, task: Task) -> list[tuple[
     shape = tuple(own[effect.sizes :].tolist())
     change = own[: effect.sizes] @ whitened(fit, noise, effect, [shape])
     others = applicable(task.catalogue, fit, task.baseline, state.data.unit)
-    names = [each for each in others if each.kind == "dynamics" and each.sizes == effect.sizes]
+    names = [each for each in others if each.kind != "unnamed" and each.sizes == effect.sizes]
     bank = build_bank(fit, noise, names)
     scores = bank.scores(change - bank.basis @ (bank.basis.T @ change))
     found: dict[str, tuple[float, Candidate]] = {}

@@ -23,7 +23,8 @@ from pendpipe.diagnosis.result import Finding, Location, nothing
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number
 
-_GLITCH_NUMBERS: Final = (1, 2, 3, 5, 10, 30, 100)
+_GLITCH_NUMBERS: Final = (*range(1, 31), 40, 53, 71, 95, 126, 168, 200)
+"""Numbers that are tried. One glitch that is not counted thickens the tails of the noise."""
 _CERTAIN_SD: Final = 4.5
 _LARGE_SD: Final = 3.0
 _ROUNDS: Final = 4
@@ -39,7 +40,7 @@ _EXPECTED_BY_CHANCE: Final = 0.05
 def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     """Test for readings that neither normal nor heavy-tailed noise explains.
 
-    Each error is compared with its window. For k = 1, 2, 3, 5, 10 ... the
+    Each error is compared with its window. For k = 1, 2, 3, ... the
     tail of the noise (Student's distribution, averaged over the posterior of nu) is fitted with
     the k largest errors censored, and the k-th largest of n is tested:
 
