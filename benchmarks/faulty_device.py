@@ -284,7 +284,7 @@ class FaultyDevice(SimulatedDevice):
         self._outbox += self._path.due(self.clock.now())
         self._follow()
         if self._stream and not self._outbox and not self._condition:
-            due = self._stream.due(self.clock)
+            due = self._stream.due()
             self._outbox += self._path.stream(due, self._stream.scan_bytes)
         self._send()
 
@@ -311,7 +311,7 @@ class FaultyDevice(SimulatedDevice):
         if self._condition == "silence":
             self._outbox.clear()
             if self._stream:
-                self._stream.due(self.clock)
+                self._stream.due()
         if self.clock.now() >= self._until_s:
             self._condition = ""
 

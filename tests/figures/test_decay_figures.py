@@ -135,6 +135,16 @@ def test_the_quality_factor_of_sin_x_is_that_of_its_turning_points() -> None:
     assert np.max(off[60:100]) < 0.005
 
 
+def test_a_decay_is_drawn_from_the_first_to_the_last_turning_point_that_was_fitted(
+    example: Any,
+) -> None:
+    entry = entry_of(example, TYPICAL)
+    measured = read_turning_points(example.folder / TYPICAL / "turning_points.csv")
+    ends = measured.time_s[[2, -3]].tolist()
+    found = read_decay(example.folder, {**entry, "start_s": ends[0], "stop_s": ends[1]})
+    assert found.points.time_s[[0, -1]].tolist() == ends
+
+
 def test_figure_7_draws_all_samples_inside_the_envelope(example: Any) -> None:
     recording = read_plain(example.folder / TYPICAL / "recording.csv")
     found = read_decay(example.folder, entry_of(example, TYPICAL))

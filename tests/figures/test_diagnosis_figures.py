@@ -97,6 +97,15 @@ def test_the_figure_of_the_damping_shows_losses_less_the_baselines(content: Show
     assert np.median(upper.containers[0][0].get_ydata()) == pytest.approx(expected, rel=0.01)
 
 
+@pytest.mark.parametrize("largest", [4.0, 9.0, 50.0, 2e3, 4e4, 1e6])
+def test_the_scale_of_the_map_has_few_marks_on_either_side_of_zero(largest: float) -> None:
+    ticks = diagnosis._ticks(largest)
+    above = [tick for tick in ticks if tick > 0.0]
+    assert ticks == [*(-tick for tick in reversed(above)), 0.0, *above]
+    assert 1 <= len(above) <= 4
+    assert above[-1] <= largest
+
+
 def test_the_map_is_loud_before_and_quiet_after(content: Shown) -> None:
     before = diagnosis.residual_map(content, content.baseline)
     assert content.extended is not None

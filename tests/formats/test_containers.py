@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +45,16 @@ def test_a_matrix_with_time_in_front_and_a_rate_beside_no_time(tmp_path: Path) -
     np.testing.assert_allclose(read(path).values, ANGLE)
     savemat(path, {"angle": ANGLE, "fs": 50.0})
     np.testing.assert_allclose(read(path).time_s, TIME)
+
+
+@pytest.mark.parametrize("member", ["experiment.cap", "Main.xml", "data/17.tmp"])
+def test_a_project_of_capstone_is_to_be_exported_first(tmp_path: Path, member: str) -> None:
+    path = tmp_path / "project.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr(member, "x")
+        archive.writestr("notes.csv", "t,x\n0,1\n1,2\n2,3\n")
+    with pytest.raises(InputError, match="Capstone; export its data"):
+        read(path)
 
 
 @pytest.mark.filterwarnings("error")

@@ -300,10 +300,6 @@ def stem(inputs: Inputs, size: FloatArray) -> Inputs:
     return replace(inputs, screw_m=inputs.screw_m + size)
 
 
-def _surfaces(design: Design) -> Sequence[Any]:
-    return ("slip", "film") if design.apparatus.tank is not None else ()
-
-
 @campaign_effect(
     "terms",
     "wall-confinement",
@@ -311,7 +307,7 @@ def _surfaces(design: Design) -> Sequence[Any]:
     r"D \to K(s, \delta/a)\, D, \quad C_m \to C_m(s, \delta/a), \quad s = 2 a/H",
     Parameter("closeness", "", 0.0, 0.5),
     0.1,
-    _surfaces,
+    lambda design: ("slip", "film") if design.apparatus.tank is not None else (),
 )
 def walls(terms: Terms, size: FloatArray, design: Design, shape: Surface) -> Terms:
     """Walls, floor and surface: the fluid goes faster past the sphere.

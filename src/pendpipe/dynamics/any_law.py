@@ -180,7 +180,7 @@ class Rates:
     loss: FloatArray
     pace: FloatArray
     pull: FloatArray
-    """G of the law, without a bound."""
+    """g = f/(omega^2 r) of the law, without a bound."""
 
 
 def rates(law: Law, motion: Motion, largest: float = _LARGEST) -> Rates:
@@ -189,17 +189,12 @@ def rates(law: Law, motion: Motion, largest: float = _LARGEST) -> Rates:
     So they are finite along a motion that is wrong: for a search on its way, and after the time
     until which a motion was followed.
     """
-    pull = _pull(law, motion)
+    omega = motion.angular_frequency
+    pull = np.asarray(motion.upwards * law(motion) / (omega * omega * motion.amplitude))
     g = np.nan_to_num(np.clip(pull, -largest, largest))
     g = np.where(g * motion.clock.cosine > _STEEPEST, np.copysign(_STEEPEST, g), g)
     free = 1.0 - g * motion.clock.cosine
-    return Rates(-g * motion.clock.sine / free, 1.0 / (motion.angular_frequency * free), pull)
-
-
-def _pull(law: Law, motion: Motion) -> FloatArray:
-    """G = f/(omega^2 r)."""
-    omega = motion.angular_frequency
-    return np.asarray(motion.upwards * law(motion) / (omega * omega * motion.amplitude))
+    return Rates(-g * motion.clock.sine / free, 1.0 / (omega * free), pull)
 
 
 def follow(

@@ -135,8 +135,9 @@ class Stream:
         dialect: Dialect,
         signal: Signal | Mapping[int, Signal],
         rate_error: float,
+        clock: ScaledClock,
     ) -> None:
-        self._dialect = dialect
+        self._dialect, self._clock = dialect, clock
         channels = dialect.channels
         self._signals = [
             signal.get(number) if isinstance(signal, Mapping) else signal for number in channels
@@ -146,16 +147,13 @@ class Stream:
         self._computed = 0  # scans
         self._ready = b""  # bytes of scans computed, not yet released
         self._released = 0  # bytes since the start
-        self._origin_s = 0.0
-
-    def begin(self, clock: ScaledClock) -> None:
-        """Take scan 0 now; the first block is computed beforehand, so that it is not late."""
+        # Scan 0 is taken when the first block has been computed, so that it is not late.
         self._compute()
         self._origin_s = clock.now()
 
-    def due(self, clock: ScaledClock) -> bytes:
+    def due(self) -> bytes:
         """Return the whole packets that are complete by now."""
-        taken = math.floor((clock.now() - self._origin_s) * self._rate_hz) + 1
+        taken = math.floor((self._clock.now() - self._origin_s) * self._rate_hz) + 1
         packet = self._dialect.packet_bytes
         size = max(0, taken * self.scan_bytes // packet * packet - self._released)
         while len(self._ready) < size:
@@ -164,11 +162,11 @@ class Stream:
         self._released += size
         return piece
 
-    def rest_s(self, clock: ScaledClock) -> float:
+    def rest_s(self) -> float:
         """How long, in seconds of the host, until the next packet is complete."""
         following = math.ceil((self._released + self._dialect.packet_bytes) / self.scan_bytes)
         complete_s = self._origin_s + (following - 1) / self._rate_hz
-        return max(_REST_S, (complete_s - clock.now()) / clock.scale)
+        return max(_REST_S, (complete_s - self._clock.now()) / self._clock.scale)
 
     def _compute(self) -> None:
         """Sample, convert and encode the next block."""
@@ -390,7 +388,7 @@ class SimulatedDevice:
             self._outbox += self.dialect.respond(data)
         self._follow()
         if self._stream and not self._outbox:
-            self._outbox += self._stream.due(self.clock)
+            self._outbox += self._stream.due()
         self._send()
 
     def _follow(self) -> None:
@@ -403,12 +401,11 @@ class SimulatedDevice:
 
     def _begin(self) -> None:
         """Begin a stream, whose first scan reads the signal at 0 s."""
-        self._stream = Stream(self.dialect, self._signal, self._rate_error)
-        self._stream.begin(self.clock)
+        self._stream = Stream(self.dialect, self._signal, self._rate_error, self.clock)
 
     def _rest_s(self) -> float:
         """How long there is nothing to do, in seconds of the host, if the host is silent."""
-        return self._stream.rest_s(self.clock) if self._stream else _LONGEST_REST_S
+        return self._stream.rest_s() if self._stream else _LONGEST_REST_S
 
     def _send(self) -> None:
         """Send what the line takes; while it is full, simulated time stands still."""

@@ -506,7 +506,8 @@ def estimate_level(information: FloatArray, score: FloatArray, noise: float, sta
     if len(score) < 3 * _WINDOWS[0]:
         return constant
     # Neighbours average out the even errors of opposite half cycles (harmonics, decay).
-    pairs = _paired(information, score)
+    even = len(score) // 2 * 2
+    pairs = information[:even].reshape(-1, 2).sum(1), score[:even].reshape(-1, 2).sum(1)
     # The wander must be smooth against the scatter of neighbours, noise or not.
     narrow, used = _local_lines(*pairs, 4)
     freedom = max(len(pairs[0]) - used, 1.0)
@@ -525,12 +526,6 @@ def estimate_level(information: FloatArray, score: FloatArray, noise: float, sta
     line, used = _local_lines(information, score, chosen)
     local = np.full(len(score), noise * math.sqrt(used / total))
     return Level(start + line, local, wanders=True)
-
-
-def _paired(information: FloatArray, score: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Join half cycles two by two."""
-    even = len(score) // 2 * 2
-    return information[:even].reshape(-1, 2).sum(1), score[:even].reshape(-1, 2).sum(1)
 
 
 def _criterion(
