@@ -101,10 +101,13 @@ class Scale:
         return self.least + self.unit * lost
 
     def worth(self, before: float, fit: Fit, effect: Effect) -> float:
-        """Return what the fall of chi^2 from `before` by an effect of a fit is worth."""
-        others = lines(fit)
-        own = others.pop(effect.key, 0.0)
-        apart = sum(others.values())
+        """Return what the fall of chi^2 from `before` by an effect of a fit is worth.
+
+        Its other lines take as much before as after, whatever they take beside this effect.
+        """
+        taken = lines(fit)
+        own = taken.pop(effect.key, 0.0)
+        apart = sum(self.lines.get(key, 0.0) for key in taken)
         return self.lost(before + apart) - self.lost(fit.chi2 + apart + own) + own
 
 
