@@ -956,6 +956,15 @@ def test_of_a_clock_that_steps_back_either_part_can_be_read(tmp_path: Path) -> N
     assert len(later) == pytest.approx(897, abs=1)
 
 
+def test_a_clock_that_steps_back_by_little_more_than_a_row_has_no_wrong_stamp(
+    tmp_path: Path,
+) -> None:
+    """Without the row behind the step the time rises: but two rows take less than one's time."""
+    stamps = np.where(np.arange(len(TIME)) < 600, TIME, TIME - 1.1 * (TIME[1] - TIME[0]))
+    with pytest.raises(InputError, match="the time falls"):
+        read_text(tmp_path, text(stamps, ANGLE, head="t (s),theta (rad)\n"))
+
+
 def test_rows_stamped_on_arrival_are_counted_where_the_periods_agree(tmp_path: Path) -> None:
     random = np.random.default_rng(5)
     time, angle = TIME[::3], ANGLE[::3]

@@ -7,10 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from pendpipe.commands import config
 from pendpipe.configuration import jobs
+from pendpipe.configuration.apparatus import pendulum
 from pendpipe.configuration.load import (
     COLUMNS,
     Record,
@@ -41,6 +43,26 @@ def test_the_default_campaign_is_the_papers(content: dict[str, Any]) -> None:
         "air": 12,
     }
     assert {record.source for record in campaign.records} == {"simulated"}
+
+
+def test_the_period_in_water_is_that_of_all_parts(content: dict[str, Any]) -> None:
+    """By hand: rod, weights, and the sphere with its buoyancy, its water, and its screw."""
+    content["apparatus"]["sphere"].update(screw_volume_m3=2e-7)
+    campaign = load_campaign(content, "config/config.yaml")
+    record = campaign.record("water-low-1")
+    where = campaign.geometry(record).weights_m
+    weights = {name: content["apparatus"]["weights"][name]["mass_kg"] for name in where}
+    volume, gravity = 4.0 / 3.0 * np.pi * 0.019**3, 9.80665
+    inertia = 0.0444 * 0.77**2 / 12.0 + 0.0358 * (0.4 * 0.019**2 + 0.452**2)
+    inertia += sum(weights[name] * where[name] ** 2 for name in where)
+    moment = 0.0358 * 0.452 + sum(weights[name] * where[name] for name in where)
+    moment -= 1000.0 * (volume * 0.452 + 2e-7 * 0.43)
+    built = pendulum(campaign, record)
+    depth = np.sqrt(2.0 * 1.0016e-6 / built.swing.angular_frequency_per_s)
+    inertia += (0.5 + 2.25 * depth / 0.019) * 1000.0 * volume * 0.452**2
+    assert built.swing.angular_frequency_per_s == pytest.approx(
+        np.sqrt(gravity * moment / inertia), rel=1e-9
+    )
 
 
 def misspell(*path: str, wrong: str) -> Callable[[dict[str, Any]], None]:
