@@ -304,6 +304,19 @@ def fit_exponent(branch: Columns, inverse_k_sd: float) -> Exponent | None:
     )
 
 
+def _exponents(losses: Columns, inverse_k_sd: float) -> dict[str, Exponent]:
+    """Fit the exponent of every branch that has one."""
+    found = {
+        branch: fit_exponent(
+            {name: column[losses["branch"] == branch] for name, column in losses.items()},
+            inverse_k_sd,
+        )
+        for branch in np.unique(losses["branch"]).tolist()
+        if branch
+    }
+    return {branch: exponent for branch, exponent in found.items() if exponent}
+
+
 def _derivative(branch: Columns, inverse_k_sd: float, order: int) -> tuple[float, float, float]:
     """Derivative of ln Q_v by ln f from a least-squares polynomial: value, own sd, common sd."""
     logs = np.log(branch["frequency_hz"])
@@ -398,19 +411,11 @@ def compare(
     }
     # Of the drag measured over that of the steady law, less 1.
     excess = 100.0 * _excess_over_steady(losses).response
-    fitted = {
-        str(branch): fit_exponent(
-            {name: column[losses["branch"] == branch] for name, column in losses.items()},
-            errors.inverse_k,
-        )
-        for branch in np.unique(losses["branch"])
-        if branch
-    }
     return Comparison(
         table=table,
         theory_factor=factor,
         history_coefficient=fit_line(losses, ends, _excess_over_steady),
-        exponents={name: found for name, found in fitted.items() if found is not None},
+        exponents=_exponents(losses, errors.inverse_k),
         steady_stokes_percent=(float(np.min(excess)), float(np.max(excess))),
         checks=[
             check_model(losses, ends, history=history, hysteresis=hysteresis)
