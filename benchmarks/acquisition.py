@@ -393,11 +393,11 @@ def slip_table(_folder: Path) -> str:
         size = 2 * swing[4]
         for run in range(RUNS):
             data = _codes(random, swing)
-            invented += bool(find_slips(data, swing[4]))
+            invented += any(True for _ in find_slips(data, swing[4]))
             at = int(random.integers(200 * size, (SLIP_SCANS - 200) * size))
             gone = (1, 3, -1)[run % 3]
             damaged = data[:at] + data[at + gone :] if gone > 0 else data[: at + 1] + data[at:]
-            slips = find_slips(damaged, swing[4])
+            slips = list(find_slips(damaged, swing[4]))
             found += bool(slips)
             true = (
                 len(slips) == 1
