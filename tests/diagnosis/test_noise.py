@@ -148,6 +148,31 @@ def test_a_misfit_about_the_harmonics_is_not_noise() -> None:
     assert estimated(readings + misfit).rms == pytest.approx(estimated(readings).rms, rel=0.01)
 
 
+@pytest.mark.parametrize("count", [300, 600, COUNT])
+@pytest.mark.parametrize("decay_s", [20.0, np.inf])
+def test_a_line_leaves_the_noise_about_it_as_it_is(count: int, decay_s: float) -> None:
+    """Four times the noise, between the second harmonic and the third; it leaks, or dies away."""
+    noise = 2.5e-4 * np.random.default_rng(count).standard_normal(count)
+    time_s = INTERVAL_S * np.arange(count)
+    line = 1e-3 * np.exp(-time_s / decay_s) * np.cos(2.0 * np.pi * 2.21 * time_s + 1.0)
+    found, alone = estimated(noise + line).variance, estimated(noise).variance
+    np.testing.assert_allclose(np.log(found / alone), 0.0, atol=0.7)
+
+
+def test_a_broad_resonance_is_noise() -> None:
+    """A stand of Q 8 at 2.2 Hz: some seventy cosines that stand out together are no line."""
+    turn, shrink = 2.0 * np.pi * 2.2 * INTERVAL_S, np.exp(-np.pi * 2.2 * INTERVAL_S / 8.0)
+    filtered = [1.0, -2.0 * shrink * np.cos(turn), shrink**2]
+    made = [
+        lfilter([1.0], filtered, np.random.default_rng(seed).standard_normal(COUNT + 500))[500:]
+        for seed in range(20)
+    ]
+    at = int(2 * COUNT * INTERVAL_S * 2.2)
+    seen = np.array([estimated(each).variance[at - 20 : at + 20].mean() for each in made])
+    true = 1.0 / np.abs(np.polyval(filtered[::-1], np.exp(-1j * turn))) ** 2
+    assert np.exp(np.mean(np.log(seen))) > 0.3 * true
+
+
 @pytest.mark.parametrize("scale", [1e-9, 0.3, 1e3])
 def test_the_noise_follows_the_unit(scale: float) -> None:
     readings = white(np.random.default_rng(7))

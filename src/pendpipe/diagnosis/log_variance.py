@@ -118,6 +118,11 @@ def log_variance(squares: Squares, smooth: Sequence[Smooth]) -> LogVariance:
     return LogVariance(mean, covariance, constant, best.charge + averaged)
 
 
+def stands_out(ratio: FloatArray | float) -> BoolArray:
+    """Return whether squares that are so many times the variance are more probably no noise."""
+    return np.asarray((np.asarray(ratio) > 1.0) & (ratio - np.log(ratio) > _NOT_NOISE))
+
+
 def _prior(smooth: Sequence[Smooth]) -> FloatArray:
     """Return the probability of each combination of strengths."""
     others = [len(each.strengths) - 1 for each in smooth]
@@ -144,7 +149,7 @@ def _at_strengths(squares: Squares, smooth: Sequence[Smooth], strengths: Sequenc
     for _ in range(_CLEANINGS):
         log = columns @ at
         ratio = value / np.exp(np.repeat(log, width) + middle)
-        lines = may_be_line & (ratio > 1.0) & (ratio - np.log(ratio) > _NOT_NOISE)
+        lines = may_be_line & stands_out(ratio)
         clean = squares.known & ~lines
         changed = not np.array_equal(clean, noise)
         noise = clean

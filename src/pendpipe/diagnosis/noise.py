@@ -8,11 +8,13 @@ from functools import lru_cache
 from typing import ClassVar, Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.fft import dct, idct
+from scipy.ndimage import maximum_filter1d, median_filter
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.log_variance import Smooth, Squares, log_variance
+from pendpipe.diagnosis.log_variance import Smooth, Squares, log_variance, stands_out
 
 _HARMONICS: Final = 7
 _HARMONIC_HALF_WIDTH: Final = 0.08
@@ -47,6 +49,13 @@ _READINGS_AT_ENDS: Final = 100.0
 """Readings over which the leakage of the ends of a filtered record adds up."""
 _SLOWEST_LINE: Final = 6
 """The cosine with three cycles in the record: what is slower is a drift and no line."""
+_BESIDE: Final = 12
+_LINE: Final = 2
+"""Cosines beside a line, and how far the line itself reaches: two to 1/duration."""
+_MEDIAN_OF_A_SQUARE: Final = 0.455
+"""Of a normal number, over its mean."""
+_LEAKED: Final = 0.2
+"""Part of the power from which a line's leak is no noise: the leak itself has nodes."""
 _ORDER: Final = 4
 """Of the differences that measure fast noise, as in `analysis.noise`."""
 
@@ -282,7 +291,8 @@ def _with_spectrum(
     smooth = [slow if red else Smooth(slow.columns, (0.0,)), fast]
     filled = count / max(float(np.sum(noise.weight > 0.0)), 1.0)
     power = dct(residual * noise.scale, norm="ortho") ** 2 * filled
-    found = log_variance(Squares(power, noise_only, starts, _SLOWEST_LINE), smooth)
+    known = noise_only & ~_about_lines(power, noise_only)
+    found = log_variance(Squares(power, known, starts, _SLOWEST_LINE), smooth)
     if found.constant > 0.5:
         width = np.diff(np.append(starts, count))
         variance = np.full(count, math.exp(float(found.mean @ width) / count))
@@ -297,6 +307,30 @@ def _with_spectrum(
         uncertainty=found.covariance,
         charge=found.charge,
     )
+
+
+def _about_lines(power: FloatArray, noise_only: BoolArray) -> BoolArray:
+    """Return the cosines that a line reaches: what it leaks there, or as it dies away, is no noise.
+
+    A line stands out of the frequencies on both of its sides, as no resonance of a stand does that
+    is wider, and no red noise. To a distance d it leaks 1/d^2 of its power.
+    """
+    width, cosine = 2 * _BESIDE + 1, np.arange(len(power))
+    heard = np.where(noise_only, power, 0.0)
+    largest = maximum_filter1d(heard, width, mode="constant")
+    peaks = np.flatnonzero(noise_only & (power == largest) & (cosine >= _SLOWEST_LINE))
+    windows = sliding_window_view(np.pad(heard, _BESIDE), width)[peaks]
+    leaks = np.zeros(len(power))
+    for peak, window in zip(peaks, windows, strict=True):
+        sides = window[: _BESIDE - _LINE], window[_BESIDE + _LINE + 1 :]
+        beside = max(float(np.median(side[side > 0.0])) for side in sides if side.any())
+        if stands_out(power[peak] * _MEDIAN_OF_A_SQUARE / beside):
+            leaks += power[peak] / np.maximum(np.abs(cosine - peak), 1) ** 2
+    if not leaks.any():
+        return leaks > 0.0
+    share = leaks * _MEDIAN_OF_A_SQUARE / np.maximum(median_filter(power, _BESIDE), 1e-300)
+    # The half of the cosines that it leaks to least tells the noise in any case.
+    return np.asarray(share > max(_LEAKED, float(np.median(share[noise_only]))))
 
 
 def _leakage(count: int) -> float:
