@@ -25,6 +25,7 @@ from .records import (
     null_fit,
     other_engine,
     recording,
+    white,
 )
 
 CLEAN = other_engine(TRUTH)
@@ -74,10 +75,15 @@ def test_in_few_readings_a_large_slow_error_of_the_zero_is_no_noise(
     assert name in named(readings, 3)
 
 
-def test_what_wanders_more_slowly_than_the_motion_is_told_beside_what_is_faster() -> None:
+@pytest.mark.parametrize("uneven", [0.0, 0.03])
+def test_what_wanders_more_slowly_than_the_motion_is_told_beside_what_is_faster(
+    uneven: float,
+) -> None:
     """A zero that comes and goes has no name; the sentence does not call all of it noise."""
-    wander = 5e-3 * np.exp(-(((TIME_S - 30.0) / 8.0) ** 2))
-    found = diagnose_recording(recording(CLEAN + wander, 3)).diagnosis
+    time_s = TIME_S + np.where(np.arange(len(TIME_S)) % 2, 0.0, uneven * INTERVAL_S)
+    wander = 5e-3 * np.exp(-(((time_s - 30.0) / 8.0) ** 2))
+    angle_rad = other_engine(TRUTH, time_s) + wander + white(3)
+    found = diagnose_recording(Recording(time_s, angle_rad, "angle_rad")).diagnosis
     assert not found.effects
     assert found.statement.startswith("Eq. 8 describes the motion of this recording, whose zero")
     assert "the zero wanders by 1.4" in found.statement

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from scipy.fft import prev_fast_len
 
 from pendpipe.arrays import BoolArray, FloatArray
@@ -13,6 +14,8 @@ from pendpipe.arrays import BoolArray, FloatArray
 _NOISE_RATIOS: Final = tuple(np.linspace(0.04, 0.5, 12))
 """Noise over step, at the values that are tried."""
 _NEEDED_GAIN: Final = 12.0
+_UNEVEN: Final = 0.02
+"""Part of an interval by which evenly spaced readings may be off."""
 _MOST_UNEVEN: Final = 2
 """Largest number of unevenly spaced readings, over `most`."""
 _FEWEST_IN_CYCLE: Final = 24.0
@@ -170,7 +173,13 @@ def gather(
     """
     intervals = np.diff(time_s)
     interval = float(np.median(intervals))
-    uniform = bool(np.all(np.abs(intervals - interval) < 0.02 * interval)) and not counts
+    rows = np.arange(len(time_s))
+    even = Polynomial.fit(rows, time_s, 1)(rows)
+    if np.all(np.abs(time_s - even) < _UNEVEN * interval):
+        # Stamps that are rounded to milliseconds differ in their intervals.
+        intervals = np.diff(even)
+        interval = float(intervals[0])
+    uniform = bool(np.all(np.abs(intervals - interval) < _UNEVEN * interval)) and not counts
     fold = 1
     if uniform and len(time_s) > most:
         fold = max(1, int(min(len(time_s) // most + 1, period_s / interval / _FEWEST_IN_CYCLE)))

@@ -65,7 +65,7 @@ def wander_note(noise: Noise, data: Data, fit: Fit) -> str | None:
     slower = max(int(_SLOWER * omega / math.pi * count * data.interval_s), 1)
     power = dct(data.residual(fit.at.reading) * data.weight, norm="ortho") ** 2 / count
     slow, fast = float(power[:slower].sum()), float(power[slower:].sum())
-    if not (data.uniform and noise.coloured) or slow < fast:
+    if data.time_noise or not noise.coloured or slow < fast:
         return None
     wander, rest = (compact(math.sqrt(part), data.unit) for part in (slow, fast))
     return (
