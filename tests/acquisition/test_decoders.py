@@ -66,6 +66,18 @@ def test_digital_inputs_do_not_reach_the_analog_reading() -> None:
     assert counts.tolist() == [[1234 - 2048]]
 
 
+def test_a_stream_goes_on_behind_a_hole_without_what_was_told_before_it() -> None:
+    """A stray byte before the hole is told once."""
+    decoder = SyncBitDecoder(1, 12)
+    scan = bytes.fromhex("90 4D")
+    assert not decoder.feed(scan + scan[1:]).losses
+    assert [loss.discarded_bytes for loss in decoder.finish().losses] == [1]
+    behind = decoder.feed(scan)
+    assert behind.counts.tolist() == [[1234 - 2048]]
+    assert not behind.losses
+    assert not decoder.finish().losses
+
+
 @pytest.mark.parametrize(
     ("received", "count"),
     [("FF 7F", 32767), ("00 80", -32768), ("FF FF", -1), ("00 40", 16384), ("F0 7F", 32752)],

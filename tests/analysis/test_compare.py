@@ -149,6 +149,12 @@ def test_two_records_of_one_frequency_have_no_slope_between_them() -> None:
     assert sorted(np.isnan(low.local_slopes)) == [False] * 6 + [True]
 
 
+def test_a_branch_of_one_frequency_has_no_exponent() -> None:
+    records = water_records()
+    found = campaign([*records[:8], records[-1], replace(records[-1], record="twin")])
+    assert set(found.exponents) == {"high"}
+
+
 @given(exponent=st.floats(-6.0, 2.0), curvature=st.floats(-3.0, 3.0))
 @settings(max_examples=25, deadline=None)
 def test_slope_and_curvature_of_an_exact_branch(exponent: float, curvature: float) -> None:

@@ -120,6 +120,13 @@ def test_every_code_of_a_converter_comes_back_exactly(
     assert again.metadata["recorded_at"] == "2026-11-21T06:52:29+00:00"
 
 
+def test_a_day_counted_in_seconds_since_1970_is_kept(tmp_path: Path) -> None:
+    recording = volts(SWING)
+    recording.metadata["recorded_at"] = "1795243949.250000 s since 1970"
+    write(tmp_path / "a.wdh", recording)
+    assert read(tmp_path / "a.wdh").metadata["recorded_at"].startswith("2026-11-21T06:52:29")
+
+
 def test_a_pause_is_told_by_a_stamp_and_exactly_by_a_comment(tmp_path: Path) -> None:
     recording = volts(SWING)
     time_s = recording.time_s.copy()

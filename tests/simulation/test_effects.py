@@ -171,6 +171,15 @@ def test_clipping_glitches_steps_and_codes(tmp_path: Path) -> None:
     assert len(own_codes) - len(fewer) == 2
 
 
+def test_a_soft_limit_bends_either_side_alike(tmp_path: Path) -> None:
+    """The law y = L - w ln(1 + e^((L - x)/w)), and its mirror image at the lower limit."""
+    own, width = simulate(model(tmp_path)).values, 0.01
+    for side, level in ((1.0, "upper_level"), (-1.0, "lower_level")):
+        given = table("clipping", width=width, **{level: 0.12 * side})
+        expected = 0.12 - width * np.log1p(np.exp((0.12 - side * own) / width))
+        np.testing.assert_allclose(side * simulate(model(tmp_path, given)).values, expected)
+
+
 @pytest.mark.parametrize(
     ("more", "message"),
     [
