@@ -170,6 +170,18 @@ def test_a_record_is_predicted_from_the_others_as_a_refit_would() -> None:
     assert densities[number] == pytest.approx(expected, abs=0.01)
 
 
+@pytest.mark.parametrize("sigmas", [-6.0, 6.0])
+def test_a_record_with_too_large_a_loss_is_pulled_up(sigmas: float) -> None:
+    design, number = default(), 6
+    measured = data(design)
+    values = measured.values.copy()
+    values[number, 1] += sigmas / np.linalg.norm(measured.whitening[number, :, 1])
+    _, pulls = held_out(joint_fit(design, measured._replace(values=values)))
+    assert int(np.argmax(np.abs(pulls))) == number
+    assert pulls[number] * sigmas > 0.0
+    assert abs(pulls[number]) > 2.0
+
+
 def test_a_class_of_two_is_told_apart_by_another_fluid_and_not_by_repeats() -> None:
     design = default()
     added = named("uniform-drag-excess")

@@ -8,6 +8,10 @@ import mpmath
 import numpy as np
 import pytest
 
+from pendpipe.effects.baseline import pendulum_of
+from pendpipe.effects.curves import usual_loss_rate
+from pendpipe.effects.effect import Span
+
 from .lock_in import lock_in, windows
 from .pendulums import OMEGA, baseline, evaluated, plain, reading, times
 
@@ -23,6 +27,13 @@ def fall_rates(
         (window.amplitude, window.decay * window.amplitude)
         for window in windows(TIME, found, OMEGA, 8, 9)
     ]
+
+
+def test_the_usual_loss_is_that_of_the_middle_amplitude() -> None:
+    """From 0.4 to 0.1 rad that is 0.2 rad: a y + b + c/y, and 1e-4 of omega for a lossless one."""
+    span = Span(0.0, 100.0, 0.05, pendulum_of(baseline(a=0.1, b=0.02, c=1e-3)), 0.4, 0.1)
+    expected = 0.1 * 0.2 + 0.02 + 1e-3 / 0.2 + 1e-4 * OMEGA
+    assert usual_loss_rate(span.pendulum, span) == pytest.approx(expected, rel=1e-12)
 
 
 def g(exponent: float) -> float:
