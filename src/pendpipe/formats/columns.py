@@ -203,8 +203,8 @@ def _parts(table: Table, options: ReadOptions) -> list[str]:
 
 def _settled(column: Column) -> Column:
     """Undo a clock's overflow; and "run1" counts nothing where it swings."""
-    if column.role == "time":
-        return replace(column, values=_counted_on(column.values))
+    if column.role == "time" or not column.name:
+        column = replace(column, values=_counted_on(column.values))
     swings = column.role == "index" and column.swing.clear
     return replace(column, role="unknown") if swings else column
 
@@ -212,13 +212,14 @@ def _settled(column: Column) -> Column:
 def _whole_times(columns: list[Column]) -> list[Column]:
     """Add to a time in whole seconds the part of a second that stands in the next column."""
     for whole, part in pairwise(columns):
-        unit = unit_of(part.unit) or unit_of(part.name)
-        if whole.role != "time" or unit is None or unit.kind != "time":
+        unit = unit_of(part.unit or part.name or ("" if whole.name else "ns"))
+        if (whole.name and whole.role != "time") or unit is None or unit.kind != "time":
             continue
         steps, fraction = np.diff(whole.values), part.values * unit.factor
         in_part = unit.factor < 1.0 and fraction.min() >= 0.0 and 0.5 < fraction.max() < 1.0
         in_whole = len(steps) > 0 and steps.min() >= 0.0 and set(np.unique(steps)) <= {0.0, 1.0}
-        if in_part and in_whole and np.any(np.diff(fraction) < 0.0):
+        falls = np.diff(fraction) < 0.0
+        if in_part and in_whole and np.any(falls) and np.all(steps[falls] == 1.0):
             one = replace(whole, values=whole.values + fraction, unit="s")
             return [one if c is whole else c for c in columns if c is not part]
     return columns
@@ -230,7 +231,8 @@ def _counted_on(values: FloatArray) -> FloatArray:
     for turn in (2.0**16, 2.0**32):
         over = steps < -0.5 * turn
         across = np.abs(steps[over] + turn).max(initial=0.0)
-        if over.any() and values.max() < turn and across < 10.0 * np.median(np.abs(steps)):
+        on = over.any() and values.max() < turn and steps[~over].min(initial=1.0) >= 0.0
+        if on and across < 10.0 * np.median(np.abs(steps)):
             return np.asarray(values + turn * np.append(0, np.cumsum(over)))
     return values
 

@@ -466,7 +466,10 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
         unit, step, weak = recording.unit, recording.resolution, recording.weak_guesses
         notes = list(recording.notes)
     except InputError as fault:
-        base = time_base(table, choice, options)
+        try:
+            base = time_base(table, choice, options)
+        except InputError:
+            raise fault from None
         time, values = base.time_s, column.values[base.rows]
         unit, step = column.unit, column.resolution or find_step(values)
         notes = [*table.notes, *choice.notes, f"the readings can't be analysed: {fault.problem}"]

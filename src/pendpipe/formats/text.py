@@ -98,7 +98,14 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
     for begins, own_form in _DIALECTS:
         if begins.match("\n".join(lines[:50])):
             lines = own_form(lines)
-    for form_of in (_in_rows, _bare_cells, _without_words, _without_split_decimals, _upright):
+    for form_of in (
+        _of_several_lines,
+        _in_rows,
+        _bare_cells,
+        _without_words,
+        _without_split_decimals,
+        _upright,
+    ):
         lines = form_of(lines)
     layout = guess_layout(lines, options)
     first = first_row(lines, layout)
@@ -147,23 +154,24 @@ def _without_tags(text: str) -> str:
 def _of_labview(lines: list[str]) -> list[str]:
     """Make of the two headers that LabVIEW writes (.lvm) remarks and one row of names."""
     ends = [row for row, line in enumerate(lines[:100]) if line.startswith("***End_of_Header***")]
-    at = max(ends, default=-1) + 1
+    at = max(ends[:2], default=-1) + 1
     told = {key: cells for key, *cells in (line.split("\t") for line in lines[:at])}
     names = [name for name in lines[at].split("\t") if name not in ("Comment", "")]
     units = ["s", *told.get("Y_Unit_Label", [])][: len(names)]
     head = [f"{n} ({u})" if u else n for n, u in zip_longest(names, units, fillvalue="")]
     bare = told.get("X_Columns") == ["No"]  # then the rows begin with an empty cell
-    rows = [line[bare:].rstrip("\t") for line in lines[at + 1 :]]
+    # Each segment has a header of its own.
+    below = (line for line in lines[at + 1 :] if not re.match(r"[A-Z*]", line))
+    rows = [line[bare:].rstrip("\t") for line in below]
     return [*("# " + line for line in lines[:at]), "\t".join(head[bare:]), *rows]
 
 
 def _of_octave(lines: list[str]) -> list[str]:
-    """Put columns that Octave saves below one another beside one another."""
-    blocks = re.split(r"^# name: ", "\n".join(lines), flags=re.M)[1:]
-    columns = [
-        [b.split("\n", 1)[0], *re.findall(r"^ *([^#\s]+) *$", b.split("\n", 1)[-1], re.M)]
-        for b in blocks
-    ]
+    """Put what Octave saves below one another, columns, rows and matrices, side by side."""
+    blocks = [block.split("\n") for block in "\n".join(lines).split("# name: ")[1:]]
+    rows = [[line.split() for line in b[1:] if line.strip() and line[:1] != "#"] for b in blocks]
+    across = [each if len(each) == 1 else zip(*each, strict=False) for each in rows]
+    columns = [[b[0], *cells] for b, some in zip(blocks, across, strict=True) for cells in some]
     longest = max(map(len, columns), default=0)
     columns = [column for column in columns if len(column) == longest]
     return ["\t".join(row) for row in zip(*columns, strict=True)] if longest > 4 else lines
@@ -193,10 +201,10 @@ def _of_tektronix(lines: list[str]) -> list[str]:
 def _of_igor(lines: list[str]) -> list[str]:
     """Make of Igor's text a table: names above, and the interval, which stands below."""
     text = "\n".join(lines)
-    scale = re.search(r"SetScale */P +x *,[^,]*,([^,]*),", text)
-    unit = re.search(r'SetScale +[yd] *,[^,]*,[^,]*, *"([^"]+)"', text)
-    names = lines[1].partition(" ")[2] if " " in lines[1] else lines[1].partition("\t")[2]
-    names = re.sub(r"[,\s]+", "\t", names.strip()) + (f" ({unit[1]})" if unit else "")
+    scale = re.search(r"SetScale */P +x[ ,]+[^,]*,([^,]*),", text)
+    said = re.findall(r'SetScale(?: */P)? +[yd][ ,]+[^,]*,[^,]*, *"([^"]+)", *(\w+)', text)
+    units = {name: f"{name} ({unit})" for unit, name in said}
+    names = "\t".join(units.get(name, name) for name in re.split(r"[,\s]+", lines[1].strip())[1:])
     rows = [line.strip() for line in lines[2:] if not re.match(r"\s*(BEGIN|END|X )", line)]
     return [f"# dt = {scale[1].strip()} s" if scale else "#", names, *rows]
 
@@ -207,9 +215,27 @@ def _of_origin(lines: list[str]) -> list[str]:
     return [*(re.sub(r"^[A-Z].*", "#", line) for line in head), *lines[6:]]
 
 
+_SEGMENT: Final = re.compile(
+    r"(?:TIMESERIES|WID2)\b(?=.*?(?:\bINT +\d+|, \d+ samples,) +(?![0.]+\b)(\d+\.?\d*)\b)"
+    r".*?(\d{4})[-/](\d\d)[-/](\d\d[T ][\d:.]+).*\n(?:[A-Z].*\n)*([-+\d.eE\s]*)"
+)
+
+
 def _of_seismograph(lines: list[str]) -> list[str]:
-    """Put the samples of an SLIST, several in a line, below one another."""
-    return [f"# {lines[0]}", *" ".join(lines[1:]).split()]
+    """Put the samples of SLIST and GSE2, several in a line, below one another, with their times."""
+    unit = [*re.findall(r", (\S+)$", lines[0]), "counts"][0]
+    rows = [f"time (s)\tchannel ({unit})"]
+    for rate, *date, samples in _SEGMENT.findall("\n".join(lines)):
+        start = column_of_clock_times(["-".join(date)])
+        first_s = 0.0 if start is None else float(start[0])
+        cells = enumerate(samples.split())
+        rows += [f"{first_s + at / float(rate):.6f}\t{cell}" for at, cell in cells]
+    return rows
+
+
+def _of_sac(lines: list[str]) -> list[str]:
+    """Put the samples of SAC's text below one another: first of all stands their interval."""
+    return [f"# dt = {lines[0].split()[0]} s", *" ".join(lines[30:]).split()]
 
 
 _DIALECTS: Final[tuple[tuple[re.Pattern[str], Callable[[list[str]], list[str]]], ...]] = (
@@ -219,7 +245,8 @@ _DIALECTS: Final[tuple[tuple[re.Pattern[str], Callable[[list[str]], list[str]]],
     (re.compile('"?Record Length"?,'), _of_tektronix),
     (re.compile(r"IGOR\s*\nWAVES"), _of_igor),
     (re.compile(r"Long Name\t"), _of_origin),
-    (re.compile("TIMESERIES .*SLIST"), _of_seismograph),
+    (re.compile(r"(?:.*\n){0,9}WID2 .* INT |TIMESERIES .*SLIST"), _of_seismograph),
+    (re.compile(r"(?: *\S+(?: +\S+){4} *\n){22}.*-12345"), _of_sac),
 )
 """Texts that are no plain table, by how they begin."""
 
@@ -233,11 +260,49 @@ def _bare_cells(lines: list[str]) -> list[str]:
     return lines
 
 
-_CLOTHED: Final = (
+_MONTH: Final = "jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec"
+_CLOTHED: Final[tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...]] = (
     (re.compile(r"(?<=\d)\s*(?:±|\+/?-)\s*\d+(?:\.\d+|,\d+(?=[^,]*[;\t]|[^,]*$))?"), ""),
     (re.compile(r"^([^;]*\d);\s*$"), r"\1"),
+    (
+        re.compile(r"^(\d{1,2}:\d\d:\d\d[.,]\d+) -> (?=[^,;\t=:]*([,;\t]))"),
+        lambda found: found[1] + found[2],
+    ),
+    (
+        re.compile(rf"(?i)\b(\d\d?)[- ]({_MONTH})[a-z]*[- ](?=\d{{4}}\b)"),
+        lambda found: f"{found[1]}.{_MONTH.index(found[2].lower()) // 4 + 1}.",
+    ),
+    (
+        re.compile(rf"(?i)\b[a-z]{{3}} ({_MONTH}) +(\d+) ([\d:.]+) (\d{{4}})\b"),
+        lambda found: f"{found[2]}.{_MONTH.index(found[1].lower()) // 4 + 1}.{found[4]} {found[3]}",
+    ),
 )
-"""Errors (``± 0.1``); rows that end in ``;``."""
+"""Errors (``± 0.1``); rows that end in ``;``; a serial monitor's clock; months as words."""
+
+
+def _of_several_lines(lines: list[str]) -> list[str]:
+    """Join the lines of each record: blocks of ``name: value``, XML, two prints a sample."""
+    filled = [line for line in lines if line.strip()]
+    shapes = [_shape(line) for line in filled[:400]]
+    alike = (
+        (sum(map(str.__eq__, shapes, shapes[n:])) / max(1, len(shapes) - n), n)
+        for n in range(1, _FEW_LINES * 5)
+    )
+    length = next((n for share, n in alike if share > 0.9), 1)
+    again = zip(shapes, shapes[length:], strict=False)
+    start = next((at for at, (one, other) in enumerate(again) if one == other), 0)
+    record = filled[start : start + length]
+    widths = {len(re.split(r"[\t;,]| +", line.strip())) for line in record}
+    if length == 1 or (len(widths) == 1 and widths != {1}):
+        return lines
+    sign = next((sign for sign in "\t;," if any(sign in line for line in record)), " ")
+    starts = range(start, len(filled), length)
+    return [*filled[:start], *(sign.join(filled[at : at + length]) for at in starts)]
+
+
+def _shape(line: str) -> str:
+    """What a line says beside its numbers."""
+    return " ".join(_TOKEN.sub("\0", line[:_LONGEST_ROW]).split())
 
 
 def _in_rows(lines: list[str]) -> list[str]:
@@ -253,8 +318,8 @@ _TOKEN: Final = re.compile(
     r"|(?<![\w.])[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:(?:[eE]|\*\^)[+-]?\d+)?"
 )
 """A time of day, or a number (Mathematica's ``1.2*^-3`` too)."""
-_SAID: Final = re.compile(r"([^\W\d]\w*)\s*[:=]\s*\"?\s*$")
-_WORDS: Final = re.compile(r"[^\W\d]\w*\s*[:=]\s*\"?\0|(->|[\[({]|\])\s*\0")
+_SAID: Final = re.compile(r"(?:([^\W\d]\w*)['\"]?\s*[:=]\s*(?:- |\[)?\s*['\"]?|<(\w+)[^<>]*>)\s*$")
+_WORDS: Final = re.compile(r"[^\W\d]\w*['\"]?\s*[:=]\s*(?:- )?['\"]?\0|(->|[\[({>]|\])\s*\0")
 
 
 def _without_words(lines: list[str]) -> list[str]:
@@ -264,17 +329,17 @@ def _without_words(lines: list[str]) -> list[str]:
     ``12:03:04.5 -> 0.3``, ``(0.1, 0.2),``. The words become the names.
     """
     some = [line for line in lines[:100] if line.strip() and len(line) < _LONGEST_ROW]
-    shapes = Counter(" ".join(_TOKEN.sub("\0", line).split()) for line in some)
+    shapes = Counter(map(_shape, some))
     shape, many = shapes.most_common(1)[0] if shapes else ("", 0)
-    if 2 * many <= len(some) or not _WORDS.search(shape):
+    if 2 * many <= len(some) + 1 or not _WORDS.search(shape):
         return lines
     said = [_SAID.search(piece) for piece in shape.split("\0")[:-1]]
-    behind = [piece.split()[:1] for piece in re.sub(r"[,;|)\]}\"]", " ", shape).split("\0")[1:]]
+    behind = [piece.split()[:1] for piece in re.sub(r"->|[,;|)\]}\"]", " ", shape).split("\0")[1:]]
     units = [word[0] if word and unit_of(word[0]) else "" for word in behind]
-    names = "\t".join(each[1] if each else "" for each in said)
+    names = "\t".join(each[1] or each[2] if each else "" for each in said)
     rows, first = list(lines), len(lines)
     for row, line in enumerate(lines):
-        if len(line) < _LONGEST_ROW and " ".join(_TOKEN.sub("\0", line).split()) == shape:
+        if len(line) < _LONGEST_ROW and _shape(line) == shape:
             rows[row] = "\t".join(
                 f"{cell.replace(' ', 'T').replace('*^', 'e')} {unit}".strip()
                 for cell, unit in zip(_TOKEN.findall(line), units, strict=True)
@@ -552,7 +617,7 @@ def column_of_numbers(cells: Sequence[str], layout: Layout, column: Column) -> C
 
 _CLOCK: Final = re.compile(
     r"(?:0 days? )?"
-    r"(?:(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})[T ,]+|(\d{1,2})[-/.](\d{1,2})[-/.](\d{4})[T ,]+)?"
+    r"(?:(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})[T ,]+|(\d{1,2})[-/.](\d{1,2})[-/.](\d{4}|\d\d)[T ,]+)?"
     r"(?:(\d{1,3})[:.])?(\d{1,2})[:.](\d{1,2}(?:[.,:]\d+)?)"
     r"\s*(am|pm)?\s*(?:z|utc|[+-]\d{2}:?\d{2})?",
     re.I,
@@ -562,9 +627,9 @@ _CLOCK: Final = re.compile(
 def column_of_clock_times(cells: Sequence[str]) -> FloatArray | None:
     """Turn ``12:34:56.7``, ``0:05.2`` or ``2024-05-01T12:34:56`` into seconds.
 
-    Times of day that pass midnight go on; dates are counted from 1 January 1970. Of two
-    parts the last is seconds. A day and month that could be either are taken as month/day
-    with slashes, as day.month else: it matters at midnight only.
+    Times of day that pass midnight go on, and minutes that pass the hour; dates are counted
+    from 1 January 1970. Of two parts the last is seconds. A day and month that could be either
+    are taken as month/day with slashes, as day.month else: it matters at midnight only.
 
     Returns
     -------
@@ -590,7 +655,8 @@ def column_of_clock_times(cells: Sequence[str]) -> FloatArray | None:
     if min(days.values()) < 0:
         return None
     if seconds.max() < 86400:
-        seconds -= 86400.0 * np.cumsum(np.rint(np.diff(seconds, prepend=seconds[0]) / 86400.0))
+        turn = 86400.0 if any(match and match[7] for match in matches) else 3600.0
+        seconds -= turn * np.cumsum(np.rint(np.diff(seconds, prepend=seconds[0]) / turn))
     return seconds
 
 
@@ -602,7 +668,7 @@ def _days(date: tuple[str | None, ...], slashed: bool) -> int:
     year, month, day = parts[:3] if date[0] else parts[:2:-1]
     if not date[0] and (month > 12 or (slashed and day <= 12)):
         day, month = month, day
-    return dt.date(year, month, day).toordinal() - 719163
+    return dt.date(year + 2000 * (year < 100), month, day).toordinal() - 719163
 
 
 def _without_cut_row(
@@ -729,7 +795,8 @@ def _columns(
         else:
             words.append(texts)
             # "0.123,V": the unit stands in a column of its own.
-            if columns and unit_of(texts[0]) and not columns[-1].unit and len(set(texts)) == 1:
+            same = len(set(texts)) == 1 and not is_blank(texts[0])
+            if columns and unit_of(texts[0]) and not columns[-1].unit and same:
                 columns[-1] = replace(columns[-1], unit=texts[0])
     return columns, words
 
@@ -811,7 +878,7 @@ def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
     filled = [(number, line) for number, line in enumerate(above, start=1) if line.strip()]
     names_at, cells = _names(filled, layout)
     _refuse_damaged_rows(place, filled, names_at, layout.split(row), layout)
-    interval = _interval([line for _, line in filled[-300:]])
+    interval = interval_of([line for _, line in filled[-300:]])
     metadata = _metadata([line for _, line in filled])
     if not cells:
         return Header(
@@ -822,7 +889,8 @@ def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
     names, units = [name for name, _ in pairs], [unit for _, unit in pairs]
     row_of_units = _row_of_units([line for number, line in filled if number > names_at], layout)
     if row_of_units:
-        units = [unit or own for unit, own in zip(row_of_units, units, strict=True)]
+        said = zip(row_of_units[-len(units) :], units, strict=True)
+        units = [unit or own for unit, own in said]
     if missing := layout.width - len(cells):
         names, units = [""] * missing + names, [""] * missing + units
         notes = (f"the header names {len(cells)} of {layout.width} columns: taken as the last",)
@@ -867,7 +935,8 @@ def _trimmed(cells: list[str], width: int) -> list[str]:
 
 def _are_units(cells: Sequence[str]) -> bool:
     """Say whether a row holds nothing but units: known ones, or all in brackets."""
-    filled = [cell for cell in cells if cell]
+    label = r"(?i)(units?|einheit(en)?|unidad(es)?|unit[àé]s?|eenhe(id|den))?"
+    filled = [cell for cell in cells if not re.fullmatch(label, cell)]
     bracketed = all(re.fullmatch(r"[\[({<].*[\])}>]", cell) for cell in filled)
     known = [unit_of(cell) is not None for cell in filled]
     return any(known) and (bracketed or all(known))
@@ -876,7 +945,7 @@ def _are_units(cells: Sequence[str]) -> bool:
 def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list[str]]:
     """Find the line of names: the last (but for a row of units) that fits the columns."""
     candidates: list[tuple[int, int, list[str]]] = []
-    for number, line in filled:
+    for above, (number, line) in pairwise([(0, ""), *filled]):
         bare = line.strip().lstrip("".join(COMMENT)).strip()
         own = layout.split(line)
         if candidates and len(own) == layout.width and all(map(layout.is_number, own)):
@@ -904,9 +973,12 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
                 texts
                 and len(cells) / 2 <= texts <= len(cells) <= layout.width
                 and not ((candidates or layout.width < 4) and any(numbers))
-                and not (_are_units(cells) and candidates and candidates[-1][0] == len(cells))
+                and not (
+                    _are_units(cells)
+                    and [(above[0], len(cells))] == [(n, len(c)) for _, n, c in candidates[-1:]]
+                )
             ):
-                candidates.append((len(cells), number, cells))
+                candidates.append((sum(map(bool, cells)), number, cells))
                 break
     _, number, names = max(candidates, key=lambda entry: entry[:2], default=(0, 0, []))
     return number, names
@@ -949,7 +1021,7 @@ def _refuse_damaged_rows(
         )
 
 
-def _interval(lines: Sequence[str]) -> float | None:
+def interval_of(lines: Sequence[str]) -> float | None:
     """Find the time between samples in ``Sample rate: 100 Hz`` and its relatives."""
     for (line, follower), (word, inverse) in product(
         zip(lines, [*lines[1:], ""], strict=False),

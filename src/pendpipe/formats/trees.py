@@ -7,6 +7,7 @@ a type, a byte count and the data, padded to eight bytes; arrays are elements th
 
 import io
 import json
+import re
 import struct
 import zlib
 from collections.abc import Callable, Iterator, Mapping
@@ -30,22 +31,9 @@ from pendpipe.formats.table import (
     next_reader_if,
     swing_of,
 )
-from pendpipe.formats.text import column_of_clock_times, table_of_text
+from pendpipe.formats.text import column_of_clock_times, interval_of, table_of_text
 from pendpipe.formats.words import role_of, split_header
 
-_SLOWEST_HZ, _FASTEST_HZ = 1e-9, 1e12
-"""What a rate or an interval may be."""
-_RATES = (
-    "fs",
-    "fps",
-    "samplerate",
-    "sample_rate",
-    "srate",
-    "rate",
-    "sampling_rate",
-    "samplingrate",
-)
-_INTERVALS = ("dt", "ts", "tsample", "sampletime", "sample_time", "t_s", "deltat")
 _MOST: Final = 1 << 27
 """Numbers that an array may hold."""
 _LARGEST_JSON: Final = 64 << 20
@@ -98,12 +86,16 @@ def _numbers(tree: Any, path: str = "", depth: int = 0) -> Iterator[tuple[str, F
     """Walk through dictionaries, lists and structures; give every real array as columns."""
     if depth > 12 or tree is None:
         return
+    if isinstance(tree, dict) and tree and all(str(key).isdigit() for key in tree):
+        tree = list(tree.values())  # as pandas numbers the rows of a column
     tree = _array_of_list(tree) if isinstance(tree, list) else tree
     label = tree.get("label") if isinstance(tree, dict) and "values" in tree else None
     if isinstance(label, str) and label.strip():
         # Simulink's "structure with time" names a signal in its label.
         path, tree = label.strip(), {"values": tree["values"]}
-    array = np.asarray(tree)
+    array: Any = np.asarray(tree)
+    kind = array.dtype.kind
+    array = array.astype(f"{kind}8[ns]").astype(float) / 1e9 if kind in "mM" else array
     records = {name: array[name] for name in array.dtype.names or ()}
     named = tree if isinstance(tree, dict) else records
     inside = {f"{path}.{name}" if path else str(name): value for name, value in named.items()}
@@ -163,10 +155,11 @@ def _one_clock(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
 
 
 def _interval(arrays: dict[str, FloatArray]) -> float | None:
-    single = ((_last(name).lower(), v[0]) for name, v in arrays.items() if v.size == 1)
-    known = (each for each in single if _SLOWEST_HZ < each[1] < _FASTEST_HZ)
-    word, value = next((each for each in known if each[0] in _RATES + _INTERVALS), ("", None))
-    return value and float(1.0 / value if word in _RATES else value)
+    """Find a single number that is named as a header would name a rate or an interval."""
+    single = ((_last(name), v.item()) for name, v in arrays.items() if v.size == 1)
+    full = ((re.sub(r"(?i)^s?(?=rate$|freq)", "sample ", name), value) for name, value in single)
+    lines = [f"{re.sub('(?i)^t_?s(ample)?$', 'ts', name)}: {value!r}" for name, value in full]
+    return interval_of(lines)
 
 
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
@@ -199,11 +192,11 @@ def _of_hdf5(place: Path, data: bytes, form: str, options: ReadOptions) -> Table
             path = name.replace("/", ".")
             tree[path] = node[()]
             unit = node.attrs.get("units", node.attrs.get("unit", ""))
-            rates = {key: node.attrs[key] for key in (*_RATES, *_INTERVALS) if key in node.attrs}
-            tree.update({f"{path}.{key}": value for key, value in rates.items()})
+            tree.update({f"{path}.{key}": value for key, value in node.attrs.items()})
             units[path] = unit.decode("utf-8", "replace") if isinstance(unit, bytes) else str(unit)
 
     with h5py.File(io.BytesIO(data), "r") as file:
+        tree.update(file.attrs)
         file.visititems(gather)  # follows no link to another file
     return table_of_tree(place, tree, form, options, units)
 

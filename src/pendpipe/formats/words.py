@@ -69,7 +69,7 @@ _SPELLINGS: Final[tuple[tuple[Kind, float, str, str], ...]] = (
     ("own", 9.80665, "m/s^2", "g gn gee"),
     ("own", 9.80665e-3, "m/s^2", "mg"),
     ("own", 1.0, "pixels", "px pix pixel pixels píxeles"),
-    ("own", 1.0, "counts", "count counts tick ticks steps lsb digits bit bits adu"),
+    ("own", 1.0, "counts", "count counts cnt cnts tick ticks steps lsb digits bit bits adu"),
     ("own", 1.0, "divisions", "skalenteile skt div divisions"),
     ("own", 1.0, "px/s", "px/s"),
     ("own", 1.0, "lx", "lx lux"),
@@ -106,6 +106,7 @@ def unit_of(text: str) -> Unit | None:
 
 
 _BRACKETED: Final = re.compile(r"\s*[\[({<]\s*([^\])}>]*)\s*[\])}>]\s*")
+_REMARK: Final = re.compile(r"(?<=.)\s*\([^()]*\)$")
 _SLASHED: Final = re.compile(r"^(.+?)\s*/\s*(\S.*)$")
 _SPACED: Final = re.compile(r"^(.+?)(?:\s+in\s+|\s*[,;:]\s*|\s+(?=\S\S))(\S+)$")
 _SUFFIX: Final = re.compile(r"^(.+?)[_\-.]([A-Za-zµ°]+)$")
@@ -144,7 +145,7 @@ def split_header(text: str) -> tuple[str, str]:
             name = f"{text[: found.start()]} {text[found.end() :]}".strip()
             return re.sub(r"(?i)\s*\brun\s*#?\d+\s*$", "", name), found[1].strip()
     for pattern in (_SLASHED, _SPACED, _SUFFIX, _CAMEL):
-        split = pattern.match(text)
+        split = pattern.match(_REMARK.sub("", text))
         # One letter after an underscore is as likely an axis or an index as a unit.
         if split and unit_of(split[2]) and (pattern is not _SUFFIX or _LIKELY.fullmatch(split[0])):
             return split[1].strip(), split[2].strip()
@@ -178,7 +179,8 @@ _WORDS: Final[tuple[tuple[Role, str], ...]] = (
         r"|battery|duty|event|events|torque|moment|drive|driver|driving|motor|exciter|erreger"
         r"|anregung|forzante|forcing|excitation|excitador|func\s?gen\w*|generator|amplitude"
         r"|ampiezza|amplitud|einhüllende|envelope|phase|phasen\w*|fase|func|window|smooth\w*"
-        r"|filter(ed)?|covariance|correlation|tg ?f|magnitude|betrag|absolute(?! (ang|pos|win))",
+        r"|filter(ed)?|covariance|correlation|tg ?f|[abw] t(otal)?|g ?f ?total|magnitude"
+        r"|betrag|absolute(?! (ang|pos|win))",
     ),
     (
         "acceleration",
@@ -224,7 +226,7 @@ _WORDS: Final[tuple[tuple[Role, str], ...]] = (
     (
         "volts",
         r"volts?|\w*voltage|spannung|tension|voltaje|tensione|tensión|напряжение|电压|電圧|u"
-        r"|ch\s?\d*|chn\s?\d*|channel\s?\d*|kanal\s?\d*|ain\d*|ai\d*|adc\d*|a\d|analog\w*"
+        r"|ch\s?\d*v?|chn\s?\d*|channel\s?\d*|kanal\s?\d*|ain\d*|ai\d*|adc\d*|a\d|analog\w*"
         r"|inp?(ut)?\s?\d+|ampl|potential|sensor\w*|signal|output|out|poti\w*",
     ),
     (
