@@ -96,6 +96,16 @@ def test_a_prior_raises_no_effect_that_the_readings_reject(gain: float) -> None:
     assert other <= own
 
 
+def test_a_pendulum_is_one_though_its_torque_is_off_by_less_than_a_hundredth() -> None:
+    """At a gain of 10^8 anything else that is small, an encoder's eccentricity say, weighs more."""
+    cubic = rival(by_identifier("cubic-stiffness"), 1e8)
+    near, far = (rival(by_identifier("circular-error"), 1e8 - behind) for behind in (5e3, 2e4))
+    own, other, _ = probabilities([cubic, near], 1e8 - 5.0)
+    assert other > 2.0 * own
+    own, other, _ = probabilities([cubic, far], 1e8 - 5.0)
+    assert other <= own
+
+
 def test_a_curve_that_fits_better_does_not_lower_a_name() -> None:
     """A real law differs from the catalogue's form by more than that at a gain of 10^5."""
     curve = rival(CURVES[0](null_fit()[0].at.span), 1e5)

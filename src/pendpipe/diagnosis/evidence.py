@@ -37,8 +37,9 @@ SIZE_CHARGE: Final = 6.0
 """Charge for a further size, for gains too large for p-values."""
 NO_SCAN: Final = Chance(Trials(1.0, 0.0), {})
 """Of a curve, which has no shapes to scan."""
-_FAR_BEHIND: Final = 100.0
-"""Difference of chi^2 beyond which a prior can't make an effect more probable than a better one."""
+_FAR_BEHIND: Final = (100.0, 1e-4)
+"""Difference of chi^2, and part of the gain, from which a prior can't make an effect more likely
+than a better one: with 1e-4, the size of a law would be off by a hundredth."""
 
 
 @dataclass(frozen=True)
@@ -333,8 +334,9 @@ def _in_order(logs: FloatArray, rivals: Sequence[Rival]) -> FloatArray:
     """
     evidence = np.array([rival.evidence for rival in rivals])
     drawn = np.array([rival.drawn for rival in rivals])
+    far = max(_FAR_BEHIND[0], _FAR_BEHIND[1] * max(rival.worth for rival in rivals))
     lowered = []
     for log, rival in zip(logs, rivals, strict=True):
-        better = (evidence > rival.evidence + _FAR_BEHIND) & (rival.drawn | ~drawn)
+        better = (evidence > rival.evidence + far) & (rival.drawn | ~drawn)
         lowered.append(np.min(logs[better], initial=log))
     return np.array(lowered)
