@@ -75,6 +75,18 @@ def test_a_short_record_of_a_pendulum_is_a_pendulums_first() -> None:
     assert found.effects[0].probability > 0.95
 
 
+def test_time_stamps_are_corrected_after_sin_x_was_fitted_to_them() -> None:
+    """1511 readings at even times, stamped late at random: a regular clock keeps 1500 of them."""
+    time_s, values = INTERVAL_S * np.arange(1511), np.append(TRUTH, 1.0)
+    values[START] = 0.3
+    readings = Model(time_s, INTERVAL_S, (by_identifier("circular-error"),)).reading(values)
+    late_s = 0.1 * INTERVAL_S * np.random.default_rng(2).random(1511)
+    found = diagnose_recording(Recording(time_s + late_s, readings + white(2, 1511), "angle_rad"))
+    assert len(found.search.data) == 1500
+    assert found.effects[0].identifier == "circular-error"
+    assert any("the readings are not" in note for note in found.search.clock_notes)
+
+
 def test_two_coupled_pendulums_are_two_modes_at_their_frequencies() -> None:
     # x'' = -omega^2 x - kappa (x - z) and z'' = -omega^2 z - kappa (z - x), released at x alone.
     omega, kappa, loss = 4.5, 0.9, 0.015

@@ -307,6 +307,8 @@ def _is_of(fit: Fit, without: Fit, effect: Effect, found: Search) -> bool:
     keys = [each.key for each in (*without.model.effects, effect)]
     if [each.key for each in fit.model.effects] != keys:
         return False
+    if not np.array_equal(fit.model.time_s, without.model.time_s):
+        return False  # the time stamps were corrected after it
     with suppress(NoMotionError):
         now = misfit(fit.model, found.data, found.noise, fit.value)
         return abs(now - fit.chi2) < SETTLED
