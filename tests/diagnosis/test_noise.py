@@ -159,6 +159,18 @@ def test_a_line_leaves_the_noise_about_it_as_it_is(count: int, decay_s: float) -
     np.testing.assert_allclose(np.log(found / alone), 0.0, atol=0.7)
 
 
+@given(st.floats(0.05, 7.0), st.floats(2.0, 60.0), st.integers(40, COUNT))
+def test_the_noise_is_told_whatever_the_harmonics_leave_of_it(
+    frequency_hz: float, cycles: float, count: int
+) -> None:
+    """Beside a single cosine between two harmonics there may be no other."""
+    readings = 2.5e-4 * np.random.default_rng(count).standard_normal(count)
+    readings += 1e-3 * np.cos(2.0 * np.pi * 2.21 * INTERVAL_S * np.arange(count))
+    noise = estimate_noise(data_of(readings), readings, frequency_hz, 0.0, cycles=cycles)
+    assert np.all(noise.variance > 0.0)
+    assert np.all(np.isfinite(noise.variance))
+
+
 def test_a_broad_resonance_is_noise() -> None:
     """A stand of Q 8 at 2.2 Hz: some seventy cosines that stand out together are no line."""
     turn, shrink = 2.0 * np.pi * 2.2 * INTERVAL_S, np.exp(-np.pi * 2.2 * INTERVAL_S / 8.0)

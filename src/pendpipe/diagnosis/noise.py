@@ -323,8 +323,8 @@ def _about_lines(power: FloatArray, noise_only: BoolArray) -> BoolArray:
     leaks = np.zeros(len(power))
     for peak, window in zip(peaks, windows, strict=True):
         sides = window[: _BESIDE - _LINE], window[_BESIDE + _LINE + 1 :]
-        beside = max(float(np.median(side[side > 0.0])) for side in sides if side.any())
-        if stands_out(power[peak] * _MEDIAN_OF_A_SQUARE / beside):
+        beside = [float(np.median(side[side > 0.0])) for side in sides if side.any()]
+        if beside and stands_out(power[peak] * _MEDIAN_OF_A_SQUARE / max(beside)):
             leaks += power[peak] / np.maximum(np.abs(cosine - peak), 1) ** 2
     if not leaks.any():
         return leaks > 0.0
