@@ -210,19 +210,26 @@ def _settled(column: Column) -> Column:
 
 
 def _whole_times(columns: list[Column]) -> list[Column]:
-    """Add to a time in whole seconds the part of a second that stands in the next column."""
+    """Join hours, minutes, seconds and their parts that stand in columns side by side."""
     for whole, part in pairwise(columns):
-        unit = unit_of(part.unit or part.name or ("" if whole.name else "ns"))
-        if (whole.name and whole.role != "time") or unit is None or unit.kind != "time":
-            continue
-        steps, fraction = np.diff(whole.values), part.values * unit.factor
-        in_part = unit.factor < 1.0 and fraction.min() >= 0.0 and 0.5 < fraction.max() < 1.0
+        turn, tick = _seconds(whole, "s"), _seconds(part, "" if whole.name else "ns")
+        steps, fraction = np.diff(whole.values), part.values * tick
+        in_part = tick < turn and fraction.min() >= 0.0 and 0.5 < fraction.max() / turn < 1.0
         in_whole = len(steps) > 0 and steps.min() >= 0.0 and set(np.unique(steps)) <= {0.0, 1.0}
         falls = np.diff(fraction) < 0.0
         if in_part and in_whole and np.any(falls) and np.all(steps[falls] == 1.0):
-            one = replace(whole, values=whole.values + fraction, unit="s")
-            return [one if c is whole else c for c in columns if c is not part]
+            seconds = whole.values * turn + fraction
+            one = replace(whole, values=seconds, name="time", unit="s", role="time")
+            return _whole_times([one if c is whole else c for c in columns if c is not part])
     return columns
+
+
+def _seconds(column: Column, usual: str) -> float:
+    """Seconds in one unit of a column of times; infinite where it can be none."""
+    said = unit_of(column.unit or column.name)
+    named = said if said is not None and said.kind == "time" else None
+    silent = unit_of(usual) if column.role == "time" or not column.name else None
+    return (named or silent or Unit("time", np.inf)).factor
 
 
 def _counted_on(values: FloatArray) -> FloatArray:
@@ -705,11 +712,12 @@ def _count_rows(_choice: Choice, base: TimeBase) -> None:
         interval = np.diff(even).min()
         frames = round((even[-1] - even[0]) / interval) + 1 - len(even)
         lost = f", with {frames} missing" if frames else ""
-        base.time_s = even
         base.notes.append(
             "time stamps are rounded and repeat: rows are counted at"
-            f" {1.0 / interval:.6g} Hz{lost}, which all stamps agree with"
+            f" {1.0 / interval:.6g} Hz{lost}, which all stamps agree with: it is known to"
+            f" {100.0 * min(interval, np.ptp(base.time_s - even)) / np.ptp(even):.1g} %"
         )
+        base.time_s = even
 
 
 def _count_late_rows(choice: Choice, base: TimeBase) -> None:

@@ -302,7 +302,8 @@ def _of_several_lines(lines: list[str]) -> list[str]:
 
 def _shape(line: str) -> str:
     """What a line says beside its numbers."""
-    return " ".join(_TOKEN.sub("\0", line[:_LONGEST_ROW]).split())
+    numberless = _TOKEN.sub("\0", line[:_LONGEST_ROW])
+    return " ".join(numberless.replace("[[", " [").replace("]]", "]").split())
 
 
 def _in_rows(lines: list[str]) -> list[str]:
@@ -892,8 +893,13 @@ def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
         said = zip(row_of_units[-len(units) :], units, strict=True)
         units = [unit or own for unit, own in said]
     if missing := layout.width - len(cells):
-        names, units = [""] * missing + names, [""] * missing + units
-        notes = (f"the header names {len(cells)} of {layout.width} columns: taken as the last",)
+        # Rows may end in a sign that the header lacks.
+        ends = not layout.split(row)[-1]
+        names, units = (
+            each + [""] * missing if ends else [""] * missing + each for each in (names, units)
+        )
+        at = "first" if ends else "last"
+        notes = (f"the header names {len(cells)} of {layout.width} columns: taken as the {at}",)
     # Names that stand more than once are numbered: Volt, Volt (2).
     before = ((name, names[:place].count(name)) for place, name in enumerate(names))
     unique = tuple(f"{name} ({n + 1})" if n and name else name for name, n in before)
@@ -961,7 +967,8 @@ def _names(filled: Sequence[tuple[int, str]], layout: Layout) -> tuple[int, list
             longer = layout.delimiter in "\t;," and number >= filled[-1][0] - 1 and cells == own
             cells = cells[: layout.width] if longer else _trimmed(cells, layout.width)
             cells = [cell.lstrip("#%") for cell in cells]
-            said = [any(map(str.isalpha, cell)) or "°" in cell for cell in cells]
+            bare_cells = (_TOKEN.sub("", cell) for cell in cells)
+            said = [any(map(str.isalpha, cell)) or "°" in cell for cell in bare_cells]
             numbers = list(map(layout.is_number, cells))
             texts = sum(a and not b for a, b in zip(said, numbers, strict=True))
             few = len(cells) < layout.width and not is_comment(line)

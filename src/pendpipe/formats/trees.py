@@ -86,8 +86,8 @@ def _numbers(tree: Any, path: str = "", depth: int = 0) -> Iterator[tuple[str, F
     """Walk through dictionaries, lists and structures; give every real array as columns."""
     if depth > 12 or tree is None:
         return
-    if isinstance(tree, dict) and tree and all(str(key).isdigit() for key in tree):
-        tree = list(tree.values())  # as pandas numbers the rows of a column
+    if isinstance(tree, dict) and _is_list(tree):
+        tree = list(tree.values())
     tree = _array_of_list(tree) if isinstance(tree, list) else tree
     label = tree.get("label") if isinstance(tree, dict) and "values" in tree else None
     if isinstance(label, str) and label.strip():
@@ -117,13 +117,22 @@ def _numbers(tree: Any, path: str = "", depth: int = 0) -> Iterator[tuple[str, F
             yield f"{path}({number})", np.ascontiguousarray(column)
 
 
+def _is_list(tree: dict[Any, Any]) -> bool:
+    """Say whether keys only number the entries, as pandas', or name records of numbers."""
+    records = [each.values() for each in tree.values() if isinstance(each, dict)]
+    simple = all(isinstance(cell, int | float | str) for record in records for cell in record)
+    named = len(records) == len(tree) > 3 and simple and len({*map(len, records)}) == 1
+    return named or (len(tree) > 0 and all(str(key).isdigit() for key in tree))
+
+
 def _array_of_list(entries: list[Any]) -> Any:
     """Turn JSON's list of records, of numbers with gaps, or of times of day into arrays."""
     if entries and all(isinstance(entry, dict) for entry in entries):
         return {name: [entry.get(name) for entry in entries] for name in entries[0]}
     if entries and all(isinstance(entry, str) for entry in entries):
         clock = column_of_clock_times(entries)
-        return np.empty(0) if clock is None else clock
+        if clock is not None:
+            return clock
     try:
         return np.array([np.nan if entry is None else entry for entry in entries], dtype=np.float64)
     except (ValueError, TypeError):
