@@ -100,6 +100,16 @@ ANGLES = {
         f"{int(t // 60) % 60:02d}:{t % 60:06.3f},{x:.4f}\n"
         for t, x in zip(TIME + 3590, DEGREES, strict=True)
     ),
+    "hours, minutes and seconds in columns": "hour,minute,second,angle_deg\n"
+    + each("12,{:.0f},{:.3f},{:.4f}\n", (1790 + TIME) // 60, (1790 + TIME) % 60, DEGREES),
+    "seconds and milliseconds in columns": "s,ms,angle (deg)\n"
+    + each("{:.0f},{:.0f},{:.4f}\n", WHOLE, NANOSECONDS / 1e6, DEGREES),
+    "times since the row above": "dt (ms),angle (deg)\n" + each("20,{:.4f}\n", DEGREES),
+    "a sign that the header lacks": "t (ms)\trate (deg/s)\tangle (deg)\n"
+    + each("{:.0f}\t0.0\t{:.4f}\t\n", 1e3 * TIME, DEGREES),
+    "an array that was printed": "["
+    + each("[{: .8e} {: .8e}]\n ", TIME, 0.3 + ANGLE).rstrip()
+    + "]\n",
     "a dash between": "time angle_rad\n" + each("{:.3f} - {:.5f}\n", TIME, ANGLE + 1.0),
 }
 
@@ -108,7 +118,8 @@ ANGLES = {
 def test_an_angle_is_read_in_any_dress(tmp_path: Path, dress: str) -> None:
     recording = read_as(tmp_path, ANGLES[dress])
     assert recording.unit == "rad"
-    same(recording, ANGLE + (1.0 if dress == "a dash between" else 0.0))
+    level = {"a dash between": 1.0, "an array that was printed": 0.3}.get(dress, 0.0)
+    same(recording, ANGLE + level)
 
 
 OTHERS = {
@@ -173,6 +184,11 @@ def test_arrays_of_dates_of_numbered_rows_and_rates_in_attributes(tmp_path: Path
     columns = {"time": TIME.tolist(), "angle_rad": ANGLE.tolist()}
     numbered = {name: dict(enumerate(values)) for name, values in columns.items()}
     same(read_as(tmp_path, json.dumps(numbered), "a.json"))
+    rows = [{"t": t, "angle_rad": x} for t, x in zip(TIME, ANGLE, strict=True)]
+    keyed = {"run": {f"-Nx{at:04d}": row for at, row in enumerate(rows)}}
+    same(read_as(tmp_path, json.dumps(keyed), "b.json"))
+    feeds = [{"t": row["t"], "angle_deg": f"{np.degrees(row['angle_rad']):.4f}"} for row in rows]
+    same(read_as(tmp_path, json.dumps({"channel": {"id": 1}, "feeds": feeds}), "c.json"))
     h5py = pytest.importorskip("h5py")
     for where in ("file", "array"):
         with h5py.File(tmp_path / "a.h5", "w") as file:
@@ -190,6 +206,29 @@ def test_rows_of_two_sensors_that_take_turns_stay_rows(tmp_path: Path) -> None:
     )
     recording = read_as(tmp_path, "Time (s),Angle (rad),Force (N)\n" + text)
     assert np.flatnonzero(recording.usable).tolist() == list(range(0, len(TIME), 2))
+
+
+@pytest.mark.parametrize("head", ["Messung;T/s", "lengde (m);tid (s)"])
+def test_a_list_of_periods_is_refused_as_one(tmp_path: Path, head: str) -> None:
+    rows = [f"{0.2 + 0.05 * (at // 3):.2f};{1.35 - 0.01 * (at % 3):.3f}" for at in range(30)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([head, *rows]).replace(".", ","))
+    for look in (inspect, read):
+        with pytest.raises(InputError, match="periods alone tell no loss"):
+            look(path)
+
+
+def test_a_first_row_glued_to_the_names_is_told(tmp_path: Path) -> None:
+    text = "x y0 0.2\n" + each("{:.3f} {:.5f}\n", TIME, ANGLE)
+    assert any(
+        "names and the first row in one line" in note for note in read_as(tmp_path, text).notes
+    )
+
+
+def test_the_rate_of_rounded_stamps_is_known_as_well_as_they_allow(tmp_path: Path) -> None:
+    text = "time,angle_deg\n" + each("5/1/2025 12:00:{:02.0f},{:.4f}\n", WHOLE, DEGREES)
+    (note,) = (note for note in read_as(tmp_path, text).notes if "rounded" in note)
+    assert "it is known to 0.07 %" in note
 
 
 def test_inspect_refuses_a_list_for_the_reason_that_fit_gives(tmp_path: Path) -> None:

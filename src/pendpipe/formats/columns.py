@@ -119,6 +119,8 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         not table.columns, table.place, "there is no column of numbers", "give time and readings"
     )
     columns = _whole_times([replace(column, role=meaning(column)) for column in table.columns])
+    if not any(column.role == "time" for column in columns):
+        columns = list(map(_summed, columns))
     table = replace(table, columns=tuple(map(_settled, columns)))
     time, counts = _time(table, options)
     if time is not None and time.role in ("length", "unknown"):
@@ -138,29 +140,35 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
     # What an instrument sampled by a clock of its own is no list.
     told = readings or [c for c in mine if c.role != "index"]
     falling = [c.label for c in told if c.time_s is None and _only_falls(c.values)]
-    refuse_if(
-        reading and falling and len(falling) == len(readings or falling),
-        table.place,
-        f"'{''.join(falling[:1])}' only falls: amplitudes, not a recording of the swing",
-        "give the recording that they were read from",
-    )
     counting = [c.label for c in readings if _counts_samples(c) and one_way(c.values) == 1.0]
-    refuse_if(
-        reading and counting,
-        table.place,
-        f"'{''.join(counting[:1])}' only counts, as passages of a light gate do: no recording of"
-        " the swing",
-        "give readings of the swing: times of passages tell no amplitude",
-    )
+    named = [c for c in table.columns if not readings and plain(c.name).startswith("period")]
+    lasting = [c.label for c in (*named, *filter(_lasts, table.columns))]
     names = listed([column.label for column in table.columns])
-    refuse_if(
-        reading and not readings,
-        table.place,
-        f"no column looks like the motion of a pendulum (found {names})",
-        "give the recording of the swing: periods alone tell no loss"
-        if any(plain(column.name).startswith("period") for column in table.columns)
-        else "name it with --column (and its unit with --unit)",
-    )
+    swing = "give the recording of the swing: "
+    for wrong, problem, remedy in (
+        (
+            lasting and (named or time is None or counts or time.label in lasting),
+            f"'{''.join(lasting[:1])}' holds periods, not a recording of the swing",
+            f"{swing}periods alone tell no loss",
+        ),
+        (
+            falling and len(falling) == len(readings or falling),
+            f"'{''.join(falling[:1])}' only falls: amplitudes, not a recording of the swing",
+            "give the recording that they were read from",
+        ),
+        (
+            counting,
+            f"'{''.join(counting[:1])}' only counts, as passages of a light gate do: no recording"
+            " of the swing",
+            f"{swing}times of passages tell no amplitude",
+        ),
+        (
+            not readings,
+            f"no column looks like the motion of a pendulum (found {names})",
+            "name it with --column (and its unit with --unit)",
+        ),
+    ):
+        refuse_if(reading and wrong, table.place, problem, remedy)
     if others:
         notes = (*notes, f"one of several runs is read; choose with --column: {others}")
     return Choice(time, counts, readings, channels, notes, weak)
@@ -189,6 +197,13 @@ def _only_falls(values: FloatArray) -> bool:
     return falls > max(0.4, 3.0 * rises)
 
 
+def _lasts(column: Column) -> bool:
+    """Whether a column of times holds durations: they go up and down, and none is near 0."""
+    times = column.values[np.isfinite(column.values)]
+    some = column.role == "time" and len(times) > 2 and one_way(times) < 0.9
+    return bool(some and times.min() > 0.3 * np.median(times))
+
+
 def _parts(table: Table, options: ReadOptions) -> list[str]:
     """Split ``x,y`` unless a column bears that very name."""
     key = options.columns[1] or ""
@@ -207,6 +222,16 @@ def _settled(column: Column) -> Column:
         column = replace(column, values=_counted_on(column.values))
     swings = column.role == "index" and column.swing.clear
     return replace(column, role="unknown") if swings else column
+
+
+def _summed(column: Column) -> Column:
+    """Add up the times since the row above (``dt (ms)``), where there is no other time."""
+    unit = unit_of(column.unit)
+    lasts = unit is not None and unit.kind == "time" and column.values.min() > 0.0
+    named = re.fullmatch(r"(d|δ|delta)[_ ]?t|interval\w*", plain(column.name))
+    return (
+        replace(column, values=np.cumsum(column.values), role="time") if lasts and named else column
+    )
 
 
 def _whole_times(columns: list[Column]) -> list[Column]:

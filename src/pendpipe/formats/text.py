@@ -209,12 +209,6 @@ def _of_igor(lines: list[str]) -> list[str]:
     return [f"# dt = {scale[1].strip()} s" if scale else "#", names, *rows]
 
 
-def _of_origin(lines: list[str]) -> list[str]:
-    """Leave of Origin's three lines of titles the names and the units."""
-    head = [re.sub(r"^(Long Name|Units)(?=\t)", "", line) for line in lines[:6]]
-    return [*(re.sub(r"^[A-Z].*", "#", line) for line in head), *lines[6:]]
-
-
 _SEGMENT: Final = re.compile(
     r"(?:TIMESERIES|WID2)\b(?=.*?(?:\bINT +\d+|, \d+ samples,) +(?![0.]+\b)(\d+\.?\d*)\b)"
     r".*?(\d{4})[-/](\d\d)[-/](\d\d[T ][\d:.]+).*\n(?:[A-Z].*\n)*([-+\d.eE\s]*)"
@@ -244,7 +238,6 @@ _DIALECTS: Final[tuple[tuple[re.Pattern[str], Callable[[list[str]], list[str]]],
     (re.compile(r"(?:.*\n)*DEF="), _of_cassy),
     (re.compile('"?Record Length"?,'), _of_tektronix),
     (re.compile(r"IGOR\s*\nWAVES"), _of_igor),
-    (re.compile(r"Long Name\t"), _of_origin),
     (re.compile(r"(?:.*\n){0,9}WID2 .* INT |TIMESERIES .*SLIST"), _of_seismograph),
     (re.compile(r"(?: *\S+(?: +\S+){4} *\n){22}.*-12345"), _of_sac),
 )
@@ -881,11 +874,13 @@ def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
     _refuse_damaged_rows(place, filled, names_at, layout.split(row), layout)
     interval = interval_of([line for _, line in filled[-300:]])
     metadata = _metadata([line for _, line in filled])
-    if not cells:
-        return Header(
-            (), (), (), interval, metadata, ("no header: columns are recognised by their values",)
-        )
     notes: tuple[str, ...] = ()
+    glued = layout.split(filled[-1][1]) if filled else []
+    if len(glued) == 2 * layout.width - 1 > 1 and layout.is_number(glued[-1]):
+        notes = (f"line {filled[-1][0]}: names and the first row in one line, which is not read",)
+    if not cells:
+        told = "no header: columns are recognised by their values"
+        return Header((), (), (), interval, metadata, (told, *notes))
     pairs = [split_header(cell) for cell in cells]
     names, units = [name for name, _ in pairs], [unit for _, unit in pairs]
     row_of_units = _row_of_units([line for number, line in filled if number > names_at], layout)
@@ -899,7 +894,8 @@ def read_header(place: Path, lines: Sequence[str], layout: Layout) -> Header:
             each + [""] * missing if ends else [""] * missing + each for each in (names, units)
         )
         at = "first" if ends else "last"
-        notes = (f"the header names {len(cells)} of {layout.width} columns: taken as the {at}",)
+        named = f"the header names {len(cells)} of {layout.width} columns: taken as the {at}"
+        notes = (*notes, named)
     # Names that stand more than once are numbered: Volt, Volt (2).
     before = ((name, names[:place].count(name)) for place, name in enumerate(names))
     unique = tuple(f"{name} ({n + 1})" if n and name else name for name, n in before)
@@ -919,7 +915,9 @@ def _splits(line: str, layout: Layout) -> Iterator[list[str]]:
     """Split a line of names as its rows are, and in the other ways that fit their width."""
     bare = line.strip().lstrip("".join(COMMENT)).strip()
     own = [layout.split(line), layout.split(bare)]
-    yield from (cells for cells in own if len(cells) == layout.width)
+    # Origin's labels stand before the columns.
+    labelled = own[0][1:] if _LABEL.fullmatch(own[0][0]) else own[0]
+    yield from (cells for cells in (*own, labelled) if len(cells) == layout.width)
     told = ": " in f"{bare} "  # a remark, unless the rows' own sign splits it
     if not told and not any(map(layout.is_number, layout.split(bare))):
         # "t (s) theta (rad)", "t / s  phi / rad": a unit belongs to the name before it.
@@ -939,10 +937,14 @@ def _trimmed(cells: list[str], width: int) -> list[str]:
     return cells
 
 
+_LABEL: Final = re.compile(
+    r"(?i)((long )?name|units?|einheit(en)?|unidad(es)?|unit[àé]s?|eenhe(id|den))?"
+)
+
+
 def _are_units(cells: Sequence[str]) -> bool:
     """Say whether a row holds nothing but units: known ones, or all in brackets."""
-    label = r"(?i)(units?|einheit(en)?|unidad(es)?|unit[àé]s?|eenhe(id|den))?"
-    filled = [cell for cell in cells if not re.fullmatch(label, cell)]
+    filled = [cell for cell in cells if not _LABEL.fullmatch(cell)]
     bracketed = all(re.fullmatch(r"[\[({<].*[\])}>]", cell) for cell in filled)
     known = [unit_of(cell) is not None for cell in filled]
     return any(known) and (bracketed or all(known))

@@ -155,11 +155,13 @@ def _length(columns: dict[str, FloatArray], options: ReadOptions) -> int:
 
 def _one_clock(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
     """Keep one of several equal time columns, and put it first."""
-    clocks: dict[str, FloatArray] = {}
     named = {name: values for name, values in columns.items() if role_of(_last(name)) == "time"}
-    for name, values in named.items():
-        if not any(np.array_equal(values, each) for each in clocks.values()):
-            clocks[name] = values
+    before = ([*named.values()][:number] for number in range(len(named)))
+    again = (
+        any(np.array_equal(a, b) for b in some)
+        for a, some in zip(named.values(), before, strict=True)
+    )
+    clocks = {name: named[name] for name, twice in zip(named, again, strict=True) if not twice}
     return clocks | {name: values for name, values in columns.items() if name not in named}
 
 
