@@ -7,7 +7,7 @@ import pytest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.location import locate
+from pendpipe.diagnosis.location import locate, near_harmonic_by_chance
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Location
@@ -23,6 +23,7 @@ from .records import (
     TONE_HZ,
     TRUTH,
     diagnosed,
+    prepared,
     white,
 )
 
@@ -157,3 +158,25 @@ def test_an_encoder_that_records_its_counts_makes_no_harmonics_of_a_phase_error(
     found, slip = located("frequency-drift", (1e-3, 40.0), time_s=written)
     assert slip > 0.5
     assert found.harmonics == (1,)
+
+
+@pytest.mark.parametrize(
+    ("frequency_hz", "by_chance"),
+    [
+        (3.5 * FREQUENCY_HZ, 0.9),
+        (3.0 * FREQUENCY_HZ, 0.05),
+        (0.5 / INTERVAL_S - FREQUENCY_HZ, 0.15),
+        (1.0 / INTERVAL_S - 11.0 * FREQUENCY_HZ, 0.15),
+    ],
+)
+def test_a_line_of_every_second_reading_or_an_alias_is_seldom_there_by_chance(
+    frequency_hz: float, by_chance: float
+) -> None:
+    """Lines at a harmonic, about half the sampling rate, and the alias of the eleventh harmonic."""
+    tone = by_identifier("tone-pickup")
+    model = Model(TIME_S, INTERVAL_S, (tone,))
+    truth = np.append(TRUTH, [3e-4, 2e-4, frequency_hz])
+    data, noise = prepared(model.reading(truth) + white(3))
+    fit = refine(model, data, noise, truth)
+    found = near_harmonic_by_chance(fit, tone)
+    assert found > by_chance if by_chance == 0.9 else found < by_chance

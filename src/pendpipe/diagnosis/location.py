@@ -129,19 +129,28 @@ def near_harmonic_by_chance(fit: Fit, effect: Effect) -> float:
     """Return the probability that a line is by chance as near a harmonic; 1 for what is no line.
 
     Of a line anywhere, twice the distance in units of the motion's frequency, with its error. Any
-    law of the motion makes lines at the harmonics.
+    law of the motion makes lines at the harmonics. So does any periodic error of the sensor at
+    their aliases, and an error of every second reading at those of half the sampling rate.
     """
-    off = _from_harmonic(fit, effect)
-    return 1.0 if off is None else min(max(2.0 * (off.value + off.sd), 1e-9), 1.0)
+    rate = 1.0 / fit.at.span.interval_s
+    found = [_from_harmonic(fit, effect, about) for about in (0.0, 0.5 * rate, rate)]
+    off = [each.value + each.sd for each in found if each is not None]
+    if not off:
+        return 1.0
+    return min(max(2.0 * off[0], 1e-9), 2.0 * len(off) * max(min(off), 1e-9), 1.0)
 
 
-def _from_harmonic(fit: Fit, effect: Effect) -> Estimate | None:
-    """Return the distance of a line from the nearest harmonic (or from zero), over the motion's."""
+def _from_harmonic(fit: Fit, effect: Effect, about_hz: float = 0.0) -> Estimate | None:
+    """Return the distance of a line from the nearest harmonic about a frequency, over the motion's.
+
+    None for what is no line.
+    """
     tone = _last_in(fit, effect, "Hz") if effect.spectral else None
     if tone is None:
         return None
     motion = 0.5 * float(fit.value[OMEGA]) / math.pi
-    return Estimate(abs(math.remainder(tone.value, motion)) / motion, tone.sd / motion, "")
+    off = abs(math.remainder(tone.value - about_hz, motion))
+    return Estimate(off / motion, tone.sd / motion, "")
 
 
 def beat_of(fit: Fit, effect: Effect) -> float | None:
