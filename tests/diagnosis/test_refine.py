@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.noise import white_noise
-from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.refine import best_fit, refine
 from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Evaluated, Model
@@ -164,3 +164,16 @@ def test_a_hopeless_fit_stops_after_a_few_steps(monkeypatch: pytest.MonkeyPatch)
     limited = refine(drift, data, noise, start, useful=useful)
     assert useful < limited.chi2 < without.chi2 - 70.0
     assert len(asked) - spent < 0.7 * spent
+
+
+def test_a_start_beyond_all_numbers_is_none() -> None:
+    """Its squares are infinite: the fit begins elsewhere, or there is none."""
+    fit, data, noise = null_fit()
+    beyond = fit.value.copy()
+    beyond[OFFSET] = 1e200
+    # Trial models overflow, as in `diagnose_decay`.
+    with np.errstate(over="ignore", invalid="ignore"):
+        assert best_fit(fit.model, data, noise, [beyond]) is None
+        found = best_fit(fit.model, data, noise, [beyond, fit.value])
+    assert found is not None
+    assert found.chi2 == pytest.approx(fit.chi2, rel=1e-6)

@@ -98,9 +98,17 @@ class GaussNewton:
         return self.evaluate(self._model.settled(np.clip(value, self._low, self._high)))
 
     def evaluate(self, value: FloatArray) -> Evaluation:
-        """Evaluate the model at exactly these values."""
+        """Evaluate the model at exactly these values.
+
+        Raises
+        ------
+        NoMotionError
+            If the model has no motion there, or its chi^2 is not finite.
+        """
         at = self._model.evaluate(value)
         residual, slip = _residual(self._data, self._noise, at, value)
+        if not math.isfinite(float(residual @ residual)):
+            raise NoMotionError("its chi^2 is not finite")
         return Evaluation(value, at, residual, slip, self._model, self._noise)
 
     def step(
