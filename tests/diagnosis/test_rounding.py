@@ -87,8 +87,15 @@ def test_a_quick_length_has_small_factors_and_loses_little(count: int) -> None:
 def test_stamps_rounded_to_milliseconds_are_evenly_spaced(rate_hz: float) -> None:
     """Their intervals, of 33 and 34 ms at 30 Hz, differ by up to six per cent."""
     exact = np.arange(900) / rate_hz
-    told = {"step": None, "unit": "rad", "counts": False, "period_s": 1.0, "noise_rms": 1.0}
-    data = gather(np.round(exact, 3), np.zeros(900), **told)  # type: ignore[arg-type]
+    data = gather(
+        np.round(exact, 3),
+        np.zeros(900),
+        step=None,
+        unit="rad",
+        counts=False,
+        period_s=1.0,
+        noise_rms=1.0,
+    )
     assert data.uniform
     assert data.interval_s == pytest.approx(1.0 / rate_hz, rel=1e-4)
 

@@ -26,6 +26,7 @@ from .records import (
     INTERVAL_S,
     TIME_S,
     TRUTH,
+    Magnet,
     null_fit,
     pulled,
     recording,
@@ -104,6 +105,19 @@ def test_a_pendulum_is_one_though_its_torque_is_off_by_less_than_a_hundredth() -
     assert other > 2.0 * own
     own, other, _ = probabilities([cubic, far], 1e8 - 5.0)
     assert other <= own
+
+
+@pytest.mark.parametrize(("pull_s2", "width_rad"), [(0.5, 0.05), (-0.5, 0.05), (-0.3, 0.1)])
+def test_a_pendulum_over_a_magnet_is_a_pendulum_beside_the_curve(
+    pull_s2: float, width_rad: float
+) -> None:
+    """Without the curve of the magnet's torque others would seem likelier than sin x."""
+    values = np.append(np.where(TRUTH == 0.15, 0.3, TRUTH), [1.0, pull_s2, width_rad])
+    effects = by_identifier("circular-error"), Magnet()
+    readings = Model(TIME_S, INTERVAL_S, effects, order=20).reading(values)
+    found = diagnose_recording(recording(readings, 3)).effects
+    assert [each.identifier for each in found] == ["circular-error", "unnamed-restoring"]
+    assert found[0].probability > 0.95
 
 
 def test_a_curve_that_fits_better_does_not_lower_a_name() -> None:

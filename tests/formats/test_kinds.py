@@ -23,6 +23,7 @@ from scipy.io import savemat
 from pendpipe.cli import main
 from pendpipe.errors import InputError
 from pendpipe.formats import ReadOptions, containers, inspect, read, trees
+from pendpipe.formats.text import column_of_clock_times
 from pendpipe.recording import Recording
 
 from .decays import Floats, swing
@@ -753,6 +754,18 @@ def test_records_of_json_with_texts_are_a_table(
     monkeypatch.setattr(trees, "_MOST_CELLS", 1000)
     with pytest.raises(InputError, match="more than 1000 cells"):
         read_text(tmp_path, content, "b.json")
+
+
+def test_numbers_of_json_that_are_written_as_texts_are_no_clock_times(tmp_path: Path) -> None:
+    """ "12.50" is a number, and not twelve minutes and fifty seconds."""
+    some = slice(0, 1400)
+    degrees = np.rad2deg(ANGLE[some])
+    told = {"time_s": [f"{t:.2f}" for t in TIME[some]], "angle_deg": [f"{x:.2f}" for x in degrees]}
+    recording = read_text(tmp_path, json.dumps(told), "a.json")
+    np.testing.assert_allclose(recording.time_s, TIME[some], atol=0.006)
+    np.testing.assert_allclose(np.rad2deg(recording.values), degrees, atol=0.006)
+    assert column_of_clock_times(["12.50", "12.51", "12.52"]) is None
+    assert column_of_clock_times(["12.50.01", "12.50.02"]) is not None
 
 
 def test_labviews_tdms_gives_its_interval_and_its_units(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.detect import Lead
-from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, lines, ranked
+from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, ranked
 from pendpipe.diagnosis.location import off_harmonics
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
@@ -96,9 +96,8 @@ def _curves_for_names(state: State) -> Iterator[Proposed]:
     Where more than noise is left, the name that gains most stays: a curve competes for the rest. A
     line off the harmonics, which no curve makes, stays too.
     """
-    apart = lines(state.fit)
     further = [step for step in state.steps if is_further(step)]
-    own = [step for step in further if step.winner.lead.effect.key not in apart]
+    own = [step for step in further if not off_harmonics(state.fit, step.winner.lead.effect)]
     if own and not Scale.of(state.fit, state.data, state.noise).clean:
         own.remove(max(own, key=lambda step: step.winner.gain))
     effects = [(step, step.winner.lead.effect) for step in own]

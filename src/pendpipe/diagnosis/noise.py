@@ -320,12 +320,14 @@ def _about_lines(power: FloatArray, noise_only: BoolArray) -> BoolArray:
     largest = maximum_filter1d(heard, width, mode="constant")
     peaks = np.flatnonzero(noise_only & (power == largest) & (cosine >= _SLOWEST_LINE))
     windows = sliding_window_view(np.pad(heard, _BESIDE), width)[peaks]
+    sides = np.stack([windows[:, : _BESIDE - _LINE], windows[:, _BESIDE + _LINE + 1 :]])
+    seen = np.count_nonzero(sides, axis=2)
+    # Beside a harmonic, or an end, one side tells too little.
+    told = np.all(2 * seen >= sides.shape[2], axis=0)
+    peaks, beside = peaks[told], (sides.sum(axis=2)[:, told] / seen[:, told]).max(axis=0)
     leaks = np.zeros(len(power))
-    for peak, window in zip(peaks, windows, strict=True):
-        sides = window[: _BESIDE - _LINE], window[_BESIDE + _LINE + 1 :]
-        beside = [float(np.median(side[side > 0.0])) for side in sides if side.any()]
-        if beside and stands_out(power[peak] * _MEDIAN_OF_A_SQUARE / max(beside)):
-            leaks += power[peak] / np.maximum(np.abs(cosine - peak), 1) ** 2
+    for peak in peaks[stands_out(power[peaks] / beside)]:
+        leaks += power[peak] / np.maximum(np.abs(cosine - peak), 1) ** 2
     if not leaks.any():
         return leaks > 0.0
     share = leaks * _MEDIAN_OF_A_SQUARE / np.maximum(median_filter(power, _BESIDE), 1e-300)

@@ -257,8 +257,6 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     gain = without.chi2 - found.improved.chi2
     if len(found.steps) == 1 and _same(gain, step) and not is_gross(without, found.data):
         return without, step.rivals
-    if effect.parameter_free and _has_curve(found.steps, step):
-        return without, step.rivals  # beside a curve any of them would do
     # Refit what was behind in the search, but not far: noise and other effects have changed.
     hopeless = step.winner.evidence - 2.0 * (class_width(step.winner) + NEAR)
     scale = Scale.of(found.improved, found.data, found.noise)

@@ -129,14 +129,12 @@ def _array_of_list(entries: list[Any]) -> Any:
     """Turn JSON's list of records, of numbers with gaps, or of times of day into arrays."""
     if entries and all(isinstance(entry, dict) for entry in entries):
         return {name: [entry.get(name) for entry in entries] for name in entries[0]}
-    if entries and all(isinstance(entry, str) for entry in entries):
-        clock = column_of_clock_times(entries)
-        if clock is not None:
-            return clock
     try:
         return np.array([np.nan if entry is None else entry for entry in entries], dtype=np.float64)
     except (ValueError, TypeError):
-        return np.array([*entries, None], dtype=object)[:-1]
+        strings = all(isinstance(entry, str) for entry in entries)
+        clock = column_of_clock_times(entries) if strings else None
+        return np.array([*entries, None], dtype=object)[:-1] if clock is None else clock
 
 
 def _last(name: str) -> str:
