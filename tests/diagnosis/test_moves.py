@@ -216,6 +216,18 @@ def test_a_line_that_takes_up_misfit_is_no_better_for_it() -> None:
     assert scale.lost_by(worse) > scale.lost_by(fit)
 
 
+def test_what_another_line_takes_is_no_worth_of_a_law() -> None:
+    """A tone of 4e-4, and one of 8e-4, beside a law that lowers chi^2 by as much."""
+    fit, larger = tone_at(3.4 * FREQUENCY_HZ), tone_at(3.4 * FREQUENCY_HZ, 8e-4)
+    scale = Scale(fit.chi2 + sum(lines(fit).values()), 1.0, 3.0, lines(fit))
+    as_good = replace(
+        larger, evaluation=replace(larger.evaluation, residual=fit.evaluation.residual)
+    )
+    law, before = by_identifier("sensor-quadratic"), fit.chi2 + 1000.0
+    assert sum(lines(as_good).values()) > 3.0 * sum(lines(fit).values())
+    assert scale.worth(before, as_good, law) == scale.worth(before, fit, law)
+
+
 def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
     """A sensor whose reading is bent where no polynomial of two terms would bend it."""
     angle = other_engine(TRUTH) - TRUTH[7]

@@ -757,7 +757,7 @@ def test_records_of_json_with_texts_are_a_table(
 
 
 def test_numbers_of_json_that_are_written_as_texts_are_no_clock_times(tmp_path: Path) -> None:
-    """ "12.50" is a number, and not twelve minutes and fifty seconds."""
+    """The text "12.50" is a number, and not twelve minutes and fifty seconds."""
     some = slice(0, 1400)
     degrees = np.rad2deg(ANGLE[some])
     told = {"time_s": [f"{t:.2f}" for t in TIME[some]], "angle_deg": [f"{x:.2f}" for x in degrees]}

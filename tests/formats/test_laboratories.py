@@ -228,7 +228,7 @@ def test_a_first_row_glued_to_the_names_is_told(tmp_path: Path) -> None:
 def test_the_rate_of_rounded_stamps_is_known_as_well_as_they_allow(tmp_path: Path) -> None:
     text = "time,angle_deg\n" + each("5/1/2025 12:00:{:02.0f},{:.4f}\n", WHOLE, DEGREES)
     (note,) = (note for note in read_as(tmp_path, text).notes if "rounded" in note)
-    assert "it is known to 0.07 %" in note
+    assert "the rate is known to 0.07 %" in note
 
 
 def test_inspect_refuses_a_list_for_the_reason_that_fit_gives(tmp_path: Path) -> None:

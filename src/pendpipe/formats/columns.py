@@ -739,7 +739,7 @@ def _count_rows(_choice: Choice, base: TimeBase) -> None:
         lost = f", with {frames} missing" if frames else ""
         base.notes.append(
             "time stamps are rounded and repeat: rows are counted at"
-            f" {1.0 / interval:.6g} Hz{lost}, which all stamps agree with: it is known to"
+            f" {1.0 / interval:.6g} Hz{lost}, which all stamps agree with: the rate is known to"
             f" {100.0 * min(interval, np.ptp(base.time_s - even)) / np.ptp(even):.1g} %"
         )
         base.time_s = even
