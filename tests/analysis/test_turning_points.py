@@ -16,6 +16,7 @@ from pendpipe.analysis.turning_points import (
     read_turning_points,
     write_turning_points,
 )
+from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, turning_points
 from pendpipe.errors import InputError, NotAnalysableError
@@ -333,3 +334,59 @@ def test_too_few_readings_in_a_cycle_are_refused_in_a_line(in_a_cycle: float) ->
     noise = 1e-4 * np.random.default_rng(5).standard_normal(len(time))
     with pytest.raises(NotAnalysableError, match=r"nine readings|three half cycles"):
         find_turning_points(Recording(time, angle + noise, "angle_rad"))
+
+
+SWING = Eq8(2.0 * math.pi / 1.352, hysteretic=0.01, viscous=0.01, coulomb=1e-9)
+ROWS_S = np.arange(8000) * 0.005
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    rows=st.integers(2, 12),
+    amplitude=st.floats(0.02, 0.5),
+    step=st.sampled_from([None, 2e-5]),
+)
+def test_a_reading_that_is_held_counts_once(
+    rows: int, amplitude: float, step: float | None
+) -> None:
+    """A sensor that measures every few rows gives what it gives without the rows between."""
+    measured = record(SWING, Release(0.0, amplitude, 0.0), ROWS_S[::rows], 1e-4, 3, step)
+    values = np.repeat(measured.values, rows)[: len(ROWS_S)]
+    held = Recording(ROWS_S[: len(values)], values, "angle_rad", resolution=step)
+    samples = prepare(held, "record")
+    assert samples.held == len(held) - len(samples)
+    np.testing.assert_allclose(samples.time_s, measured.time_s[: len(samples)], atol=1e-9)
+    assert np.array_equal(samples.values, measured.values[: len(samples)])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_turning_points_of_readings_held_for_some_rows_have_the_errors_stated(seed: int) -> None:
+    """Two to seven rows, at random: each reading is as old as its first row tells."""
+    draw = np.random.default_rng(seed)
+    starts = np.append(0, np.cumsum(draw.integers(2, 8, 4000)))
+    starts = starts[starts < len(ROWS_S)]
+    measured = record(SWING, Release(0.0, 0.2, 0.0), ROWS_S[starts], 1e-4, seed)
+    values = np.repeat(measured.values, np.diff(np.append(starts, len(ROWS_S))))
+    points = find_turning_points(Recording(ROWS_S, values, "angle_rad"))
+    assert any("readings are held" in note for note in points.notes)
+    assert points.noise_rms_rad == pytest.approx(1e-4, rel=0.1)
+    angle, late, _ = errors(points, SWING, Release(0.0, 0.2, 0.0))
+    for pull in (angle / points.angle_sd_rad, late / points.time_sd_s):
+        assert np.sqrt(np.mean(pull**2)) == pytest.approx(1.0, abs=3.5 / math.sqrt(2 * len(pull)))
+
+
+@pytest.mark.parametrize("step", [1e-3, 6e-3, 2e-2])
+def test_an_encoder_that_repeats_its_count_is_not_held(step: float) -> None:
+    """It stays on a count as long as the motion does."""
+    swing = record(SWING, Release(0.0, 0.5, 0.0), ROWS_S, step=step)
+    assert np.mean(np.diff(swing.values) == 0.0) > 0.02
+    assert prepare(swing, "record").held == 0
+
+
+@given(share=st.floats(0.0, 0.1), seed=st.integers(0, 1000))
+@settings(max_examples=10, deadline=None)
+def test_some_pictures_that_repeat_are_no_held_readings(share: float, seed: int) -> None:
+    swing = record(SWING, Release(0.0, 0.5, 0.0), ROWS_S, 1e-4)
+    again = np.flatnonzero(np.random.default_rng(seed).random(len(ROWS_S)) < share)[1:]
+    swing.values[again] = swing.values[again - 1]
+    assert prepare(swing, "record").held == 0

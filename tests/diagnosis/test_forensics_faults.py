@@ -207,6 +207,7 @@ def test_a_random_torque_is_measured(clean: FloatArray) -> None:
         finding = found(FAULTS["torque of 1e-8"].make(clean, generator(seed)))["broadband-drive"]
         estimate = finding.parameters["acceleration_density"]
         pulls.append((estimate.value - 1e-8) / estimate.sd)
+        assert finding.margin > 2.0  # kicks, and not a smooth misfit
     assert np.mean(np.abs(pulls)) < 2.0
 
 

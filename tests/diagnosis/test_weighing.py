@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -195,3 +196,19 @@ def test_a_random_cause_is_no_more_probable_than_the_names_beside_it(
         fault_named(found, fault, given).probability / fault_named(found, fault, sure).probability
     )
     assert ratio == pytest.approx(1.0 - none if name == "broadband-drive" else 1.0)
+
+
+def test_a_random_torque_that_explains_no_more_than_a_smooth_misfit_is_not_confident() -> None:
+    """What a law lacks changes amplitude and phase too."""
+    found = jumped().search
+    margins = (math.inf, 10.0, 0.0, -10.0)
+    findings = [Finding("broadband-drive", 1e-9, 100.0, margin=margin) for margin in margins]
+    sure = [
+        weigh(found, jumped().beginning, step)._replace(weights=np.array([1.0, 0.0]))
+        for step in found.steps
+    ]
+    chances = [fault_named(found, Fault(each, 1e-7), sure).probability for each in findings]
+    assert chances == sorted(chances, reverse=True)
+    assert chances[1] > 0.98 * chances[0]
+    assert chances[2] < 0.5
+    assert chances[3] < 0.01

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, NamedTuple
@@ -138,6 +139,8 @@ class Finding:
         Identifiers of effects that would give exactly the same codes.
     confirmed
         What a second test found that does not use the model.
+    margin
+        Twice the log-likelihood by which it exceeds what looks most like it.
     """
 
     identifier: str
@@ -151,6 +154,7 @@ class Finding:
     kind: Literal["fault", "property"] = "fault"
     also: tuple[str, ...] = ()
     confirmed: Confirmation | None = None
+    margin: float = math.inf
 
 
 def nothing(identifier: str) -> Finding:

@@ -203,6 +203,7 @@ def fault_named(found: Search, fault: Fault, weighed: Sequence[Weighed]) -> Foun
     doubt = math.exp(-0.5 * _clean_charge(found))
     if finding.confirmed is not None:
         doubt *= finding.confirmed.p_value
+    doubt += math.exp(-0.5 * finding.margin)
     # Effects that give exactly the same codes are equally probable.
     each = 1.0 / (1.0 + len(finding.also) + doubt)
     if finding.identifier in _SEEN_IN_RESIDUAL:

@@ -662,6 +662,10 @@ def _notes(samples: Samples, keep: BoolArray, level: Level) -> tuple[str, ...]:
     notes = (
         (lost, f"{lost} half cycle(s) are left out for lack of readings"),
         (level.wanders, "the offset wanders; it is followed by local lines"),
+        (
+            samples.held,
+            f"readings are held: {samples.held} row(s) repeat the one above, and are left out",
+        ),
         (samples.counts, "one row a count: the times of the counts are the data"),
     )
     return tuple(note for is_so, note in notes if is_so)

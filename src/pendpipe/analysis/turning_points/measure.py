@@ -480,6 +480,10 @@ _BEGINNING: Final = 2048
 """Readings that tell a step: at the beginning the motion crosses most."""
 _FEWEST: Final = 16
 _SATURATED: Final = 0.1
+_HELD: Final = 0.2
+"""Share of rows that repeat the one above, in fast motion, from which readings are held."""
+_SEVERAL: Final = 3.0
+"""Steps from row to row in fast motion."""
 
 
 @dataclass(frozen=True)
@@ -505,6 +509,8 @@ class Samples:
         as much larger; None elsewhere.
     radius_excess
         Of positions: distance from the pivot over its median, less 1, shape (n,).
+    held
+        How many rows repeat the reading above, and are left out.
     """
 
     time_s: FloatArray
@@ -515,6 +521,7 @@ class Samples:
     counts: bool = False
     promised_step: float | None = None
     radius_excess: FloatArray | None = None
+    held: int = 0
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -558,8 +565,13 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
     step = recording.resolution or find_step(values[:_BEGINNING])
     if step is not None and _one_row_a_count(time, values, step):
         return _edges(time, values, recording.unit, step)
+    new, rows = _new_readings(values, step), len(values)
+    if new is not None:
+        time, values = _when_measured(time, new), values[new]
+        radius = None if radius is None else radius[new]
     noise = noise_rms(values, step)
-    return Samples(time, values, recording.unit, step, noise, radius_excess=radius)
+    held = rows - len(values)
+    return Samples(time, values, recording.unit, step, noise, radius_excess=radius, held=held)
 
 
 def _range(values: FloatArray) -> tuple[float, float]:
@@ -602,6 +614,46 @@ def _one_row_a_count(time: FloatArray, values: FloatArray, step: float) -> bool:
     single = float(np.mean(np.abs(change - step) < 0.1 * step))
     uneven = float(np.percentile(intervals, 90)) > 1.5 * float(np.percentile(intervals, 10))
     return len(piece) > 50 and single > 0.98 and uneven
+
+
+def _new_readings(values: FloatArray, step: float | None) -> BoolArray | None:
+    """Return which rows hold a new reading, where a sensor is read more often than it measures.
+
+    What moves by several steps from row to row repeats no reading. Where it is slow a reading may
+    be the same again: a new one stands there after as many rows as one is held at most. None where
+    each row is a reading.
+    """
+    piece = values[: 1 << 16]
+    again = np.diff(piece) == 0.0
+    share = float(np.mean(again))
+    if not _HELD < share < 1.0:
+        return None
+    reach = math.ceil(2.0 / (1.0 - share))
+    moved = np.abs(piece[2 * reach :] - piece[: -2 * reach]) / (2 * reach)
+    jumps = np.abs(np.diff(piece))
+    fast = moved > _SEVERAL * (step or float(jumps[jumps > 0.0].min()))
+    repeats = again[reach : reach + len(fast)]
+    if np.count_nonzero(fast) < _FEWEST or float(np.mean(repeats[fast])) < _HELD:
+        return None
+    starts = np.flatnonzero(np.append(True, np.diff(values) != 0.0))
+    whole = starts[(starts >= reach) & (starts < reach + len(fast) - reach)]
+    lengths = np.diff(whole)[fast[whole[:-1] - reach]]
+    usual, most = np.percentile(lengths, (5, 100))
+    # Two readings in a row may be the same by chance.
+    most = int(usual if usual == np.percentile(lengths, 95) else most)
+    age = np.arange(len(values)) - np.repeat(starts, np.diff(np.append(starts, len(values))))
+    return np.asarray(age % most == 0)
+
+
+def _when_measured(time: FloatArray, new: BoolArray) -> FloatArray:
+    """Return even times of new readings where these can be true, else those of their rows.
+
+    A reading stands in the first row after it was measured.
+    """
+    found = time[new]
+    order = np.arange(len(found))
+    even = np.polynomial.Polynomial.fit(order, found, 1)(order)
+    return even if np.ptp(found - even) < 1.1 * float(np.median(np.diff(time))) else found
 
 
 def _edges(time: FloatArray, values: FloatArray, unit: str, step: float) -> Samples:

@@ -5,6 +5,7 @@ the pendulum's frequency; the density of coloured noise there differs from its m
 """
 
 import math
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -136,6 +137,11 @@ class Shapes(NamedTuple):
     square: FloatArray
 
     @property
+    def smoother(self) -> "Shapes":
+        """The same squares, of fluctuations that are smoother than a random walk."""
+        return Shapes(self.weight**2, self.square)
+
+    @property
     def chance(self) -> float:
         """Probability that noise alone gives such squares."""
         return tail_of_squares(float(self.weight @ self.square), self.weight)
@@ -163,9 +169,12 @@ def find_random_torque(data: Data, fit: Fit, noise: Noise, samples: Samples) -> 
         np.append(amplitude.weight, phase.weight), np.append(amplitude.square, phase.square)
     )
     size, sd, gain = _likelihood(both)
+    # What a law lacks changes amplitude and phase too, and more smoothly than kicks do.
+    margin = gain - _likelihood(both.smoother)[2]
     less = min(_likelihood(amplitude)[2], _likelihood(phase)[2])
     gain = min(gain, _LARGEST_IMBALANCE * less) if p_value < _SUSPECT else 0.0
-    return _described(data, fit, p_value, size / per_kick, sd / per_kick, gain)
+    found = _described(data, fit, p_value, size / per_kick, sd / per_kick, gain)
+    return replace(found, margin=margin)
 
 
 def _fluctuations(data: Data, fit: Fit, noise: Noise) -> tuple[Shapes, Shapes, float]:
@@ -217,8 +226,7 @@ def _likelihood(shapes: Shapes) -> tuple[float, float, float]:
 
 def _may_walk(shapes: Shapes) -> bool:
     """Whether it may be a random walk: no smoother than one, and of one strength at all scales."""
-    smoother = Shapes(shapes.weight**2, shapes.square)
-    if _likelihood(smoother)[2] > _likelihood(shapes)[2] + _SMOOTH_GAIN:
+    if _likelihood(shapes.smoother)[2] > _likelihood(shapes)[2] + _SMOOTH_GAIN:
         return False
     half = len(shapes.weight) // 2
     slow, slow_sd, slow_gain = _likelihood(Shapes(shapes.weight[:half], shapes.square[:half]))
