@@ -128,6 +128,16 @@ def test_play_is_right_to_a_ten_thousandth(gap: float) -> None:
     assert np.max(np.abs(found - expected)) < 1e-4 * effect
 
 
+def test_a_parametric_drive_is_right_to_a_ten_thousandth() -> None:
+    """Near twice the frequency, where it beats."""
+    h, pace = 1e-3, 2.0 * math.pi * 1.85
+    law = with_extra(lambda t, x, v, s, turn: -h * OMEGA**2 * x * math.cos(pace * t))
+    expected = integrate(law, START, 0.0, TIME)
+    found = evaluated("parametric-drive", (h, 0.0, 1.85), BASE, TIME).sampled.angle
+    effect = np.max(np.abs(expected - plain(BASE, TIME)))
+    assert np.max(np.abs(found - expected)) < 1e-4 * effect
+
+
 def test_x_times_its_size_is_right_to_a_thousandth() -> None:
     """Its curvature jumps at x = 0, between the nodes of the clock."""
     law = with_extra(lambda t, x, v, s, turn: -0.1 * OMEGA**2 * x * abs(x))

@@ -40,6 +40,7 @@ DYNAMICS = [
     "second-mode",
     "plane-coupling",
     "periodic-drive",
+    "parametric-drive",
     "broadband-drive",
     "frequency-drift",
     "damping-drift",
@@ -178,7 +179,7 @@ def numerical(model: Model, value: Floats, index: int, step: float) -> Floats:
     return (model.reading(high) - model.reading(low)) / (2.0 * step)
 
 
-FREQUENCIES = ("f_2", "f_d", "f_a", "detuning")
+FREQUENCIES = ("f_2", "f_d", "f_h", "f_a", "detuning")
 BASELINE_STEPS = {A: 1e-5, B: 1e-5, C: 1e-6, OMEGA: 1e-5, START: 1e-5, TIME: 1e-5, OFFSET: 1e-5}
 
 

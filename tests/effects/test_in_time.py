@@ -10,7 +10,7 @@ import pytest
 from pendpipe.effects.baseline import TIME as TIME_S
 from pendpipe.effects.baseline import pendulum_of
 from pendpipe.effects.catalogue import by_identifier
-from pendpipe.effects.effect import STRAIGHT_S
+from pendpipe.effects.effect import STRAIGHT_S, Span
 from pendpipe.effects.model import Model
 
 from .lock_in import lock_in
@@ -124,6 +124,17 @@ def test_a_second_plane_beats() -> None:
         window = lock_in(TIME, found, OMEGA, start, start + 4.0 * CYCLE)
         beat = math.cos(2.0 * math.pi * detuning * window.time_s)
         assert window.amplitude - 0.15 == pytest.approx(q * beat, abs=0.06 * q)
+
+
+@pytest.mark.parametrize("pump", [2e-3, -2e-3])
+def test_a_parametric_drive_at_twice_the_frequency_pumps(pump: float) -> None:
+    """By x'' + w^2 (1 + h sin 2wt) x = 0 it grows as exp(h w t/4), or falls (Mathieu)."""
+    twice = 2.0 * OMEGA / (2.0 * math.pi)
+    found = reading("parametric-drive", (0.0, pump, twice), baseline(), TIME)
+    for start in (0.0, 20.0, 45.0):
+        window = lock_in(TIME, found, OMEGA, start, start + 8.0 * CYCLE)
+        growth = math.log(window.amplitude / 0.15)
+        assert growth == pytest.approx(0.25 * pump * OMEGA * window.time_s, rel=0.03)
 
 
 def test_history_starts_from_rest() -> None:
@@ -257,3 +268,18 @@ def test_samples_are_lost_whole(samples: float) -> None:
     # One of the ten readings of a mean is a whole one.
     span = span._replace(fold=10)
     assert cost(0.1) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_drive_that_keeps_in_step_is_a_loss() -> None:
+    """It is as likely as any from a quarter of a turn over the record on."""
+    drive, span = (
+        by_identifier("parametric-drive"),
+        Span(0.0, 60.0, 0.04, pendulum_of(baseline(b=0.02)), 0.4, 0.1),
+    )
+    slips = np.array([1e-4, 1e-2, 0.25, 1.0, 10.0]) / span.duration_s
+    unlikely = [
+        drive.prior_penalty(np.array([1e-3, 0.0, 2.0 / span.period_s + d]), span) for d in slips
+    ]
+    assert unlikely == sorted(unlikely, reverse=True)
+    assert unlikely[0] == pytest.approx(2.0 * math.log(2500.0), rel=0.01)
+    assert unlikely[2:] == pytest.approx([0.0] * 3, abs=1e-6)

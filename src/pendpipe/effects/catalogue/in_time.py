@@ -173,6 +173,39 @@ def periodic_drive(
     return tone_at(cosine, sine, 2.0 * math.pi * f_d * since_release(motion, pendulum))
 
 
+def _keeps_in_step(values: FloatArray, span: Span) -> float:
+    """Twice the logarithm by which a drive is less likely to stay in step: that is a loss."""
+    slipped = abs(float(values[2]) - 2.0 / span.period_s) * span.duration_s
+    return -2.0 * math.log(min(max(4.0 * slipped, 1e-6), 1.0))
+
+
+@enters(
+    "acceleration",
+    identifier="parametric-drive",
+    name="parametric drive",
+    equation=r"\omega^2 x \to \omega^2 x (1 + h_c \cos 2\pi f_h t + h_s \sin 2\pi f_h t)",
+    parameters=(
+        Parameter("h_cosine", "1", -1.0, 1.0),
+        Parameter("h_sine", "1", -1.0, 1.0, 0.0),
+        Parameter("f_h", "Hz", 0.0, 1e6),
+    ),
+    sizes=2,
+    example=(2e-4, 1e-4, 1.85),
+    discriminating_test="stop what shakes the pivot, or record another length beside it",
+    shapes=lambda span: rows(2.0 / span.period_s - np.ravel(_detunings(span))),
+    prior_penalty=_keeps_in_step,
+)
+def parametric_drive(
+    motion: Motion, pendulum: Pendulum, cosine: float, sine: float, f_h: float
+) -> FloatArray:
+    """A pivot that is shaken up and down, or a length that changes, at about twice the frequency.
+
+    Amplitude and phase beat with the difference to twice the pendulum's frequency.
+    """
+    torque = tone_at(cosine, sine, 2.0 * math.pi * f_h * since_release(motion, pendulum))
+    return np.asarray(-(pendulum.angular_frequency**2) * motion.angle * torque)
+
+
 BROADBAND_DRIVE: Final[Effect] = without_template(
     __name__,
     "Random torque (seismic, air): amplitude and phase walk, and never come to rest.",
