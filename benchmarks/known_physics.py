@@ -9,7 +9,8 @@ if one of its alternatives (split by `/`) is named, or belongs to the class of a
 
 Residuals are set beside the floor of the sensor, never beside a fitted spectrum: step/sqrt(12) for
 an encoder that is read at fixed times, else what polynomials of degree 5 leave of nine
-neighbouring rows.
+neighbouring rows. Beside what was left by hand stands what names leave of the same readings
+(`hand_span`, s).
 """
 
 from __future__ import annotations
@@ -248,6 +249,11 @@ def ask(row: Mapping[str, str], limit_s: float) -> dict[str, Any]:
     words = [str(path), *options]
     fit = run("fit", words, limit_s)
     diagnosis = run("diagnose", [*words, "--no-figures"], limit_s)
+    same = diagnosis
+    if row["hand_span"]:
+        ends = zip(("--start", "--stop"), row["hand_span"].split(":"), strict=True)
+        span = [word for end, at in ends if at for word in (end, at)]
+        same = run("diagnose", [*words, *span, "--no-figures"], limit_s)
     names = [each.removeprefix("--") for each in options[::2]]
     recording = pp.read(path, **dict(zip(names, options[1::2], strict=True)))
     kept = slice(None)
@@ -262,7 +268,8 @@ def ask(row: Mapping[str, str], limit_s: float) -> dict[str, Any]:
     if row["encoder_step"]:
         floor = float(row["encoder_step"]) * 1e-3 / np.sqrt(12)
     rms = float(np.std(recording.values[kept]))
-    return {"record": row["record"], "fit": fit, "diagnosis": diagnosis, "floor": floor, "rms": rms}
+    asked = {"fit": fit, "diagnosis": diagnosis, "same_span": same}
+    return {"record": row["record"], **asked, "floor": floor, "rms": rms}
 
 
 # ---------------------------------------------------------------- the table
@@ -292,7 +299,9 @@ def judge(row: Mapping[str, str], kept: Mapping[str, Any]) -> dict[str, Any]:
         judged["over_floor"] = {key: value / kept["floor"] for key, value in left.items()}
         judged["followed"] = left["curve"] < FOLLOWED * kept["rms"]
         if row["hand_rms"]:
-            judged["over_hand"] = left["names"] / (float(row["hand_rms"]) * 1e-3)
+            same = kept["same_span"]
+            names = residuals(same["content"], same["said"])["names"]
+            judged["over_hand"] = names / (float(row["hand_rms"]) * 1e-3)
     return judged
 
 

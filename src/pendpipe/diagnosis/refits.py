@@ -74,15 +74,16 @@ def _names_first(rivals: list[Rival]) -> list[Rival]:
 
     Where even the best leaves a misfit, names and curves will be needed together, and a curve that
     was drawn first would hide the names. What is not needed beside the curve is dropped again.
-    Among names that the record can't distinguish the prior decides.
+    Among names that the record can't distinguish the prior decides; then a law that acts throughout
+    comes before an event, which takes a part of any misfit.
     """
     half = 0.5 * max(rival.gain for rival in rivals)
     best = max(rivals, key=lambda rival: -math.inf if rival.drawn else rival.evidence)
     near = best.evidence - class_width(best)
 
-    def order(rival: Rival) -> tuple[bool, float, float]:
+    def order(rival: Rival) -> tuple[bool, float, bool, float]:
         prior = rival.prior if rival.evidence > near else -math.inf
-        return rival.drawn or rival.gain < half, -prior, -rival.evidence
+        return rival.drawn or rival.gain < half, -prior, rival.lead.effect.local, -rival.evidence
 
     return sorted(rivals, key=order)
 
