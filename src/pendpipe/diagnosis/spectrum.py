@@ -73,7 +73,9 @@ class ToneScan:
         where chance explains it.
         """
         seen = self.inverse.any(axis=1)
-        resolved = self.size / len(self.envelope)
+        power = self.envelope**2
+        # A tone that fades is wider.
+        resolved = self.size * float(power @ power) / float(power.sum()) ** 2
 
         def sums(cosines: float) -> FloatArray:
             width = 2 * round(cosines * resolved) + 1
