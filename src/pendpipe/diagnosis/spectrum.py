@@ -59,11 +59,12 @@ class ToneScan:
         """Return the probability that chance alone does better at each frequency by itself.
 
         It is that of `scores.local_p_values` for two degrees of freedom. Where the frequencies
-        beside one are louder than the noise should be, it is compared with them.
+        beside one are louder than the noise should be, it is compared with them. They tell the
+        noise too where its spectrum is hardly known, as beside a strong line.
         """
         level, beside = self._beside(scores)
-        variance = np.where(level > 1.0, np.maximum(1.0 / beside, self.log_scale_variance), 0.0)
-        half = np.maximum(0.5 * np.maximum(variance, self.log_scale_variance), 1e-12)
+        least = np.where(level > 1.0, 1.0 / beside, self.log_scale_variance)
+        half = np.maximum(0.5 * np.minimum(least, 1.0 / beside), 1e-12)
         return np.asarray(np.exp(-0.5 / half * np.log1p(half * scores / level)))
 
     def _beside(self, scores: FloatArray) -> tuple[FloatArray, FloatArray]:
