@@ -170,7 +170,7 @@ def refit_without(state: State, steps: Sequence[Step]) -> Fit | None:
 def describe(state: State, p_value: float, task: Task) -> bool:
     """Add what describes best what is left, a curve or a rare name, if that lowers the score.
 
-    Where nothing was found in what chance does not explain, the best curve says so.
+    Where nothing but sin x was found in what chance does not explain, the best curve says so.
     """
     curves = [(curve, np.zeros(curve.count)) for curve in _curves(state.fit, state, in_time=True)]
     fits = [fit for pair in curves if (fit := _with(state.fit, *pair, state))]
@@ -178,7 +178,8 @@ def describe(state: State, p_value: float, task: Task) -> bool:
         return False
     scale = Scale.of(min(fits, key=lambda fit: fit.chi2), state.data, state.noise)
     rivals = ranked([_rival(state.fit, fit, scale) for fit in fits])
-    needed = not (state.steps or state.faults) and p_value < task.level
+    found = [*filter(is_further, state.steps), *state.faults]
+    needed = not found and p_value < task.level
     if rivals[0].evidence <= CHOICE and not needed:
         return False
     rivals = prefer_rare(state, rivals, task)
