@@ -158,17 +158,11 @@ def grown(state: State, task: Task, beginning: Beginning) -> Search:
 
 
 def _grow(state: State, task: Task) -> None:
-    """Add effects until chance explains the rest, then improve the set.
-
-    Of two laws that each take half of a misfit neither pays its price before the other is there:
-    one is added on trial.
-    """
-    paid = True
+    """Add effects until chance explains the rest, then improve the set."""
     while len(state.steps) < _MOST_EFFECTS:
         task.forensics.before(state, task.progress)
-        if not _add_one(state, task, on_trial=paid):
+        if not _add_one(state, task):
             break
-        paid = _pays(state.steps[-1], state.steps[:-1])
     improve(state, task.progress, task.rare(state))
     if task.forensics.again(state, task.progress):
         improve(state, task.progress, task.rare(state))
@@ -225,11 +219,8 @@ def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     return fit
 
 
-def _add_one(state: State, task: Task, *, on_trial: bool) -> bool:
-    """Scan the catalogue and add the best effect; return whether one was added.
-
-    `on_trial` is whether it may be one that does not pay its price, where more than noise is left.
-    """
+def _add_one(state: State, task: Task) -> bool:
+    """Scan the catalogue and add the best effect; return whether one was added."""
     gross, progress = is_gross(state.fit, state.data), task.progress
     effects = task.scanned(state)
     assert state.now is not None
@@ -261,8 +252,6 @@ def _add_one(state: State, task: Task, *, on_trial: bool) -> bool:
     if not rivals or (not gross and task.forensics.kicked_at_random(state, rivals[0], progress)):
         return False
     step = _first_that_predicts(state, rivals, p_value, progress)
-    if step is None and on_trial:
-        step = _on_trial(Step(tuple(rivals), p_value, state.fit), state)
     if step is None:
         return False
     winner = step.winner
@@ -282,13 +271,16 @@ def _first_that_predicts(
 ) -> Step | None:
     """Return the best effect that pays its price and predicts cycles left out no worse.
 
-    In a gross misfit it is what is still missing that decides how well cycles are predicted.
+    Where more than noise is left none need pay yet: of two laws that share a misfit neither does
+    before the other is there, and what is not needed then is dropped. In a gross misfit it is what
+    is still missing that decides how well cycles are predicted.
     """
     gross = is_gross(state.fit, state.data)
     asked = [each for each in rivals if each is rivals[0] or not each.lead.effect.rare]
     for rival in asked[:_TRIED]:
         step = Step((rival, *(other for other in rivals if other is not rival)), p_value, state.fit)
-        if not _pays(step, state.steps):
+        pays = rival.worth >= price([*state.steps, step]) - price(state.steps)
+        if not (pays or remainder_of(rival.fit, state.data, state.noise).systematic):
             continue
         effect, held = rival.lead.effect, state.held
         if isinstance(effect, ReleasedParameter):
@@ -298,18 +290,6 @@ def _first_that_predicts(
             return step
         progress(f"{rival.name} predicts cycles that are left out worse: it is not added")
     return None
-
-
-def _on_trial(step: Step, state: State) -> Step | None:
-    """Return a name that does not pay its price, and leaves more than noise; else None."""
-    left = remainder_of(step.winner.fit, state.data, state.noise)
-    asked = left.systematic and not step.winner.drawn and not _pays(step, state.steps)
-    return step if asked else None
-
-
-def _pays(step: Step, before: Sequence[Step]) -> bool:
-    """Whether an effect is worth the price of its name."""
-    return step.winner.worth >= price([*before, step]) - price(before)
 
 
 def _rms(fit: Fit, data: Data) -> float:
