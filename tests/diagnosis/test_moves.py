@@ -242,6 +242,18 @@ def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
     assert after.excess < 0.2 * before.excess
 
 
+def test_what_is_left_is_described_where_only_sin_x_was_found() -> None:
+    """A line that sweeps, of which no curve makes much."""
+    sine = by_identifier("circular-error")
+    model, value = Model(TIME_S, INTERVAL_S, (sine,)), np.append(TRUTH, 1.0)
+    data, noise = prepared(model.reading(value) + 0.3 * CHIRP + white(6))
+    fit = refine(model, data, noise, value)
+    known = Step((Rival(Lead(sine, (), 9.0, 0.0), fit, 9.0, 9.0, 9.0),), 0.0, fit)
+    state = State(fit, data, noise, [], fit.value[: len(TRUTH)], [known])
+    assert describe(state, 1e-9, task_for(recording(data.values, 6)))
+    assert state.steps[-1].winner.drawn
+
+
 def test_noise_is_not_described() -> None:
     fit, data, noise = null_fit()
     state = State(fit, data, noise, [], fit.value)
@@ -321,3 +333,16 @@ def test_a_random_cause_pays_the_price_of_a_name(
         state.faults.clear()
         forensics._examine(name, state, silent)
         assert [fault.finding.identifier for fault in state.faults] == [name] * told
+
+
+@pytest.mark.parametrize("times", [3.0, 10.0])
+def test_two_laws_that_share_a_misfit_are_both_found(times: float) -> None:
+    """Each takes half of it, which is not worth the price of a name before the other is there."""
+    step, sensor = VALUES["equilibrium-step"], VALUES["sensor-quadratic"]
+    effects = tuple(map(by_identifier, ("equilibrium-step", "sensor-quadratic")))
+    value = np.append(TRUTH, [times * step[0], step[1], times * sensor[0]])
+    found = diagnose_recording(
+        recording(Model(TIME_S, INTERVAL_S, effects).reading(value), 5)
+    ).effects
+    assert {effect.identifier for effect in found} == {"equilibrium-step", "sensor-quadratic"}
+    assert all(effect.probability > 0.5 for effect in found)

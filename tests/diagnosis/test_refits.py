@@ -11,7 +11,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.detect import Detection, Lead
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, of_one_class
 from pendpipe.diagnosis.refine import pulled, refine
-from pendpipe.diagnosis.refits import NEAR, refit_leads, side_by_side, useful_chi2
+from pendpipe.diagnosis.refits import NEAR, _names_first, refit_leads, side_by_side, useful_chi2
 from pendpipe.effects.baseline import OMEGA, A, C
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
@@ -109,3 +109,21 @@ def test_what_happens_at_one_instant_is_compared_there(part: float) -> None:
     (found,) = [rival for rival in rivals if rival.identifier == "impulse"]
     assert found.fit.value[-1] == pytest.approx(truth[-1], abs=0.1 * period_s)
     assert found is rivals[0] or of_one_class(rivals[0], found)
+
+
+@pytest.mark.parametrize(
+    ("behind", "first"), [(1.0, "presliding-friction"), (30.0, "frequency-step")]
+)
+def test_in_a_misfit_a_law_that_acts_throughout_comes_before_an_event(
+    behind: float, first: str
+) -> None:
+    """A step takes a part of any misfit; one that explains it far better leads."""
+    fit, _, _ = null_fit()
+    rivals = [
+        Rival(Lead(by_identifier(name), (), 0.0, 0.0), fit, gain, worth, worth)
+        for name, gain, worth in (
+            ("frequency-step", 1000.0, 60.0),
+            ("presliding-friction", 900.0, 60.0 - behind),
+        )
+    ]
+    assert _names_first(rivals)[0].identifier == first

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,11 +15,11 @@ from .records import INTERVAL_S, TIME_S, null_fit, white
 LINE_HZ = 3.3
 
 
-def scanned(readings: FloatArray) -> tuple[ToneScan, FloatArray]:
-    """A scan of readings for steady tones, and the chi^2 of each frequency."""
+def scanned(readings: FloatArray, decay_s: float = np.inf) -> tuple[ToneScan, FloatArray]:
+    """A scan of readings for tones, steady or fading, and the chi^2 of each frequency."""
     fit, data, noise = null_fit()
     basis = np.linalg.qr(fit.jacobian[:, list(fit.free)])[0]
-    scan = tone_scan(data, noise, basis, np.inf, Band(0.1))
+    scan = tone_scan(data, noise, basis, decay_s, Band(0.1))
     whitened = np.append(noise.whiten(readings), 0.0)
     whitened -= basis @ (basis.T @ whitened)
     return scan, scan.scores(noise.adjoint(whitened[:-1]))
@@ -45,3 +47,24 @@ def test_the_highest_peak_of_a_resonance_is_no_line(seed: int) -> None:
     assert np.exp(-0.5 * scores[best]) < 1e-6
     # 1500 cosines are tried: one in fifty is as improbable as that.
     assert scan.p_values(scores).min() > 0.02 / len(TIME_S)
+
+
+@pytest.mark.parametrize("decay_s", [10.0, 50.0])
+def test_a_tone_that_fades_is_not_hidden_by_its_own_width(decay_s: float) -> None:
+    """What lies a few 1/duration beside it is its own."""
+    tone = 1e-3 * np.exp(-TIME_S / decay_s) * np.cos(2.0 * np.pi * LINE_HZ * TIME_S)
+    scan, scores = scanned(white(7) + tone, decay_s)
+    best = int(np.argmax(scores))
+    assert scores[best] > 1000.0
+    assert np.log(scan.p_values(scores)[best]) < -50.0
+
+
+def test_beside_a_strong_line_its_neighbours_tell_the_noise() -> None:
+    """The spectrum may be unknown there by a factor of four: no line would be improbable."""
+    line = 3e-4 * np.cos(2.0 * np.pi * LINE_HZ * TIME_S)
+    scan, scores = scanned(white(7) + line)
+    unsure = replace(scan, log_scale_variance=np.full_like(scan.log_scale_variance, 2.0))
+    best = int(np.argmax(scores))
+    assert np.log(unsure.p_values(scores)[best]) < -50.0
+    noise = unsure.p_values(scanned(white(8))[1])
+    assert noise.min() > 0.02 / len(TIME_S)
