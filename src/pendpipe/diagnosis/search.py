@@ -1,8 +1,9 @@
 """Add one effect after another, until nothing significant is left."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from pendpipe.diagnosis.alternatives import prefer_parameters, reconsider_red_no
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Detection, more_leads, printed
-from pendpipe.diagnosis.evidence import Rival
+from pendpipe.diagnosis.evidence import Rival, Scale
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.held_out import predicts_worse
 from pendpipe.diagnosis.known_first import known_law_first
@@ -158,14 +159,41 @@ def grown(state: State, task: Task, beginning: Beginning) -> Search:
 
 
 def _grow(state: State, task: Task) -> None:
-    """Add effects until chance explains the rest, then improve the set."""
+    """Add effects until chance explains the rest, then improve the set.
+
+    Of two laws that share a misfit neither may pay its price before the other is there. From the
+    first that does not pay on, names stand if together they leave noise alone.
+    """
+    paid: list[dict[str, Any]] = []
     while len(state.steps) < _MOST_EFFECTS:
         task.forensics.before(state, task.progress)
-        if not _add_one(state, task):
+        before = [_as_it_is(each) for each in (state, task.forensics)]
+        if not _add_one(state, task, names_first=bool(paid)):
             break
+        if not paid and not _pays(state.steps[-1], state.steps[:-1]):
+            paid = before
+    _improve(state, task)
+    clean = Scale.of(state.fit, state.data, state.noise).clean
+    if paid and (not clean or any(step.winner.drawn for step in state.steps)):
+        task.progress("more than noise is left: dropping what does not pay its price")
+        for each, was in zip((state, task.forensics), paid, strict=True):
+            vars(each).update(was)
+        _improve(state, task)
+
+
+def _improve(state: State, task: Task) -> None:
+    """Make the moves that lower the score; masked readings may come back with them."""
     improve(state, task.progress, task.rare(state))
     if task.forensics.again(state, task.progress):
         improve(state, task.progress, task.rare(state))
+
+
+def _as_it_is(thing: object) -> dict[str, Any]:
+    """Return its attributes, so that they can be restored."""
+    return {
+        name: copy(value) if isinstance(value, (list, dict)) else value
+        for name, value in vars(thing).items()
+    }
 
 
 def _described(state: State, task: Task) -> Fit | None:
@@ -219,8 +247,8 @@ def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     return fit
 
 
-def _add_one(state: State, task: Task) -> bool:
-    """Scan the catalogue and add the best effect; return whether one was added."""
+def _add_one(state: State, task: Task, *, names_first: bool) -> bool:
+    """Scan the catalogue and add the best effect, or name; return whether one was added."""
     gross, progress = is_gross(state.fit, state.data), task.progress
     effects = task.scanned(state)
     assert state.now is not None
@@ -247,11 +275,15 @@ def _add_one(state: State, task: Task) -> bool:
     rivals.sort(key=lambda rival: rival.lead.effect.rare)
     if rivals:
         rivals = prefer_parameters(state, rivals)
+    if names_first:
+        rivals.sort(key=lambda rival: rival.drawn)
     if rivals:
         rivals = prefer_rare(state, rivals, task)
     if not rivals or (not gross and task.forensics.kicked_at_random(state, rivals[0], progress)):
         return False
-    step = _first_that_predicts(state, rivals, p_value, progress)
+    step = _first_that_predicts(state, rivals, p_value, progress) or _on_trial(
+        Step(tuple(rivals), p_value, state.fit), state
+    )
     if step is None:
         return False
     winner = step.winner
@@ -271,16 +303,13 @@ def _first_that_predicts(
 ) -> Step | None:
     """Return the best effect that pays its price and predicts cycles left out no worse.
 
-    Where more than noise is left none need pay yet: of two laws that share a misfit neither does
-    before the other is there, and what is not needed then is dropped. In a gross misfit it is what
-    is still missing that decides how well cycles are predicted.
+    In a gross misfit it is what is still missing that decides how well cycles are predicted.
     """
     gross = is_gross(state.fit, state.data)
     asked = [each for each in rivals if each is rivals[0] or not each.lead.effect.rare]
     for rival in asked[:_TRIED]:
         step = Step((rival, *(other for other in rivals if other is not rival)), p_value, state.fit)
-        pays = rival.worth >= price([*state.steps, step]) - price(state.steps)
-        if not (pays or remainder_of(rival.fit, state.data, state.noise).systematic):
+        if not _pays(step, state.steps):
             continue
         effect, held = rival.lead.effect, state.held
         if isinstance(effect, ReleasedParameter):
@@ -290,6 +319,18 @@ def _first_that_predicts(
             return step
         progress(f"{rival.name} predicts cycles that are left out worse: it is not added")
     return None
+
+
+def _on_trial(step: Step, state: State) -> Step | None:
+    """Return a name that does not pay its price alone, and leaves more than noise; else None."""
+    left = remainder_of(step.winner.fit, state.data, state.noise)
+    asked = left.systematic and not step.winner.drawn and not _pays(step, state.steps)
+    return step if asked else None
+
+
+def _pays(step: Step, before: Sequence[Step]) -> bool:
+    """Whether an effect is worth the price of its name."""
+    return step.winner.worth >= price([*before, step]) - price(before)
 
 
 def _rms(fit: Fit, data: Data) -> float:
