@@ -174,7 +174,9 @@ def prepare(fit: Fit, data: Data, noise: Noise, effects: Sequence[Effect]) -> Sc
         steady = Band(_FEWEST_CYCLES / float(since[-1]), own, plane_band_hz(fit.at.span))
         scans.append(tone_scan(data, noise, bank.basis, math.inf, steady))
         scans += [
-            tone_scan(data, noise, bank.basis, part * float(since[-1]), Band(_LOWEST_MODE * own))
+            tone_scan(
+                data, noise, bank.basis, part * float(since[-1]), Band(_LOWEST_MODE * own, own)
+            )
             for part in _DECAY_TIMES
         ]
     return Scanner(bank, noise, spectral, tuple(scans))

@@ -11,6 +11,7 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.remainder import by_cycle
 from pendpipe.diagnosis.result import Location
+from pendpipe.diagnosis.spectrum import OFF_HARMONIC
 from pendpipe.diagnosis.statement import listed
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
@@ -22,8 +23,6 @@ _INTERVAL_SHARE: Final = 0.9
 """Part of what an effect explains that its intervals hold."""
 _LARGE_PHASE_RAD: Final = 0.3
 """Phase difference of two models in rad from which the difference of readings misleads."""
-_OFF_HARMONIC: Final = 0.1
-"""Distance of a separate line from the nearest harmonic, over the motion's frequency."""
 _HARMONICS: Final = 6
 _HARMONIC_SHARE: Final = 0.1
 
@@ -122,7 +121,7 @@ def instant_of(fit: Fit, effect: Effect) -> tuple[float, float] | None:
 def off_harmonics(fit: Fit, effect: Effect) -> bool:
     """Whether an effect is a line off the motion's harmonics: no misfit of the motion makes one."""
     off = _from_harmonic(fit, effect)
-    return off is not None and off.value > _OFF_HARMONIC
+    return off is not None and off.value > OFF_HARMONIC
 
 
 def near_harmonic_by_chance(fit: Fit, effect: Effect) -> float:

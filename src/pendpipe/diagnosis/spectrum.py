@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 
@@ -17,15 +17,17 @@ _LINE: Final = 2.0
 """Frequencies beside a line, in 1/duration: how far they reach, and how far the line does."""
 _LOUD: Final = 2.0
 """Standard deviations by which they are louder than the noise explains."""
+OFF_HARMONIC: Final = 0.1
+"""Distance of a separate line from the nearest harmonic, over the motion's frequency."""
 _VISIBLE: Final = 0.02
 """Part of a tone's power that must remain after the projection."""
 
 
 class Band(NamedTuple):
-    """The scanned frequencies: above one, and not near another."""
+    """The scanned frequencies: above one, and not near the motion's own."""
 
     above_hz: float
-    not_hz: float = 0.0
+    own_hz: float
     width_hz: float = 0.0
 
 
@@ -46,6 +48,13 @@ class ToneScan:
         zero where nothing remains.
     log_scale_variance
         Variance of the logarithm of the noise at each frequency, shape (m,).
+    size
+        Of the Fourier transform.
+    wider
+        By how much a tone is wider than a steady one.
+    as_steady
+        Where what lies beside a steady tone is taken, shape (m,): near the motion's harmonics,
+        whose misfits fade too, or everywhere if beside a wider one lies the next harmonic.
     """
 
     decay_s: float
@@ -54,6 +63,8 @@ class ToneScan:
     inverse: FloatArray
     log_scale_variance: FloatArray
     size: int
+    wider: float
+    as_steady: BoolArray
 
     def p_values(self, scores: FloatArray) -> FloatArray:
         """Return the probability that chance alone does better at each frequency by itself.
@@ -71,12 +82,19 @@ class ToneScan:
         """Return the level of the frequencies beside each one, over the noise, and their number.
 
         A spectrum that is smooth over many cosines misses the resonance of a stand. A level is 1
-        where chance explains it.
+        where chance explains it. A tone that fades is wider.
+        """
+        steady = self.size / len(self.envelope)
+        found = [self._about(scores, resolved) for resolved in (steady, steady * self.wider)]
+        level, beside = (np.where(self.as_steady, *each) for each in zip(*found, strict=True))
+        return np.where(level > 1.0 + _LOUD / np.sqrt(beside), level, 1.0), beside
+
+    def _about(self, scores: FloatArray, resolved: float) -> tuple[FloatArray, FloatArray]:
+        """Return the mean of the frequencies about each one, and their number.
+
+        `resolved` is by how many entries independent frequencies lie apart.
         """
         seen = self.inverse.any(axis=1)
-        power = self.envelope**2
-        # A tone that fades is wider.
-        resolved = self.size * float(power @ power) / float(power.sum()) ** 2
 
         def sums(cosines: float) -> FloatArray:
             width = 2 * round(cosines * resolved) + 1
@@ -84,9 +102,7 @@ class ToneScan:
             return np.asarray(width * uniform_filter1d(pair, width, mode="constant"))
 
         total, number = sums(_BESIDE) - sums(_LINE)
-        beside = np.maximum(number / resolved, 1.0)
-        mean = total / np.maximum(number, 1.0)
-        return np.where(mean > 1.0 + _LOUD / np.sqrt(beside), mean, 1.0), beside
+        return total / np.maximum(number, 1.0), np.maximum(number / resolved, 1.0)
 
     def scores(self, weights: FloatArray) -> FloatArray:
         """Return chi^2 (two degrees of freedom) of a tone at each frequency; shape (m, ...).
@@ -134,9 +150,14 @@ def tone_scan(data: Data, noise: Noise, basis: FloatArray, decay_s: float, band:
     seen = (
         (determinant > (_VISIBLE * 0.25 * (g11 + g22) ** 2))
         & (frequency > band.above_hz)
-        & (np.abs(frequency - band.not_hz) > band.width_hz)
+        & (np.abs(frequency - band.own_hz) > band.width_hz)
         & (frequency < 0.98 * frequency[-1])
     )
     safe = np.where(seen, determinant, 1.0)
     inverse = np.stack([h22 / safe, -h12 / safe, h11 / safe], axis=1) * seen[:, None]
-    return ToneScan(decay_s, envelope, frequency, inverse, noise.log_variance_at(cosine), size)
+    order, fade = frequency / band.own_hz, envelope**2
+    wider = float(count * (fade @ fade) / fade.sum() ** 2)
+    beyond = _BESIDE * wider / (count * data.interval_s) > band.own_hz
+    as_steady = beyond | (np.abs(order - np.rint(order)) < OFF_HARMONIC)
+    unsure = noise.log_variance_at(cosine)
+    return ToneScan(decay_s, envelope, frequency, inverse, unsure, size, wider, as_steady)

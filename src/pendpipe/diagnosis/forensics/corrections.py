@@ -303,10 +303,13 @@ def whole_steps(data: Data, fit: Fit, unit: FloatArray) -> Slips | None:
     unit
         What a step of one changes in each reading, rad, shape (n,).
     """
-    left, basis = data.residual(fit.at.reading) * data.weight, _slow(data, fit)
-    left = left - basis @ (basis.T @ left)
+    whole_left, slow = data.residual(fit.at.reading) * data.weight, _slow(data, fit)
+    known = slow.shape[1]
+    basis = np.empty((len(slow), known + _MOST), order="F")
+    basis[:, :known] = slow
+    left = whole_left - slow @ (slow.T @ whole_left)
     whole = _later(unit[:, None] ** 2 * data.weight[:, None])
-    alone = whole - np.sum(_later(unit[:, None] * basis) ** 2, axis=1, keepdims=True)
+    alone = whole - np.sum(_later(unit[:, None] * slow) ** 2, axis=1, keepdims=True)
     rows: list[int] = []
     for _ in range(_MOST):
         seen = alone[:, 0] > 1e-6 * whole[0]
@@ -316,10 +319,13 @@ def whole_steps(data: Data, fit: Fit, unit: FloatArray) -> Slips | None:
         if gain[row] < (2.0 * math.log(len(left)) + _CHOICE) * spread(left) ** 2:
             break
         rows.append(row)
-        known = basis.shape[1]
-        left, basis = _without(left, basis, _step(row, unit, data))
-        alone -= np.sum(_later(unit[:, None] * basis[:, known:]) ** 2, axis=1, keepdims=True)
-    return _whole(data, fit, unit, np.sort(np.array(rows, dtype=np.int64)))
+        column = _beside(_step(row, unit, data), basis[:, :known])
+        if column is not None:
+            left = left - column * float(column @ left)
+            alone -= _later((unit * column)[:, None]) ** 2
+            basis[:, known] = column
+            known += 1
+    return _whole(whole_left, slow, unit, data, np.sort(np.array(rows, dtype=np.int64)))
 
 
 def _later(columns: FloatArray) -> FloatArray:
@@ -354,26 +360,22 @@ def _step(row: int, unit: FloatArray, data: Data) -> FloatArray:
     return np.where(np.arange(len(unit)) >= row, unit, 0.0) * data.weight
 
 
-def _without(
-    left: FloatArray, basis: FloatArray, column: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Project one more column out of the residual, and add it to the basis."""
+def _beside(column: FloatArray, basis: FloatArray) -> FloatArray | None:
+    """Return what a column has beside a basis, of unit length; None where that is nothing."""
     length = float(np.linalg.norm(column))
     for _ in range(2):
         column = column - basis @ (basis.T @ column)
     alone = float(np.linalg.norm(column))
-    if alone < 1e-6 * length:
-        return left, basis
-    column = column / alone
-    return left - column * float(column @ left), np.column_stack([basis, column])
+    return None if alone < 1e-6 * length else column / alone
 
 
-def _whole(data: Data, fit: Fit, unit: FloatArray, rows: IntArray) -> Slips | None:
-    """Fit all sizes together."""
-    left, basis = data.residual(fit.at.reading) * data.weight, _slow(data, fit)
+def _whole(
+    left: FloatArray, slow: FloatArray, unit: FloatArray, data: Data, rows: IntArray
+) -> Slips | None:
+    """Fit all sizes together, beside what varies slowly."""
     while len(rows) >= _FEWEST:
         columns = np.column_stack([_step(row, unit, data) for row in rows.tolist()])
-        columns -= basis @ (basis.T @ columns)
+        columns -= slow @ (slow.T @ columns)
         sizes = np.asarray(np.linalg.lstsq(columns, left, rcond=1e-10)[0], dtype=np.float64)
         kept = np.abs(sizes) > 0.5
         if kept.all():
