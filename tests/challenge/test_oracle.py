@@ -84,6 +84,7 @@ def test_what_an_effect_was_sized_for_is_what_a_refit_loses(effect: str) -> None
 
 APPARATUS = {
     "amplitude-linear-stiffness",
+    "parametric-drive",
     "camera-geometry",
     "clock-slips",
     "count-slips",
