@@ -4,6 +4,7 @@ One lost sample changes chi^2 more than most physics. So faults that can corrupt
 tested before the catalogue, and those that only small residuals reveal after it.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
@@ -72,6 +73,7 @@ class Forensics:
         self.samples, self.level = samples, level
         self._recorded = samples
         self._quiet: dict[str, float] = {}
+        self._left: dict[str, float] = {}
         self.clock_notes: list[str] = []
 
     def p_value(self, faults: Sequence[Fault]) -> float:
@@ -241,16 +243,22 @@ class Forensics:
             state.faults = [fault for fault in state.faults if fault not in known]
 
     def _correct_slips(self, state: State, progress: Progress) -> None:
-        """Correct the values of an encoder that loses counts, or the times of a slipping clock."""
+        """Correct the values of an encoder that loses counts, or the times of a slipping clock.
+
+        Where none were found they are looked for again once the squares left have halved.
+        """
         # Slips that go on and on are as steady as noise, but never white.
         clean = state.fit.chi2 <= _CLEAN_CHI2 * state.data.used and not state.noise.coloured
+        left = float(np.sum((state.data.residual(state.fit.at.reading) * state.data.weight) ** 2))
         for name, most in SLIPS.items():
             if (
                 clean
                 or state.fit.max_phase_error_rad > most
                 or any(fault.finding.identifier == name for fault in state.faults)
+                or left > 0.5 * self._left.get(name, math.inf)
             ):
                 continue
+            self._left[name] = left
             corrected, finding = corrections.find_slips(name, state.data, state.fit, self.samples)
             if self._correct(state, corrected, finding):
                 progress(finding.summary)
