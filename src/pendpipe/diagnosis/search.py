@@ -33,6 +33,8 @@ from pendpipe.effects.curves import FOLLOW_UP_CURVES, Curve
 from pendpipe.quantities import compact
 
 _MOST_EFFECTS: Final = 4
+_GOOD_PART: Final = 1.0 / 3.0
+"""Of a misfit, that one of a few laws takes which share it."""
 _TRIED: Final = 3
 """Rivals tried in their order where the best predicts worse."""
 LESS_FRICTION: Final = (1.0, 0.9, 0.7, 0.4)
@@ -322,10 +324,11 @@ def _first_that_predicts(
 
 
 def _on_trial(step: Step, state: State) -> Step | None:
-    """Return a name that does not pay its price alone, and leaves more than noise; else None."""
-    left = remainder_of(step.winner.fit, state.data, state.noise)
-    asked = left.systematic and not step.winner.drawn and not _pays(step, state.steps)
-    return step if asked else None
+    """Return a name that does not pay its price alone, but takes a good part of a misfit."""
+    best = step.winner
+    before, left = (remainder_of(fit, state.data, state.noise) for fit in (state.fit, best.fit))
+    part = best.gain > _GOOD_PART * before.excess and left.systematic
+    return step if part and not (best.drawn or _pays(step, state.steps)) else None
 
 
 def _pays(step: Step, before: Sequence[Step]) -> bool:
