@@ -14,16 +14,18 @@ from scipy.interpolate import CubicSpline
 from pendpipe.analysis.turning_points.measure import prepare as prepare_samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import silent
+from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, lines
-from pendpipe.diagnosis.faults import Forensics
-from pendpipe.diagnosis.forensics import TESTS
+from pendpipe.diagnosis.faults import SLIPS, Forensics
+from pendpipe.diagnosis.forensics import TESTS, corrections
 from pendpipe.diagnosis.location import off_harmonics
 from pendpipe.diagnosis.moves import describe, improve
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import Finding
 from pendpipe.diagnosis.run import diagnose_recording
+from pendpipe.diagnosis.search import _on_trial
 from pendpipe.diagnosis.state import CHOICE, FURTHER, State, Step, price
 from pendpipe.diagnosis.task import Task
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
@@ -346,3 +348,38 @@ def test_two_laws_that_share_a_misfit_are_both_found(times: float) -> None:
     ).effects
     assert {effect.identifier for effect in found} == {"equilibrium-step", "sensor-quadratic"}
     assert all(effect.probability > 0.5 for effect in found)
+
+
+@pytest.mark.parametrize(("part", "worth", "tried"), [(0.5, 5.0, True), (0.1, 5.0, False)])
+def test_a_name_is_tried_on_credit_if_it_takes_a_good_part_of_the_misfit(
+    part: float, worth: float, tried: bool
+) -> None:
+    state = state_with(pulled() + white(6))
+    excess = remainder_of(state.fit, state.data, state.noise).excess
+    lead = Lead(by_identifier("impulse"), (), 0.0, 0.0)
+    step = Step((Rival(lead, state.fit, part * excess, worth, worth),), 0.0, state.fit)
+    assert worth < CHOICE
+    assert (_on_trial(step, state) is step) == tried
+
+
+def test_slips_are_looked_for_again_once_the_misfit_has_halved(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each search is long, and finds what it found before."""
+    asked: list[str] = []
+
+    def nothing_found(name: str, data: Data, *_: object) -> tuple[Data, Finding]:
+        asked.append(name)
+        return data, Finding(name, 1.0)
+
+    monkeypatch.setattr(corrections, "find_slips", nothing_found)
+    whole, part = (
+        state_with(other_engine(TRUTH) + share * (pulled() - other_engine(TRUTH)) + white(6))
+        for share in (3.0, 1.5)
+    )
+    forensics = task_for(recording(whole.data.values, 6)).forensics
+    for _ in range(3):
+        forensics._correct_slips(whole, silent)
+    assert asked == [*SLIPS]
+    forensics._correct_slips(part, silent)
+    assert asked == [*SLIPS, *SLIPS]
