@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from pendpipe.cli import main
 from pendpipe.formats import inspect, read
-from pendpipe.formats.table import clipped_samples, find_gaps, is_uniform, sample_rate
+from pendpipe.formats.table import clipped_samples, find_gaps, is_uniform, sample_rate, swing_of
 from pendpipe.recording import find_step, read_plain
 
 from .decays import WindaqFile, swing
@@ -122,3 +123,19 @@ def test_a_fault_ends_with_2_one_line_and_no_file(
     assert main(["convert", str(path), str(out)]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("last", [0.5, 0.05, 0.02])
+def test_the_cycles_of_a_decay_are_graded(last: float) -> None:
+    """Of an exponential decay to 1/20, ln(8.5)/ln(20) of the cycles lie from 0.85 to 0.1 of it."""
+    cycle = np.arange(20000) / 100.0
+    values = last ** (cycle / cycle[-1]) * np.cos(2.0 * np.pi * cycle)
+    lies = math.log(max(last, 0.1) / 0.85) / math.log(last)
+    assert swing_of(values).graded == pytest.approx(lies, abs=0.03)
+
+
+@pytest.mark.parametrize("off", [0.0, 0.05])
+def test_a_drive_that_is_switched_on_and_off_is_not_graded(off: float) -> None:
+    cycle = np.arange(20000) / 100.0
+    size = np.where(cycle % 50.0 < 25.0, 1.0, off)
+    assert swing_of(size * np.cos(2.0 * np.pi * cycle)).graded < 0.03
