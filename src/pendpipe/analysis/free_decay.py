@@ -346,7 +346,8 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     NotAnalysableError
         When there is no free decay of at least three half cycles: one line that says why.
     """
-    usable = recording.usable
+    # A whole recording is not copied.
+    usable = slice(None) if recording.usable.all() else recording.usable
     time, values = recording.time_s[usable], recording.values[usable]
     span = float(np.ptp(values)) if len(values) else 0.0
     if len(values) < 8 or span == 0:
@@ -364,11 +365,14 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
             else "no oscillation: the reading does not swing to and fro"
         )
         raise NotAnalysableError(place, why, "give a recording of a free decay")
+    pieces = [piece for piece in _pieces(time, 2.0 * half_period) if piece.stop - piece.start >= 8]
+    parts = [half_cycles(time[piece], values[piece], least, half_period) for piece in pieces]
+    gapless = pieces == [slice(0, len(time))]
+    whole = parts[0] if gapless else half_cycles(time, values, least, half_period)
     found = [
         run
-        for piece in _pieces(time, 2.0 * half_period)
-        if piece.stop - piece.start >= 8
-        for run in best_runs(half_cycles(time[piece], values[piece], least, half_period), piece)
+        for cycles, piece in zip(parts, pieces, strict=True)
+        for run in best_runs(cycles, piece)
         if run.legs >= _LEAST_HALF_CYCLES
     ]
     told = max(found, key=lambda run: run.worth, default=None)
@@ -376,7 +380,7 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     used = _chained(found, told) if told else []
     beside = sum(run.path for run in found) - sum(run.path for run in used)
     alone = told and beside <= 0.3 * told.path and _falls(told, least)
-    beat = _beating(time, values, least, half_period, place, driven=not alone)
+    beat = _beating(time, values, whole, half_period, place, driven=not alone)
     if beat is not None:
         return beat
     if told is None:
@@ -478,7 +482,7 @@ def _rise(swing: FloatArray) -> float:
 def _beating(
     time: FloatArray,
     values: FloatArray,
-    least: float,
+    cycles: HalfCycles,
     half_period: float,
     place: str | Path,
     *,
@@ -491,7 +495,6 @@ def _beating(
     NotAnalysableError
         When one of the modes does not decay, but is `driven` (else that is no beat).
     """
-    cycles = half_cycles(time, values, least, half_period)
     if len(cycles) < _MANY:
         return None
     half = np.diff(cycles.middle_s)
@@ -535,7 +538,7 @@ def _beating(
         values,
         start,
         stop,
-        quiet=2.0 * least,
+        quiet=2.0 * cycles.step,
         window_s=half_period,
         before=_BY_HAND,
     )

@@ -26,7 +26,7 @@ from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.physics.decay import amplitude_and_gradient
+from pendpipe.physics.decay import amplitude, amplitude_and_gradient
 
 _LOUD: Final = 2.0
 TOP: Final = 3.13
@@ -226,22 +226,19 @@ def fit_envelope(
     measured = points.amplitude_rad
     shared = -points.level_coupling * points.side
 
-    def parts(value: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def evaluate(value: FloatArray) -> Quadratic:
         a, b, c, y0, level = value
         model, gradient = amplitude_and_gradient(time, y0, a, b, c)
         jacobian = np.concatenate([gradient[:, 1:], gradient[:, :1], shared[:, None]], axis=1)
-        return measured - model - shared * level, jacobian
-
-    def evaluate(value: FloatArray) -> Quadratic:
-        residual, jacobian = parts(value)
         if not np.all(np.isfinite(jacobian)):
             return Quadratic(np.inf, np.zeros(5), np.eye(5))
-        return _quadratic(points, residual, jacobian, float(value[4]))
+        return _quadratic(points, measured - model - shared * level, jacobian, float(level))
 
     start, held = _start(points, fixed or {})
     found = minimise(evaluate, start, BOUNDS, held=held, tolerance=tolerance)
-    residual, _ = parts(found.value)
-    model = measured - residual - shared * found.value[4]
+    a, b, c, y0, level = found.value
+    model = amplitude(time, y0, a, b, c)
+    residual = measured - model - shared * level
     return EnvelopeFit(found.value, found.quadratic, held, model, residual, found.converged)
 
 
@@ -383,19 +380,21 @@ def envelope_and_period(
     fixed: Mapping[str, float],
     baseline: Baseline,
     restoring: Restoring,
-    tolerance: float = 1e-5,
+    *,
+    start: bool = False,
 ) -> tuple[EnvelopeFit, Period, float | None]:
-    """Fit the amplitudes of turning points, and then their times."""
+    """Fit the amplitudes of turning points, and then their times; as a start without errors."""
     if restoring == "linear":
-        envelope = fit_envelope(points, held, tolerance=tolerance)
+        envelope = fit_envelope(points, held, tolerance=0.3 if start else 1e-5)
     else:
         middle = share_of(parts, held.get("b", 0.0), baseline)
         envelope = fit_energies(points, held, share=0.5 if middle is None else middle)
     rates = envelope.value[:3].tolist()
     share = share_of(parts, rates[1], baseline)
     omega = 2.0 * math.pi * fixed["frequency"] if "frequency" in fixed else None
+    taken = 0.5 if start and share is None else share
     period = fit_period(
-        points, envelope.amplitude, rates, share=share, held=omega, restoring=restoring
+        points, envelope.amplitude, rates, share=taken, held=omega, restoring=restoring
     )
     return envelope, period, share
 
@@ -651,12 +650,9 @@ def sine_coefficient(points: TurningPoints) -> Coefficient:
     part = clear(points, _LARGE)
     if len(part) < _FEWEST or points.unit != "rad":
         return Coefficient(0.0, math.inf, 0.0)
-    start = _law_start(part, "sine")
-    losses = (*start.rates.tolist(), 0.5)
-    plain, phase = (
-        phases(part, part.amplitude_rad, losses, start.angular_frequency, torque)
-        for torque in TORQUES
-    )
+    amplitude, omega = part.amplitude_rad, 2.0 * math.pi * part.apparent_frequency_hz
+    losses = (*loss_rates(part.time_s, amplitude, part.angle_sd_rad).tolist(), 0.5)
+    plain, phase = (phases(part, amplitude, losses, omega, torque) for torque in TORQUES)
     weight = 1.0 / part.time_sd_s
     right = (part.time_s - part.time_s[0]) * weight
 

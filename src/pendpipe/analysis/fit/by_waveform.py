@@ -281,7 +281,7 @@ def start_values(
     omega = 2.0 * math.pi * fixed["frequency"] if "frequency" in fixed else None
     parts = loss_rates_of(fixed, points.apparent_frequency_hz)
     envelope, period, share = envelope_and_period(
-        points, held, parts, fixed, baseline, restoring, tolerance=0.3
+        points, held, parts, fixed, baseline, restoring, start=True
     )
     a, b, c, y0, level = (float(number) for number in envelope.value)
     # What is not known to a fraction of a radian accuses nobody.

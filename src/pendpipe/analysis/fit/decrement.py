@@ -31,6 +31,8 @@ _STEEP: Final = 0.5
 ever less nearer to the stop."""
 _SEEN: Final = 8.0
 """Standard deviations that a turning point must stand out."""
+_MISSED: Final = 1e-6
+"""Part of an amplitude by which the cycle about it may miss it."""
 _STEPS: Final = 4.0
 """Steps of the readings within which rounding moves all turning points alike."""
 
@@ -118,7 +120,7 @@ def _seen(points: TurningPoints) -> list[tuple[float, float, float]]:
         beyond = np.abs(logs[order] - logs[centre]) > reach
         beyond[:_FEWEST] = False
         window = order[np.cumsum(beyond) == 0]
-        found.append(seen_loss(points.chosen(np.isin(index, window))))
+        found.append(seen_loss(points.chosen(slice(window.min(), window.max() + 1))))
     return found
 
 
@@ -174,7 +176,10 @@ def loss_of(law: Eq8, amplitude: float) -> float:
             return _slow_loss(law, amplitude)
         loss = math.log(start / abs(float(cycle.angle_rad[2]))) / float(cycle.time_s[2])
         # Friction that does not depend on the speed takes the same from any start: one step.
-        start += amplitude - abs(float(cycle.angle_rad[1]))
+        missed = amplitude - abs(float(cycle.angle_rad[1]))
+        if abs(missed) < _MISSED * amplitude:
+            break
+        start += missed
     return loss
 
 

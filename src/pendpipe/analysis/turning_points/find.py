@@ -540,27 +540,22 @@ def _criterion(
 def _local_lines(
     information: FloatArray, score: FloatArray, window: int
 ) -> tuple[FloatArray, float]:
-    """Fit a weighted line about each half cycle; return it and the freedom it uses."""
-    k = np.arange(len(score), dtype=np.float64)
-    sums = [
-        _box(column, window)
-        for column in (information, information * k, information * k * k, score, score * k)
-    ]
-    w, wk, wkk, s, sk = sums
+    """Fit a weighted line about each half cycle; return it and the freedom it uses.
+
+    It takes the neighbours within `window`, fewer at the ends.
+    """
+    k = np.arange(len(score))
+    running = np.zeros((5, len(score) + 1))
+    columns = (information, information * k, information * k * k, score, score * k)
+    np.cumsum(columns, axis=1, out=running[:, 1:])
+    upper, lower = np.minimum(k + window + 1, len(score)), np.maximum(k - window, 0)
+    w, wk, wkk, s, sk = running[:, upper] - running[:, lower]
     centre = wk / w
     spread = wkk - wk * centre
     slope = (sk - s * centre) / np.maximum(spread, 1e-300)
     offset = k - centre
     leverage = information * (1.0 / w + offset**2 / np.maximum(spread, 1e-300))
     return s / w + slope * offset, float(leverage.sum())
-
-
-def _box(column: FloatArray, window: int) -> FloatArray:
-    """Sum over the neighbours within `window` of each entry (fewer at the ends)."""
-    running = np.concatenate([[0.0], np.cumsum(column)])
-    k = np.arange(len(column))
-    upper, lower = np.minimum(k + window + 1, len(column)), np.maximum(k - window, 0)
-    return np.asarray(running[upper] - running[lower])
 
 
 _LEAST_SHARE: Final = 0.3

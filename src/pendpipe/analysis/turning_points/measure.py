@@ -409,7 +409,7 @@ def measure(
     )
     prior = np.zeros(number)
     one_sided = gram[:, 1, 2] ** 2 > _ONE_SIDED**2 * gram[:, 1, 1] * gram[:, 2, 2]
-    if amplitude is not None:
+    if amplitude is not None and one_sided.any():
         known = np.maximum(smoothed(amplitude), 1e-12)
         held = (samples.noise_rms / (known * (_PHASE_PRIOR + places.unsteady_phase))) ** 2
         prior = np.where(one_sided, held, 0.0)

@@ -117,9 +117,9 @@ class TurningPoints:
 
     def first(self, count: int) -> Self:
         """The first `count` of them."""
-        return self.chosen(np.arange(len(self)) < count)
+        return self.chosen(slice(count))
 
-    def chosen(self, keep: BoolArray) -> Self:
+    def chosen(self, keep: BoolArray | slice) -> Self:
         """Some of them, with all that they share."""
         return replace(self, **{name: getattr(self, name)[keep] for name in COLUMNS})
 
