@@ -183,7 +183,18 @@ def test_a_class_that_holds_the_truth_is_right_whichever_of_its_names_leads() ->
     assert not judged["false"]
     assert judged["leads"] is False
     wrong = scores.judge(kept([("glitches", 0.6, ["clipping"])]), names)
-    assert wrong["confident"] == ["glitches"]
+    assert (wrong["likely"], wrong["confident"]) == (["glitches"], [])
+
+
+def test_confident_means_the_same_in_both_proofs() -> None:
+    measures = pytest.importorskip("pendpipe_challenge.measures")
+    assert measures.CONFIDENT == scores.CONFIDENT
+    names = scores.catalogue()
+    at_limit, above = (
+        scores.judge(kept([("glitches", chance, [])]), names)["confident"]
+        for chance in (scores.CONFIDENT, scores.CONFIDENT + 1e-9)
+    )
+    assert (at_limit, above) == ([], ["glitches"])
 
 
 def test_on_a_null_every_name_is_false_and_near_names_are_no_error_outside() -> None:
@@ -198,4 +209,4 @@ def test_on_a_null_every_name_is_false_and_near_names_are_no_error_outside() -> 
         outside="wind",
         near=["drag-form"],
     )
-    assert not scores.judge(outside, names)["confident"]
+    assert not scores.judge(outside, names)["likely"]
