@@ -4,11 +4,17 @@
 
 A statement's module is drawn by its number of statements, and in it an operator, a comparison, a
 constant, a sign or a statement that is changed or dropped. A clone of the commit in
-``.evidence/mutations`` gets one mutation at a time. The test files whose names match the mutated
-file or its package run first, then those nearest to it by imports; what they miss meets the whole
-suite, unless ``--near`` says that it is only listed. A test counts if it fails twice with the
-mutation and passes without; so do tests that take too long with the mutation only. Each outcome is
-kept in a journal beside the clone, so that a run can be broken off and taken up.
+``.evidence/mutations`` gets one mutation at a time. Once per commit the suite is followed
+(`benchmarks.entered`): a mutation meets the tests that enter its function, those that enter the
+fewest others first, as many as run in `NEAR_S`. What no test enters, since it is compiled or stands
+outside functions, meets the tests of what names it. What they miss meets the whole suite, unless
+``--near SECONDS`` says how long to look; it is printed how many of the tests it met. A test counts
+if it fails twice with the mutation and passes without; so do tests that take too long with the
+mutation only. Each outcome is kept in a journal beside the clone, so that a run can be broken off
+and taken up.
+
+Not drawn are annotations, texts and decorators that only speed things up: the library answers the
+same without them. All else is, whether its mutant can be told from the library or not.
 """
 
 from __future__ import annotations
@@ -19,21 +25,21 @@ import json
 import os
 import random
 import re
+import signal
 import subprocess
 import sys
 import time
-from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from benchmarks.house import ROOT, git, importers, is_text, module_name
+from benchmarks.house import ROOT, git, is_text
 
 PLACE: Final = ROOT / ".evidence" / "mutations"
-NEAREST: Final = 8
-"""Test files that run before the whole suite."""
-NEAR_S, ALL_S = 600.0, 3600.0
-"""Seconds after which the nearest tests, or all, count as noticing (an endless loop)."""
+NEAR_S, ALL_S = 120.0, 3600.0
+"""Seconds of the tests that run before the whole suite, and of all of them."""
+SLOWER, START_S = 3.0, 60.0
+"""So many times their seconds, and what starts and compiles, are an endless loop: it is noticed."""
 _PAIRS: Final = (
     *((ast.Add, ast.Sub), (ast.Mult, ast.Div), (ast.Lt, ast.LtE), (ast.Gt, ast.GtE)),
     *((ast.Eq, ast.NotEq), (ast.Is, ast.IsNot), (ast.In, ast.NotIn), (ast.And, ast.Or)),
@@ -60,7 +66,8 @@ class Mutation(NamedTuple):
         """Where and what, in a line."""
         old = "dropped: " if self.new == "pass" else ""
         new = "" if self.new == "pass" else f" -> {self.new}"
-        return f"{self.path}:{self.node.lineno} {old}{ast.unparse(self.node)}{new}"
+        place = f"{self.path}:{self.node.lineno}:{self.node.col_offset}"
+        return f"{place} {old}{ast.unparse(self.node)}{new}"
 
     def applied(self, source: str) -> str:
         """The file's text with the change; positions count bytes."""
@@ -131,60 +138,108 @@ def drawn(tree: Path, commit: str, count: int) -> list[Mutation]:
     found: dict[str, Mutation] = {}
     while len(found) < count:
         mutation = dice.choice(dice.choices(pools, weights)[0])
-        found.setdefault(f"{mutation.text} {mutation.node.col_offset}", mutation)
+        found.setdefault(mutation.text, mutation)
     return list(found.values())
 
 
-def nearest_tests(tree: Path) -> dict[str, list[str]]:
-    """By module: the test files that reach it by the fewest imports."""
-    sources = {p: ast.parse(p.read_text("utf-8")) for p in (tree / "src").rglob("*.py")}
-    by = importers(sources)
-    tests: dict[str, set[str]] = defaultdict(set)
-    for path in sorted((tree / "tests").rglob("test_*.py")):
-        for name in re.findall(
-            r"^\s*(?:from|import) (pendpipe[\w.]*)", path.read_text("utf-8"), re.M
-        ):
-            tests[name].add(path.relative_to(tree).as_posix())
-    found = {}
-    for name in map(module_name, sources):
-        seen, level, files = {name}, {name}, list[str]()
-        while level and len(files) < NEAREST:
-            near = {file for module in level for file in tests[module]} - set(files)
-            # Of equally near ones those of the same room first.
-            room = f"tests/{name.split('.')[1] if '.' in name else ''}/"
-            files += sorted(near, key=lambda file: (not file.startswith(room), file))
-            level = {each for module in level for each in by.get(module, ())} - seen
-            seen |= level
-        found[name] = files[:NEAREST]
+class Definition(NamedTuple):
+    """A function, method or constant, or what else stands in a class or a module."""
+
+    path: str
+    name: str
+    first: int
+    last: int
+    mentions: frozenset[str]
+
+    @classmethod
+    def of(cls, path: str, home: str, node: ast.stmt) -> Definition:
+        """What a statement of a module or class defines."""
+        words = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
+        words |= {n.attr for n in ast.walk(node) if isinstance(n, ast.Attribute)}
+        match node:
+            case ast.Assign(targets=[ast.Name(name), *_]) | ast.AnnAssign(target=ast.Name(name)):
+                pass
+            case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
+                pass
+            case _:
+                name = ""
+        first = min([node.lineno, *(d.lineno for d in getattr(node, "decorator_list", ()))])
+        last = node.end_lineno or first
+        return cls(path, f"{home}.{name}".strip("."), first, last, frozenset(words))
+
+
+def definitions(tree: Path) -> list[Definition]:
+    """The library's definitions: of classes what stands in them."""
+    found = []
+    for path in sorted((tree / "src").rglob("*.py")):
+        name = path.relative_to(tree).as_posix()
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                found += [Definition.of(name, node.name, inner) for inner in node.body]
+            found.append(Definition.of(name, "", node))
     return found
 
 
-def matching_tests(tree: Path, module: str) -> list[str]:
-    """The test files named like the module or its package."""
-    _, *rooms, name = module.split(".")
-    words = [word.rstrip("s") for word in (*rooms[1:], name)]
-    folder = tree / "tests" / (rooms[0] if rooms else "core")
-    # Commands and stages have no folder of their own.
-    files = sorted((folder if folder.is_dir() else tree / "tests").rglob("test_*.py"))
-    named = [path for path in files if any(word in path.stem for word in words)]
-    return [path.relative_to(tree).as_posix() for path in named]
+def entering(mutation: Mutation, known: list[Definition], tests: dict[str, Any]) -> set[str]:
+    """The tests that enter what is mutated, else what names it, however far off."""
+    line, path = mutation.node.lineno, mutation.path
+    level = [d for d in known if d.path == path and d.first <= line <= d.last][:1]
+    seen = set(level)
+    while level:
+        keys = {f"{each.path}:{each.name}" for each in level}
+        if found := {test for test, of in tests.items() if not keys.isdisjoint(of["functions"])}:
+            return found
+        words = {each.name.strip(".").split(".")[-1] for each in level} - {""}
+        level = [d for d in known if d not in seen and not words.isdisjoint(d.mentions)]
+        seen.update(level)
+    return set()
 
 
-def run_tests(tree: Path, words: list[str], seconds: float) -> tuple[int, str]:
-    """Run tests in the clone; status -1 where they ran out of their time."""
+def nearest_tests(found: set[str], tests: dict[str, Any], most_s: float) -> tuple[list[str], float]:
+    """Of these tests those that enter the fewest functions, and the seconds that they take."""
+    chosen, seconds = [], 0.0
+    for test in sorted(found, key=lambda test: (len(tests[test]["functions"]), test)):
+        if not chosen or seconds + tests[test]["seconds"] <= most_s:
+            chosen.append(test)
+            seconds += tests[test]["seconds"]
+    return chosen, seconds
+
+
+def followed(tree: Path, record: Path) -> dict[str, Any]:
+    """Which functions each test of a commit enters; the suite is followed once."""
+    if not record.exists():
+        run([str(ROOT / "benchmarks/entered.py"), str(record), "tests"], tree, SLOWER * ALL_S)
+    return json.loads(record.read_text("utf-8"))  # type: ignore[no-any-return]
+
+
+def run(words: list[str], tree: Path, seconds: float) -> tuple[int, str]:
+    """Run Python in the clone; status -1 where it ran out of its time, with all it started."""
     environment = {
         **os.environ,
         "PYTHONPATH": f"{tree / 'src'}{os.pathsep}{tree / 'challenge/src'}",
         "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
     }
-    call = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=no", *words]
-    try:
-        run = subprocess.run(
-            call, cwd=tree, env=environment, timeout=seconds, capture_output=True, text=True
-        )
-    except subprocess.TimeoutExpired:
-        return -1, "time"
-    return run.returncode, run.stdout
+    with subprocess.Popen(
+        [sys.executable, *words],
+        cwd=tree,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        try:
+            output, _ = process.communicate(timeout=seconds)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            return -1, "time"
+    return process.returncode, output
+
+
+def run_tests(tree: Path, words: list[str], seconds: float) -> tuple[int, str]:
+    """Run tests in the clone."""
+    return run(["-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=no", *words], tree, seconds)
 
 
 def failed(output: str) -> list[str]:
@@ -230,7 +285,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--commit", default="HEAD", help="whose library is mutated (%(default)s)")
     parser.add_argument("--count", type=int, default=40, help="how many (%(default)s)")
-    parser.add_argument("--near", action="store_true", help="without the whole suite")
+    parser.add_argument("--near", type=float, metavar="SECONDS", help="without the whole suite")
+    parser.add_argument("--seed", help="draw from this instead of the commit's hash")
     arguments = parser.parse_args()
     commit = git("rev-parse", arguments.commit).decode().strip()
     tree, journal = PLACE / commit, PLACE / f"{commit}.jsonl"
@@ -241,27 +297,29 @@ def main() -> None:
     entries = journal.read_text("utf-8").splitlines() if journal.exists() else []
     known: dict[str, Any] = {entry["mutation"]: entry for entry in map(json.loads, entries)}
     spoilt = {name for entry in known.values() for name in entry["spoilt"]}
-    tests, chosen = nearest_tests(tree), drawn(tree, commit, arguments.count)
+    tests, known_names = followed(tree, PLACE / f"{commit}.json"), definitions(tree)
+    chosen = drawn(tree, arguments.seed or commit, arguments.count)
     caught = 0
     for mutation in chosen:
         entry = known.get(mutation.text)
         if entry is None:
             began = time.monotonic()
-            module = module_name(tree / mutation.path)
-            near = [files for files in (matching_tests(tree, module), tests[module]) if files]
-            stages = [(files, NEAR_S) for files in near]
-            stages += [] if arguments.near else [(["tests"], ALL_S)]
+            found = entering(mutation, known_names, tests)
+            near, seconds = nearest_tests(found, tests, arguments.near or NEAR_S)
+            stages = [(near, SLOWER * seconds + START_S)] if near else []
+            stages += [] if arguments.near else [(["tests"], SLOWER * ALL_S)]
             by = outcome(tree, mutation, stages, spoilt)
             entry = {
                 "mutation": mutation.text,
                 "by": by,
+                "met": f"{len(near)} of {len(found)} tests" if arguments.near else "all tests",
                 "spoilt": sorted(spoilt),
                 "seconds": time.monotonic() - began,
             }
             with journal.open("a", encoding="utf-8") as stream:
                 stream.write(json.dumps(entry) + "\n")
         caught += bool(entry["by"])
-        how = f"caught by {entry['by']}" if entry["by"] else "**survived**"
+        how = f"caught by {entry['by']}" if entry["by"] else f"**survived** {entry['met']}"
         print(f"{mutation.text}: {how} ({entry['seconds']:.0f} s)", flush=True)
     print(f"{caught} of {len(chosen)} caught at {commit[:12]}")
     if spoilt:
