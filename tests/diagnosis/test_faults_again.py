@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +18,8 @@ from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Finding, nothing
 from pendpipe.diagnosis.run import diagnose_recording
-from pendpipe.diagnosis.state import Fault, State
+from pendpipe.diagnosis.state import Fault, State, is_gross
+from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
@@ -80,6 +82,39 @@ def test_a_far_reading_stays_out_where_its_test_cannot_judge(
     monkeypatch.setitem(TESTS, "glitches", lambda *_: nothing("glitches"))
     assert forensics.again(state, silent) is not stays
     assert (state.data.weight[odd] == 0.0) is np.bool_(stays)
+
+
+def test_a_test_that_reports_nothing_counts_by_its_chance() -> None:
+    """The farther off one reading, the less likely the record, before it is called a glitch."""
+    chances = []
+    for error in (4.6, 4.8, 5.0):
+        forensics, state = blamed(error)
+        state.faults, state.data = [], replace(state.data, weight=np.ones(len(TIME_S)))
+        state.noise = white_noise(state.data, NOISE_RAD)
+        forensics.before(state, silent)
+        assert state.faults == []
+        chances.append(forensics.p_value([]))
+    assert LEVEL < chances[2] < chances[1] < chances[0] < 1.0
+    # As the tail of a normal distribution falls: by six.
+    assert chances[2] < 0.25 * chances[0]
+
+
+def test_glitches_are_masked_before_a_model_that_is_far_off_is_mended() -> None:
+    """No other test can judge by such a model; readings apart from their neighbours can."""
+    forensics, state = blamed(0.0)
+    readings = state.data.values.copy()
+    wild = [300, 801, 1200]
+    readings[wild] += 40.0 * NOISE_RAD
+    state.data, _ = prepared(readings)
+    state.noise, state.faults = white_noise(state.data, NOISE_RAD), []
+    state.held, state.bare = [OMEGA], TRUTH.copy()
+    state.bare[OMEGA] *= 1.01
+    state.fit = refine(state.fit.model, state.data, state.noise, state.bare, held=state.held)
+    assert is_gross(state.fit, state.data)
+    forensics.before(state, silent)
+    (fault,) = state.faults
+    assert fault.finding.identifier == "glitches"
+    assert np.flatnonzero(state.data.weight == 0.0).tolist() == wild
 
 
 @functools.cache

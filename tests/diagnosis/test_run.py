@@ -9,7 +9,8 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
-from pendpipe.diagnosis.run import diagnose_recording
+from pendpipe.analysis.free_decay import measure_recording
+from pendpipe.diagnosis.run import diagnose_decay, diagnose_recording
 from pendpipe.diagnosis.values import effect_parameters
 from pendpipe.effects.baseline import OFFSET, OMEGA, B, pendulum_of
 from pendpipe.effects.catalogue import by_identifier
@@ -223,6 +224,19 @@ def test_what_cannot_be_held_is_refused_in_one_line(given: dict[str, float]) -> 
     """A friction that stops the pendulum at once, no parameter, and a gain of energy."""
     with pytest.raises(InputError, match="; "):
         diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+
+
+def test_gaps_of_the_whole_recording_are_told_though_the_decay_has_none() -> None:
+    """They say what the recorder does: here it paused for 7 s before the release."""
+    record = recording(other_engine(TRUTH), 1)
+    points, part = measure_recording(record, "the test")
+    rest = np.arange(TIME_S[0] - 12.0, TIME_S[0] - 7.0, TIME_S[1])
+    whole = Recording(np.append(rest, TIME_S), np.append(0.0 * rest, record.values), "angle_rad")
+    told, silent = (
+        diagnose_decay(part, points, whole=given).diagnosis.warnings for given in (whole, record)
+    )
+    (gap,) = set(told) - set(silent)
+    assert f"a gap of {TIME_S[0] - rest[-1]:.4g} s" in gap
 
 
 @pytest.mark.parametrize("name", [*NAMES, "null", "two", "dropped-samples"])
