@@ -248,7 +248,7 @@ class Setup:
 
     channels: tuple[int, ...]
     rate_hz: float
-    range_volts: float = 10.0
+    range_volts: float
 
 
 def plain_name(model: str) -> str:
