@@ -154,3 +154,16 @@ def test_the_progress_line_tells_amplitude_losses_and_breaks() -> None:
     assert "2.0 of 60 s, 4 scans, 2.0 Hz" in text
     assert "amplitude 1.000 V" in text
     assert text.endswith("0 lost, 1 break(s)")
+
+
+def test_what_follows_the_progress_line_begins_on_a_line_of_its_own() -> None:
+    for scans, shown in ((4, True), (0, False)):
+        terminal = Terminal()
+        line = ProgressLine(terminal, 60.0)
+        line.begin(step_volts=10.0 / 32768)
+        if scans:
+            line.update(1.0, Scans(np.zeros((scans, 1), dtype="<i2")))
+        line.end()
+        written = terminal.getvalue()
+        assert bool(written) == shown
+        assert not shown or written.endswith("\n")

@@ -236,6 +236,9 @@ def test_shared_errors_move_the_factor_as_eq16_says() -> None:
     assert relative["temperature"] == pytest.approx(by_viscosity + by_density, rel=0.05)
     assert set(found.budget) == {"the records themselves", *relative}
     assert found.budget["temperature"] == pytest.approx(relative["temperature"])
+    # Independent sources add in quadrature, to the whole error and nothing else.
+    whole = np.linalg.norm(list(found.budget.values()))
+    assert whole == pytest.approx(factor.estimate.sd / abs(value))
     assert np.all(
         found.table["quality_factor_theory_sd"] > 0.004 * found.table["quality_factor_theory"]
     )

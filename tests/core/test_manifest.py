@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pendpipe import manifest
+from pendpipe import __version__, manifest
 from pendpipe.errors import DamagedError
 from pendpipe.files import read_json
 
@@ -114,6 +114,12 @@ def test_a_damaged_manifest_is_damage_too(home: Path, change: Callable[[bytes], 
     (line,) = manifest.set_aside_damaged(home)
     assert "this manifest is torn or altered" in line
     assert noticed(home) == []
+
+
+def test_a_manifest_states_its_form_its_stage_and_who_wrote_it(home: Path) -> None:
+    path = manifest.read_manifest(home, "fit").path
+    stated = {name: read_json(path)[name] for name in ("schema_version", "stage", "version")}
+    assert stated == {"schema_version": 1, "stage": "fit", "version": __version__}
 
 
 def test_a_sound_copy_of_the_results_is_sound(home: Path) -> None:

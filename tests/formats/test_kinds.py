@@ -768,6 +768,14 @@ def test_numbers_of_json_that_are_written_as_texts_are_no_clock_times(tmp_path: 
     assert column_of_clock_times(["12.50.01", "12.50.02"]) is not None
 
 
+def test_lists_of_unlike_lengths_in_json_are_signals_of_their_own(tmp_path: Path) -> None:
+    """A sensor that samples more slowly, or a remark, changes nothing for the others."""
+    some = slice(0, 1400)
+    lists = [[1.0, 2.0, 3.0], TIME[some].tolist(), ANGLE[some].tolist()]
+    recording = read_text(tmp_path, json.dumps({"data": lists}), "a.json")
+    same(recording, ANGLE[some], TIME[some])
+
+
 def test_labviews_tdms_gives_its_interval_and_its_units(tmp_path: Path) -> None:
     told = {"wf_increment": 1.0 / 30.0, "wf_start_offset": 0.0, "unit_string": "deg"}
     path = tmp_path / "a.tdms"

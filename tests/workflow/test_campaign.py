@@ -104,6 +104,13 @@ def test_the_summary_has_the_contracts_keys(campaign: Campaign) -> None:
     assert all(names <= set(record) for record in summary["records"])
 
 
+def test_every_result_states_the_first_form_of_its_contract(campaign: Campaign) -> None:
+    paths = [path for path in campaign.results.rglob("*.json") if ".snakemake" not in path.parts]
+    assert {path.parent.name for path in paths} >= {"water-low-7", "diagnosis", "broken"}
+    stated = {path: json.loads(path.read_text())["schema_version"] for path in paths}
+    assert set(stated.values()) == {1}
+
+
 def test_the_inertia_has_the_errors_of_its_frequency_and_of_its_torque(campaign: Campaign) -> None:
     """I = K/(2 pi f)^2, with K from distances of 0.1 mm and masses: per mille to some per cent."""
     comparison = json.loads((campaign.results / "comparison.json").read_text())

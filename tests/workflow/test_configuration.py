@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
+from pendpipe.analysis.fit.result import FitResult
 from pendpipe.commands import config
 from pendpipe.configuration import jobs
 from pendpipe.configuration.apparatus import pendulum
@@ -21,7 +24,7 @@ from pendpipe.configuration.load import (
     read_records,
 )
 from pendpipe.errors import InputError
-from pendpipe.stages.results import RecordResult
+from pendpipe.stages.results import RecordResult, placed
 from pendpipe.stages.separate import common_relative_sd
 
 ROOT = Path(__file__).parents[2]
@@ -218,6 +221,20 @@ def test_records_share_the_relative_error_of_their_sensor() -> None:
     results = [RecordResult(record, None, calibration) for calibration in (own, run, run)]
     assert common_relative_sd(results) == pytest.approx(0.002)
     assert common_relative_sd(results[:1]) == 0.0
+
+
+def test_only_a_usable_record_in_a_fluid_of_a_known_apparatus_has_a_place_in_the_theory(
+    content: dict[str, Any],
+) -> None:
+    campaign = load_campaign(content, "config/config.yaml")
+    record = campaign.record("water-low-1")
+    fits = {light: Mock(FitResult, light=light) for light in ("green", "yellow", "red")}
+    good, fair, bad = (RecordResult(record, fit, {}) for fit in fits.values())
+    refused = RecordResult(record, None, {}, "no motion")
+    dry = RecordResult(replace(record, fluid=""), fits["green"], {})
+    assert placed(campaign, [good, bad, refused, dry, fair]) == [good, fair]
+    unknown = campaign.configuration.model_copy(update={"apparatus": None})
+    assert placed(replace(campaign, configuration=unknown), [good]) == []
 
 
 def test_the_jobs_get_numbers_where_the_command_line_gave_text(
