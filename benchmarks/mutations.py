@@ -288,6 +288,8 @@ def main() -> None:
     parser.add_argument("--near", type=float, metavar="SECONDS", help="without the whole suite")
     parser.add_argument("--seed", help="draw from this instead of the commit's hash")
     arguments = parser.parse_args()
+    # A shell's background has Ctrl-C ignored, and a test that interrupts a recording would hang.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     commit = git("rev-parse", arguments.commit).decode().strip()
     tree, journal = PLACE / commit, PLACE / f"{commit}.jsonl"
     if not tree.exists():
