@@ -341,3 +341,14 @@ def test_the_answer_does_not_depend_on_the_unit() -> None:
     assert names[0][0] == "second-mode"
     sizes = [answer.effects[0].parameters["q_cosine"].value for answer in answers]
     assert sizes[1] == pytest.approx(1000.0 * sizes[0], rel=1e-2)
+
+
+def test_of_noise_below_the_rounding_nothing_is_said() -> None:
+    """A wheel read by an encoder and nothing else: five readings a second, a step of 0.62 deg."""
+    time_s, step_rad = 0.2 * np.arange(300), 0.0108814
+    angle_rad = 1.79 * np.exp(-0.0036 * time_s) * np.cos(2.0 * np.pi / 1.822 * (time_s - 0.28))
+    found = diagnose_recording(Recording(time_s, rounded(angle_rad, step_rad), "angle_rad"))
+    assert found.verdict == "consistent"
+    assert not [line for line in found.diagnosis.warnings if "noise" in line]
+    assert found.diagnosis.improved.residual_rms_rad < step_rad / 12.0**0.5
+    assert "less than the rounding adds (3.14 mrad)" in found.diagnosis.statement

@@ -274,7 +274,10 @@ def diagnose_decay(
         raise NotAnalysableError(place, f"the model can't follow it ({error})", remedy) from error
     effects = _in_order(found, weighed, samples)
     gap = gap_note((whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
-    changing = None if found.data.time_noise else level_note(found.noise)
+    rounding = found.data.step / 12.0**0.5
+    # Of noise below that of rounding nothing is seen.
+    seen = not found.data.time_noise and found.noise.rms > rounding
+    changing = level_note(found.noise) if seen else None
     wander = wander_note(found.noise, found.data, found.improved)
     stamps = tuple(note for note in (gap, *found.clock_notes, changing, wander) if note)
     before = _fitted_model(found.baseline, found)
@@ -287,7 +290,7 @@ def diagnose_decay(
     if not fixed and [each.key for each in found.improved.model.effects] == [SINE]:
         after = _as_fit_prints(after, part, points, baseline, "sine", place)
     # What is left holds all noise.
-    noise_rms = max(min(found.noise.rms, after.residual_rms_rad), found.data.step / 12.0**0.5)
+    noise_rms = max(min(found.noise.rms, after.residual_rms_rad), rounding)
     missing = any(effect.identifier != COLOURED_NOISE for effect in effects)
     if missing:
         progress("predicting cycles that are left out of the fit")

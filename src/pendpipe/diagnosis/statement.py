@@ -111,11 +111,13 @@ def statement(
     if len(noise) == len(effects):
         wanders = any("the zero wanders" in note for note in notes)
         what = "the motion of this recording, whose zero wanders" if wanders else "this recording"
+        left, noise_is = (compact(each, unit) for each in (before.residual_rms_rad, noise_rms))
+        agrees = f"the residual of {left} rms agrees with the noise ({noise_is})"
+        if before.residual_rms_rad < noise_rms:
+            agrees = f"it leaves {left} rms, less than the rounding adds ({noise_is})"
         nothing = (
-            f"{_capital(model)} describes {what}: the residual of"
-            f" {compact(before.residual_rms_rad, unit)} rms agrees with the noise"
-            f" ({compact(noise_rms, unit)}), and no effect of the catalogue improves the fit more"
-            f" than chance would ({printed(unexplained)})."
+            f"{_capital(model)} describes {what}: {agrees}, and no effect of the catalogue"
+            f" improves the fit more than chance would ({printed(unexplained)})."
         )
         return " ".join([nothing, *(f"{_capital(said)}." for said in noise), *stamps])
     times = before.residual_rms_rad / noise_rms
