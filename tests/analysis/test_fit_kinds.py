@@ -55,6 +55,19 @@ def test_a_torsion_wheel_has_no_sine_however_far_it_turns(wound: float) -> None:
     assert holds(result, "b", 0.03)
 
 
+@pytest.mark.parametrize("quality", [1.8, 2.2, 3.0, 4.0])
+@pytest.mark.parametrize("torque", ["linear", "sine"])
+def test_a_brake_leaves_few_half_cycles_and_they_tell_law_and_loss(
+    quality: float, torque: str
+) -> None:
+    """The wheel of every teaching laboratory, and a vane in oil: some six half cycles."""
+    loss = 0.5 * OMEGA / quality
+    result = fitted(viscous(1.5, 0.0, loss, linear=torque == "linear"), rms=2e-3)
+    assert (result.restoring, result.light) == (torque, "green")
+    assert holds(result, "b", loss)
+    assert holds(result, "frequency", 0.5 * OMEGA / math.pi)
+
+
 def test_sin_x_is_refused_beyond_pi() -> None:
     wheel = recorded(viscous(4.0, 0.0, 0.03, linear=True), TIME, 2e-3)
     for method in ("waveform", "turning-points"):

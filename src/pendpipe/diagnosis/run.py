@@ -378,18 +378,18 @@ def _as_fit_prints(
     diagnosis follows it along the motion, and its own numbers stand.
     """
     from pendpipe.analysis.fit import fit_recording
-    from pendpipe.analysis.fit.by_points import restoring_of
 
-    taken = restoring_of(points, stated=part.unit_is_stated)
     try:
-        fitted = fit_recording(
-            part,
-            points=points,
-            method=None if restoring == taken else "waveform",
-            restoring=restoring,
-            baseline=baseline,
-            place=place,
-        )
+        fitted = fit_recording(part, points=points, baseline=baseline, place=place)
+        if fitted.restoring != restoring:
+            fitted = fit_recording(
+                part,
+                points=points,
+                method="waveform",
+                restoring=restoring,
+                baseline=baseline,
+                place=place,
+            )
     except NotAnalysableError:
         return own
     return own if fitted.light == "red" else replace(own, parameters=fitted.parameters)

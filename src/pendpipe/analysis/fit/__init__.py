@@ -8,7 +8,14 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import check_fixed, fit_points, may_be_sine, restoring_of
+from pendpipe.analysis.fit.by_points import (
+    SEEN,
+    check_fixed,
+    fit_points,
+    may_be_sine,
+    restoring_of,
+    sine_coefficient,
+)
 from pendpipe.analysis.fit.by_waveform import fit_waveform
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring, read_fit
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
@@ -106,8 +113,11 @@ def _fit(
     samples = prepare(recording, place)
     if points is None:
         points = turning_points_of(samples, place)
+    presumed = False
     if restoring is None:
-        restoring = restoring_of(points, stated=recording.unit_is_stated)
+        coefficient = sine_coefficient(points)
+        restoring = restoring_of(points, coefficient, stated=recording.unit_is_stated)
+        presumed = restoring == "sine" and not coefficient.agrees
     elif restoring == "sine" and not may_be_sine(points):
         largest = float(np.max(points.amplitude_rad))
         raise NotAnalysableError(
@@ -119,6 +129,10 @@ def _fit(
     if method == "turning-points":
         return fit_points(points, baseline=baseline, fixed=fixed, restoring=restoring)
     result = fit_waveform(samples, points, baseline=baseline, fixed=fixed, restoring=restoring)
+    if presumed:
+        linear = fit_waveform(samples, points, baseline=baseline, fixed=fixed, restoring="linear")
+        if _contradicts(result, linear):
+            result, restoring = linear, "linear"
     if method == "waveform" or _stands(result):
         return result
     by_points = fit_points(points, baseline=baseline, fixed=fixed, restoring=restoring)
@@ -133,6 +147,12 @@ def _fit(
             return _of_larger(larger, points, part)
     settled = [each for each in (result, by_points) if each.settled]
     return min(settled, key=_worst, default=by_points)
+
+
+def _contradicts(sine: FitResult, linear: FitResult) -> bool:
+    """Whether all readings exclude the sin x that few or noisy half cycles do not."""
+    more = sine.samples * (sine.chi2_per_dof - linear.chi2_per_dof)
+    return linear.settled and more > SEEN**2 * max(linear.chi2_per_dof, 1.0)
 
 
 def _worst(result: FitResult) -> float:

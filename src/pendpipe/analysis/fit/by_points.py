@@ -493,7 +493,7 @@ def _numbers(
 _LARGE: Final = 0.2
 """Of the largest amplitude: below, sin x lengthens the period by 4 % of what it does there."""
 _FEWEST: Final = 6
-_SEEN: Final = 3.0
+SEEN: Final = 3.0
 """Standard deviations from which an amplitude, or a coefficient, is seen, and up to which the
 coefficient may be off."""
 _AGREES: Final = 2.0
@@ -522,13 +522,13 @@ class Coefficient(NamedTuple):
         coefficient is within 0.2 of 1, or as near as a drift would bring it.
         """
         off = abs(self.value - 1.0)
-        near = off < _AGREES * self.sd and self.value > _SEEN * self.sd
+        near = off < _AGREES * self.sd and self.value > SEEN * self.sd
         return near or (self.removed > 0.5 and off < max(_NEAR, self.sd))
 
     @property
     def excludes_sine(self) -> bool:
         """Whether the whole of sin x contradicts the times, a drift of the frequency granted."""
-        return abs(self.value - 1.0) > _SEEN * self.sd
+        return abs(self.value - 1.0) > SEEN * self.sd
 
 
 class LawStart(NamedTuple):
@@ -648,6 +648,9 @@ def sine_coefficient(points: TurningPoints) -> Coefficient:
     By what the coefficient changes if the frequency may drift in time, it is uncertain too.
     """
     part = clear(points, _LARGE)
+    if len(part) < _FEWEST:
+        # Of a strong loss few are large.
+        part = clear(points).first(_FEWEST)
     if len(part) < _FEWEST or points.unit != "rad":
         return Coefficient(0.0, math.inf, 0.0)
     amplitude, omega = part.amplitude_rad, 2.0 * math.pi * part.apparent_frequency_hz

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.half_cycles import find_extremes
+from pendpipe.analysis.half_cycles import find_extremes, without_ripples
 from pendpipe.analysis.noise import quantisation_rms, undithered_rms
 from pendpipe.analysis.turning_points.harmonics import far_points, odd_harmonics, own_square
 from pendpipe.analysis.turning_points.long_records import follow
@@ -38,6 +38,8 @@ from pendpipe.recording import Recording
 _ENOUGH: Final = 24
 """Readings in a half cycle that a first look needs."""
 _LOOK: Final = 200_000
+_FEW: Final = 5
+"""Extremes of which no threshold can be told by a median of five swings."""
 
 
 class Rough(NamedTuple):
@@ -68,6 +70,8 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
         if len(index) > 3:
             stride = max(1, int(np.median(np.diff(index))) // _ENOUGH)
     index, first = find_extremes(samples.values, least, start=start, stride=stride)
+    if len(index) <= _FEW:
+        index, first = _of_any_size(samples.values, least)
     time, value = samples.time_s[index], samples.values[index]
     side = first * (1 - 2 * (np.arange(len(index)) % 2))
     if len(index) >= 3:
@@ -87,6 +91,17 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
         begin += count
     cut = slice(begin, begin + count)
     return Rough(number[:count], time[cut], side[cut], _level(value[cut])), stride
+
+
+def _of_any_size(values: FloatArray, least: float) -> tuple[IntArray, int]:
+    """Find extremes whose swings fall faster than a threshold by those before them can follow."""
+    index, first = find_extremes(values, least)
+    turns = without_ripples(values, index)
+    # The first and the last reading may be extremes: there the motion need not turn.
+    inner = (turns > 0) & (turns < len(values) - 1)
+    inner[-1:] = False
+    skipped = int(np.argmax(inner)) if inner.any() else 0
+    return turns[inner], first * (-1) ** skipped
 
 
 def _beside_gaps(time: FloatArray, index: IntArray) -> tuple[np.ndarray, IntArray]:
@@ -644,7 +659,7 @@ def last_seen(measured: Measured, noise: float) -> int:
 
 def _usual(coverage: FloatArray) -> FloatArray:
     """What is usual among the five neighbours to each side."""
-    middle = float(np.median(coverage[coverage > 0.0]))
+    middle = float(np.median(coverage[coverage > 0.0])) if coverage.any() else 0.0
     if len(coverage) < 12 or np.max(np.abs(coverage[1:-1] - middle)) < 0.3 * middle:
         return np.full(len(coverage), middle)
     padded = np.pad(coverage, 5, mode="reflect")
