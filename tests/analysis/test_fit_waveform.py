@@ -315,6 +315,16 @@ def test_a_step_taken_on_trust_ends_at_the_optimum() -> None:
     assert np.max(off) < 0.1
 
 
+@pytest.mark.parametrize(("omega", "time_s"), [(OMEGA, -1e8), (1e7, -0.3)])
+def test_a_trial_of_more_half_cycles_than_readings_can_show_is_refused(
+    omega: float, time_s: float
+) -> None:
+    """Without a loss the engine would follow it for ever."""
+    problem = Waveform(TIME, np.zeros_like(TIME), 1e-4, {})
+    trial = np.array([0.0, 0.0, 0.0, 0.5, omega, 0.07, time_s, 0.0])
+    assert problem.evaluate(trial).chi2 == math.inf
+
+
 @pytest.mark.parametrize("quadratic", [0.0, 0.45])
 def test_a_long_step_of_the_share_of_b_keeps_the_period_that_its_derivative_promises(
     quadratic: float,

@@ -205,7 +205,10 @@ class Waveform:
         """chi^2, gradient and normal matrix, summed over pieces of the record."""
         refused = Quadratic(np.inf, np.zeros(8), np.eye(8))
         model, release = self.model(value)
-        if release.time_s > self.time_s[0] or not np.isfinite(model.stop_rad):
+        turns = model.angular_frequency * (self.time_s[-1] - release.time_s) / np.pi
+        # Of more half cycles than two a reading nothing is seen, and they would never end.
+        lost = not turns < 2.0 * len(self.values) or not np.isfinite(model.stop_rad)
+        if release.time_s > self.time_s[0] or lost:
             return refused
         chi2, gradient, normal = 0.0, np.zeros(8), np.zeros((8, 8))
         for first in range(0, len(self.values), _PIECE):
