@@ -97,9 +97,18 @@ def test_signs_between_thousands(
     same(read_as(f"time (ms){sign}angle (deg)\n" + text))
 
 
-def test_words_where_there_is_no_reading(read_as: Callable[..., Recording]) -> None:
+@pytest.mark.parametrize(
+    "words",
+    [
+        {250: "OL", 750: "---", 1250: "overrange", 1750: "#N/A"},
+        {250: "#DIV/0!", 750: "#REF!", 1250: "#####", 1750: "#BEZUG!"},
+        {250: "n/d", 750: ".", 1250: "k.A.", 1750: "-1.#IND00"},
+    ],
+)
+def test_words_where_there_is_no_reading(
+    words: dict[int, str], read_as: Callable[..., Recording]
+) -> None:
     lines = rows(TIME, DEGREES, form=".3f").splitlines()
-    words = {250: "OL", 750: "---", 1250: "overrange", 1750: "#N/A"}
     for row, word in words.items():
         lines[row] = f"{TIME[row]:.3f},{word}"
     recording = read_as("time (s),angle (deg)\n" + "\n".join(lines) + "\n")

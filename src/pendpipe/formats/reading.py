@@ -31,6 +31,7 @@ from pendpipe.formats.table import (
     is_uniform,
     most_unpacked,
     sample_rate,
+    without_marks,
 )
 from pendpipe.formats.words import role_of, split_header, unit_of
 from pendpipe.recording import (
@@ -227,11 +228,18 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     base = time_base(table, choice, options)
     found = readings(table, choice, options, base)
     notes = [*table.notes, *choice.notes, *base.notes, *found.notes]
-    values = _without_marks(found.values[base.rows] / found.factor, notes) * found.factor
+    given = found.values[base.rows]
+    values = without_marks(given)
     _refuse_absurd(table, base, values)
     missing = np.isnan(values)
+    lost = given[missing & ~np.isnan(given)] / found.factor
     start = base.time_s[0] if base.time_s.size else 0.0
     for said, note in (
+        (
+            lost.size,
+            f"{lost.size} reading(s) that stand out"
+            f" ({', '.join(f'{mark:.6g}' for mark in np.unique(lost)[:3])}): taken as lost",
+        ),
         (missing.any(), f"{missing.sum()} row(s) without a reading, marked missing"),
         (start < 0, f"the times begin at {start:.6g} s, before their zero"),
     ):
@@ -264,19 +272,6 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     )
     check(table.place, recording)
     return recording
-
-
-def _without_marks(values: FloatArray, notes: list[str]) -> FloatArray:
-    """Take ``-1``, ``-9999`` and their like, far from the swing, for lost readings."""
-    for mark in (-1.0, 0.0, 999.0, -999.0, 9999.0, -9999.0):
-        lost = values == mark
-        if not 0 < lost.sum() < 0.2 * len(values):
-            continue
-        low, high = np.nanmin(values[~lost]), np.nanmax(values[~lost])
-        if not low - (high - low) < mark < high + (high - low):
-            notes.append(f"{lost.sum()} reading(s) of {mark:g} far from the others: taken as lost")
-            values = np.where(lost, np.nan, values)
-    return values
 
 
 def _refuse_absurd(table: Table, base: TimeBase, values: FloatArray) -> None:

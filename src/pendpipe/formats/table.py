@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.special import ellipk
 
 from pendpipe.arrays import FloatArray, IntArray
@@ -23,6 +24,15 @@ _LOOKED_AT: Final = 1 << 15
 """Samples of a long column that are transformed: means of neighbours."""
 _CLEAR: Final = 0.25
 """Share of the variance that lies near one frequency; of white noise it is under 0.05."""
+
+
+_BESIDE: Final = 5
+"""Readings to each side of one that may stand for a lost one."""
+_LEAST: Final = 0.05
+"""Of the span, by which it stands out at least."""
+_SPARSE: Final = 0.3
+"""Share of readings beyond both their neighbours by that much, from which all may be turning
+points: there are seven or fewer in a cycle."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +91,49 @@ def swing_of(values: FloatArray) -> Swing:
         samples_per_cycle=block * len(some) / peak,
         graded=_graded(rest, len(some) / peak),
     )
+
+
+@np.errstate(invalid="ignore", over="ignore")
+def without_marks(values: FloatArray) -> FloatArray:
+    """Make NaN of readings that a sensor, or a program, gives in place of a lost one.
+
+    Such a reading leaves the range of its neighbours, and comes back, by more than that range. It
+    is lost where the same number (``0``, ``-999``) does so three times, or where it is also beyond
+    all others by more than they span. What jumps over the whole span of the others has wrapped.
+    """
+    good = np.flatnonzero(np.isfinite(values))
+    # Numbers that stand in several rows on end are one.
+    starts = np.flatnonzero(np.diff(values[good], prepend=np.nan) != 0.0)
+    level = values[good[starts]]
+    if len(level) < 2 * _BESIDE:
+        return values
+    step = np.diff(level)
+    turns = 1 + np.flatnonzero(step[:-1] * step[1:] < 0.0)
+    rest = np.delete(level, turns)
+    span, middle = float(np.ptp(rest)), 0.5 * float(rest.min() + rest.max())
+    floor = max(_LEAST * span, 3.0 * np.abs(step).min())
+    at = turns[np.minimum(np.abs(step[turns - 1]), np.abs(step[turns])) > floor]
+    if len(at) > _SPARSE * len(level):
+        return values
+    around = sliding_window_view(np.pad(level, _BESIDE, mode="edge"), 2 * _BESIDE + 1)[at]
+    own = level[at]
+    other = around != own[:, None]
+    low = np.min(around, axis=1, where=other, initial=np.inf)
+    high = np.max(around, axis=1, where=other, initial=-np.inf)
+    beyond = np.maximum(low - own, own - high)
+    clear = beyond / np.maximum(high - low, floor)
+    off = np.abs(own - middle)
+    odd = (clear > 1.0) & ((off > 0.75 * span) | (beyond < 0.75 * span))
+    number, often = np.unique(own[odd], return_counts=True)
+    lost = np.zeros(len(level), dtype=bool)
+    lost[at[np.isin(own, number[often > 2]) | (odd & (off > 1.5 * span))]] = True
+    rows = np.diff(np.append(starts, len(good)))
+    gone = np.zeros(len(values), dtype=bool)
+    gone[good[np.repeat(lost, rows)]] = True
+    if not 0.0 < gone.mean() < 0.2:
+        return values
+    # One beside another is seen when that is gone.
+    return without_marks(np.where(gone, np.nan, values))
 
 
 def _graded(rest: FloatArray, cycle: float) -> float:
@@ -332,7 +385,7 @@ class Column:
     @cached_property
     def swing(self) -> Swing:
         """Its strongest oscillation."""
-        return swing_of(self.values)
+        return swing_of(without_marks(self.values))
 
     @property
     def label(self) -> str:

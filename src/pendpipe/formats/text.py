@@ -393,7 +393,8 @@ _IN_A_ROW: Final = 4
 MOST_COLUMNS: Final = 1024
 """A row of more cells is no sample of an instrument."""
 _BLANK: Final = re.compile(
-    r'|""|[-*]{1,4}|--[.:]--|n/?a|#n/a|#nv|[+-]?∞|null|none|nan|#value!|\?|ol|over(load|flow|range)?'
+    r'|""|[-*]{1,4}|--[.:]--|n/?[ad]|n\.[ad]\.|k\.a\.|\.|#+|#n/a|#nv|#[^\W\d]+(/0)?[!?]|[+-]?∞|null|none'
+    r"|-?nan(\(ind\))?|-?1\.#(qnan|snan|ind|inf)\d*|\?|ol|over(load|flow|range)?|no data"
     r"|missing|invalid|err|error",
     re.I,
 )
