@@ -58,7 +58,13 @@ class Evaluation:
     @cached_property
     def columns(self) -> FloatArray:
         """The Jacobian."""
-        return _jacobian(self.model, self.noise, self.value, self.at)
+        columns = np.empty((len(self.at.reading) + 1, self.model.size))
+        columns[:-1] = self.noise.whiten(jacobian(self.model, self.value, self.at))
+        columns[-1] = 0.0
+        columns[-1, SHARE] = 1.0 / _SHARE_SD
+        # If one part of b is held, changing b changes the share.
+        columns[:, B] += share_by_b(self.value, self.model.held_parts()) * columns[:, SHARE]
+        return columns
 
     @cached_property
     def factored(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -157,16 +163,6 @@ def _residual(
     difference, slip = unwrapped(data, at)
     prior = (0.5 - value[SHARE]) / _SHARE_SD
     return np.append(noise.whiten(difference), prior), slip
-
-
-def _jacobian(model: Model, noise: Noise, value: FloatArray, at: Evaluated) -> FloatArray:
-    columns = np.empty((len(at.reading) + 1, model.size))
-    columns[:-1] = noise.whiten(jacobian(model, value, at))
-    columns[-1] = 0.0
-    columns[-1, SHARE] = 1.0 / _SHARE_SD
-    # If one part of b is held, changing b changes the share.
-    columns[:, B] += share_by_b(value, model.held_parts()) * columns[:, SHARE]
-    return columns
 
 
 def _step(

@@ -297,8 +297,10 @@ def _with_spectrum(
         width = np.diff(np.append(starts, count))
         variance = np.full(count, math.exp(float(found.mean @ width) / count))
     else:
+        # The ends of the record leak into all cosines, all in one pattern.
+        least = min(math.log(_READINGS_AT_ENDS / count), 0.0)
         middle = 0.5 * (starts + np.append(starts[1:], count) - 1)
-        logs = np.maximum(found.mean, _largest_beside(found.mean, middle) + _leakage(count))
+        logs = np.maximum(found.mean, _largest_beside(found.mean, middle) + least)
         variance = np.exp(np.interp(np.arange(count), middle, logs))
     return replace(
         noise,
@@ -333,14 +335,6 @@ def _about_lines(power: FloatArray, noise_only: BoolArray) -> BoolArray:
     share = leaks * _MEDIAN_OF_A_SQUARE / np.maximum(median_filter(power, _BESIDE), 1e-300)
     # The half of the cosines that it leaks to least tells the noise in any case.
     return np.asarray(share > max(_LEAKED, float(np.median(share[noise_only]))))
-
-
-def _leakage(count: int) -> float:
-    """Return ln of the part of its neighbours' variance below which a cosine's can't be told.
-
-    The ends of the record leak into all cosines, all in one pattern.
-    """
-    return min(math.log(_READINGS_AT_ENDS / count), 0.0)
 
 
 def _largest_beside(logs: FloatArray, middle: FloatArray) -> FloatArray:

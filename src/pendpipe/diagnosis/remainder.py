@@ -86,7 +86,8 @@ def remainder_of(fit: Fit, data: Data, noise: Noise) -> Remainder:
     over = math.sqrt(fit.chi2 / freedom)
     if over <= INCOMPLETE:
         return Remainder(excess, over, float(freedom))
-    parts = _in_parts(_unit_numbers(fit, data, noise), fit.at.sampled.phase)
+    in_sds = data.residual(fit.at.reading) * data.weight / noise.sd
+    parts = _in_parts(in_sds, fit.at.sampled.phase)
     powers = [np.asarray(dct(part, axis=0, norm="ortho") ** 2).ravel() for part in parts]
     by_noise = [power.size for power in powers[:-1]]
     by_noise.append(max(int(np.count_nonzero(parts[-1])) - sum(by_noise), 1))
@@ -138,11 +139,6 @@ def _in_parts(residual: FloatArray, phase: FloatArray) -> list[FloatArray]:
     """Return what lies in each of the parts of the motion, cycle by cycle, and between them."""
     found, rest = by_cycle(residual, phase)
     return [found[:, 0], found[:, 1], found[:, 2], found[:, 3:], rest]
-
-
-def _unit_numbers(fit: Fit, data: Data, noise: Noise) -> FloatArray:
-    """Return the residual in standard deviations of a reading."""
-    return np.asarray(data.residual(fit.at.reading) * data.weight / noise.sd)
 
 
 def by_cycle(

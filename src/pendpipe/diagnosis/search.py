@@ -215,11 +215,7 @@ def _described(state: State, task: Task) -> Fit | None:
         if _ends_with_curve(state):
             return named
         remainder = remainder_of(state.fit, state.data, state.noise)
-    return _without_curve(state)
-
-
-def _without_curve(state: State) -> Fit | None:
-    """Fit the names without a curve that can follow anything, and would imitate them."""
+    # A curve that can follow anything would imitate the names.
     last = state.steps[-1].winner.lead.effect if state.steps else None
     if len(state.steps) < 2 or not isinstance(last, Curve) or not last.of_anything:
         return None

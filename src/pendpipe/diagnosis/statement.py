@@ -121,11 +121,12 @@ def statement(
         )
         return " ".join([nothing, *(f"{_capital(said)}." for said in noise), *stamps])
     times = before.residual_rms_rad / noise_rms
+    many = f"{_factor(times)} times" if times > 1.05 else "as large as"
     # The others only describe.
     named = [each for each in effects if each.kind != "unnamed" and each.probability > DOUBTFUL]
     text = [
         f"{_capital(model)} does not describe this recording ({printed(p_value)}): the residual is"
-        f" {compact(before.residual_rms_rad, unit)} rms, {_times(times)} the noise of"
+        f" {compact(before.residual_rms_rad, unit)} rms, {many} the noise of"
         f" {compact(noise_rms, unit)}.",
         *(_effect(effect) for effect in named),
         _nameless([effect for effect in effects if effect not in named], rest=bool(named)),
@@ -331,10 +332,6 @@ def _percent(share: float) -> str:
 def _factor(ratio: float) -> str:
     """A ratio to two digits, without a power of ten."""
     return f"{float(f'{ratio:.2g}'):,.0f}" if ratio > 9.95 else f"{ratio:.2g}"
-
-
-def _times(ratio: float) -> str:
-    return f"{_factor(ratio)} times" if ratio > 1.05 else "as large as"
 
 
 def _rival(identifier: str) -> str:

@@ -256,7 +256,8 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
     starts = [value, bare, step.before.value]
     without = best_fit(model, found.data, found.noise, starts, held=held) or step.before
     gain = without.chi2 - found.improved.chi2
-    if len(found.steps) == 1 and _same(gain, step) and not is_gross(without, found.data):
+    same = abs(gain - step.winner.gain) < _SAME_GAIN * gain
+    if len(found.steps) == 1 and same and not is_gross(without, found.data):
         return without, step.rivals
     # Refit what was behind in the search, but not far: noise and other effects have changed.
     hopeless = step.winner.evidence - 2.0 * (class_width(step.winner) + NEAR)
@@ -276,11 +277,6 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
         if fit is not None:
             fits.append((rival, fit))
     return without, [rival.again(fit, without.chi2, scale) for rival, fit in fits]
-
-
-def _same(gain: float, step: Step) -> bool:
-    """Whether an effect gains what it gained when its rivals were refitted."""
-    return abs(gain - step.winner.gain) < _SAME_GAIN * gain
 
 
 def refitted(

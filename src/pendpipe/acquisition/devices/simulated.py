@@ -377,7 +377,8 @@ class SimulatedDevice:
         """Serve the line until the end; an exception of the signal silences the device."""
         try:
             while not self._ending.is_set():
-                self._link.wait(min(self._rest_s(), _LONGEST_REST_S), sending=bool(self._outbox))
+                rest_s = self._stream.rest_s() if self._stream else _LONGEST_REST_S
+                self._link.wait(min(rest_s, _LONGEST_REST_S), sending=bool(self._outbox))
                 self.step()
         except BaseException as fault:
             self.failure = fault
@@ -402,10 +403,6 @@ class SimulatedDevice:
     def _begin(self) -> None:
         """Begin a stream, whose first scan reads the signal at 0 s."""
         self._stream = Stream(self.dialect, self._signal, self._rate_error, self.clock)
-
-    def _rest_s(self) -> float:
-        """How long there is nothing to do, in seconds of the host, if the host is silent."""
-        return self._stream.rest_s() if self._stream else _LONGEST_REST_S
 
     def _send(self) -> None:
         """Send what the line takes; while it is full, simulated time stands still."""

@@ -131,7 +131,9 @@ def _fit(
     result = fit_waveform(samples, points, baseline=baseline, fixed=fixed, restoring=restoring)
     if presumed:
         linear = fit_waveform(samples, points, baseline=baseline, fixed=fixed, restoring="linear")
-        if _contradicts(result, linear):
+        # All readings may exclude the sin x that few or noisy half cycles do not.
+        more = result.samples * (result.chi2_per_dof - linear.chi2_per_dof)
+        if linear.settled and more > SEEN**2 * max(linear.chi2_per_dof, 1.0):
             result, restoring = linear, "linear"
     if method == "waveform" or _stands(result):
         return result
@@ -147,12 +149,6 @@ def _fit(
             return _of_larger(larger, points, part)
     settled = [each for each in (result, by_points) if each.settled]
     return min(settled, key=_worst, default=by_points)
-
-
-def _contradicts(sine: FitResult, linear: FitResult) -> bool:
-    """Whether all readings exclude the sin x that few or noisy half cycles do not."""
-    more = sine.samples * (sine.chi2_per_dof - linear.chi2_per_dof)
-    return linear.settled and more > SEEN**2 * max(linear.chi2_per_dof, 1.0)
 
 
 def _worst(result: FitResult) -> float:

@@ -624,7 +624,15 @@ def row(file: str, result: FitResult | None) -> tuple[str, ...]:
     if result is None:
         return (file, "refused", *[""] * (len(HEAD) - 2))
     period, large = small_period(result), qualities(result)[0]
-    rates = ["" if result.light == "red" else _bare(result[name]) for name in "abc"]
+    # Without the unit, which is in the head of the table.
+    rates = [
+        ""
+        if result.light == "red"
+        else rate_with_error(replace(result[name], unit=""))
+        .removesuffix(" (95 %)")
+        .replace("below ", "< ")
+        for name in "abc"
+    ]
     return (
         file,
         result.light,
@@ -635,11 +643,6 @@ def row(file: str, result: FitResult | None) -> tuple[str, ...]:
         else with_error(large.quality_factor.value, large.quality_factor.sd, short=True),
         compact(large.amplitude_rad, result["amplitude"].unit),
     )
-
-
-def _bare(rate: Estimate) -> str:
-    """Print a rate without its unit, which is in the head of the table."""
-    return rate_with_error(replace(rate, unit="")).removesuffix(" (95 %)").replace("below ", "< ")
 
 
 def table(rows: list[tuple[str, ...]]) -> str:

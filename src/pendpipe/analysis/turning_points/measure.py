@@ -564,7 +564,11 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
     _refuse_saturated(values, low, high, place)
     step = recording.resolution or find_step(values[:_BEGINNING])
     if step is not None and _one_row_a_count(time, values, step):
-        return _edges(time, values, recording.unit, step)
+        # Counts are turned into the angles at which they changed, half a step back: the same edge
+        # is then passed upwards and downwards at the same angle, and a step's width is no friction.
+        angles = values[1:] - 0.5 * np.copysign(step, np.diff(values))
+        # The lines of a scale are placed to a small part of its step.
+        return Samples(time[1:], angles, recording.unit, None, 0.05 * step, counts=True)
     new, rows = _new_readings(values, step), len(values)
     if new is not None:
         time, values = _when_measured(time, new), values[new]
@@ -654,14 +658,3 @@ def _when_measured(time: FloatArray, new: BoolArray) -> FloatArray:
     order = np.arange(len(found))
     even = np.polynomial.Polynomial.fit(order, found, 1)(order)
     return even if np.ptp(found - even) < 1.1 * float(np.median(np.diff(time))) else found
-
-
-def _edges(time: FloatArray, values: FloatArray, unit: str, step: float) -> Samples:
-    """Turn counts into the angles at which they changed, half a step back.
-
-    The same edge is then passed upwards and downwards at the same angle, so that the
-    encoder's width of a step is no friction.
-    """
-    angles = values[1:] - 0.5 * np.copysign(step, np.diff(values))
-    # The lines of a scale are placed to a small part of its step.
-    return Samples(time[1:], angles, unit, None, 0.05 * step, counts=True)
