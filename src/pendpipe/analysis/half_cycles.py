@@ -51,99 +51,56 @@ class HalfCycles:
         return len(self.swing)
 
 
-def find_extremes(
-    values: FloatArray, least: float, *, start: float | None = None, stride: int = 1
-) -> tuple[IntArray, int]:
+def find_extremes(values: FloatArray, least: float) -> tuple[IntArray, int]:
     """Find alternating extremes: each is followed by a return of more than a threshold.
 
-    Nothing need be known of level or period.
+    Nothing need be known of level or period. The first reading can be an extreme; and how far the
+    motion went after the last one is an extreme too, though no return follows.
 
     Parameters
     ----------
     values
         Readings, shape (n,).
     least
-        The threshold. The first reading can be an extreme; and how far the motion went after
-        the last one is an extreme too, though no return follows.
-    start
-        Where given, this is the first threshold, later it is a quarter of the median of the last
-        five swings, and `least` (a multiple of the noise) is never undercut. Single wild
-        readings are then no extremes, and each needs a return.
-    stride
-        Every how many-th reading is looked at.
+        The threshold.
 
     Returns
     -------
     index, first
         Positions of the extremes; `first` is +1 if the first one is a maximum.
     """
-    found = np.empty(len(values) // stride + 2, dtype=np.int64)
-    fixed = start is None
-    first = least if start is None else start
+    found = np.empty(len(values) + 1, dtype=np.int64)
     values = np.ascontiguousarray(values, dtype=np.float64)
-    count = _find_extremes(values, stride, first, least, fixed, found, np.empty(5), np.empty(5))
+    count = _find_extremes(values, least, found)
     return found[: abs(count)].copy(), (count > 0) - (count < 0)
 
 
 @kernel()
-def _find_extremes(
-    values: FloatArray,
-    stride: int,
-    start: float,
-    least: float,
-    fixed: int,
-    found: IntArray,
-    swings: FloatArray,
-    ordered: FloatArray,
-) -> int:
+def _find_extremes(values: FloatArray, least: float, found: IntArray) -> int:
     """Fill `found`; return how many there are, negative if the first one is a minimum."""
-    swings[:] = np.inf
-    count, direction, first = 0, 0, 0
-    threshold = max(start, least)
-    edge = 0 if fixed else stride
-    high, low = edge, edge
+    count, direction, first, high, low = 0, 0, 0, 0, 0
     top, bottom = -np.inf, np.inf
-    for i in range(edge, values.size - edge, stride):
+    for i in range(values.size):
         x = values[i]
-        if not fixed:
-            # The median of three: a glitch of one sample is no extreme.
-            p, r = values[i - stride], values[i + stride]
-            x = max(min(p, x), min(max(p, x), r))
         if x > top:
             high, top = i, x
         if x < bottom:
             low, bottom = i, x
-        if direction >= 0 and top - x > threshold:
+        if direction >= 0 and top - x > least:
             extreme, turned = high, -1
-        elif direction <= 0 and x - bottom > threshold:
+        elif direction <= 0 and x - bottom > least:
             extreme, turned = low, 1
         else:
             continue
         if direction == 0:
             first = -turned
-        elif not fixed:
-            swings[count % 5] = abs(values[extreme] - values[found[count - 1]])
-            threshold = max(least, 0.25 * _median(swings, ordered, min(count, 5)))
         found[count] = extreme
         count += 1
         direction, high, low, top, bottom = turned, i, i, x, x
-    if fixed and direction != 0:
+    if direction != 0:
         found[count] = high if direction > 0 else low
         count += 1
     return first * count
-
-
-@kernel()
-def _median(values: FloatArray, ordered: FloatArray, known: int) -> float:
-    """Median of five values of which only `known` are finite; `ordered` is room for them."""
-    for i in range(5):
-        j = i
-        while j > 0 and ordered[j - 1] > values[i]:
-            ordered[j] = ordered[j - 1]
-            j -= 1
-        ordered[j] = values[i]
-    middle: float = 0.5 * (ordered[(known - 1) // 2] + ordered[known // 2])
-    return middle
 
 
 _SMALL: Final = 0.15

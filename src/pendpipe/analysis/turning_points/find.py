@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.half_cycles import find_extremes, without_ripples
+from pendpipe.analysis.half_cycles import half_cycles, usual_half_period
 from pendpipe.analysis.noise import quantisation_rms, undithered_rms
 from pendpipe.analysis.turning_points.harmonics import far_points, odd_harmonics, own_square
 from pendpipe.analysis.turning_points.long_records import follow
@@ -36,10 +36,10 @@ from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.recording import Recording
 
 _ENOUGH: Final = 24
-"""Readings in a half cycle that a first look needs."""
+"""Readings in a half cycle that a first look needs, and half cycles from which it is worth it."""
 _LOOK: Final = 200_000
-_FEW: Final = 5
-"""Extremes of which no threshold can be told by a median of five swings."""
+_EDGE: Final = 0.05
+"""Half periods from the first reading within which an extreme may be that reading alone."""
 
 
 class Rough(NamedTuple):
@@ -63,17 +63,17 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
     if samples.counts:
         least = 40.0 * samples.noise_rms
     piece = samples.values[:_LOOK]
-    start = 0.15 * float(piece.max() - piece.min())
-    stride = 1
-    if not samples.counts:
-        index, _ = find_extremes(piece[: len(piece) // 8], least, start=start)
-        if len(index) > 3:
-            stride = max(1, int(np.median(np.diff(index))) // _ENOUGH)
-    index, first = find_extremes(samples.values, least, start=start, stride=stride)
-    if len(index) <= _FEW:
-        index, first = _of_any_size(samples.values, least)
-    time, value = samples.time_s[index], samples.values[index]
-    side = first * (1 - 2 * (np.arange(len(index)) % 2))
+    half_period = usual_half_period(samples.time_s[:_LOOK], piece)
+    time = value = np.zeros(0)
+    if half_period is not None:
+        cycles = half_cycles(samples.time_s, samples.values, least, half_period)
+        # Where the readings begin the motion need not turn.
+        turned = cycles.turn_time_s > samples.time_s[0] + _EDGE * half_period
+        time, value = cycles.turn_time_s[turned], cycles.turn[turned]
+    index, stride = np.searchsorted(samples.time_s, time), 1
+    if len(index) > _ENOUGH and not samples.counts:
+        stride = max(1, int(np.median(np.diff(index))) // _ENOUGH)
+    side = np.sign(np.diff(value, prepend=value[1:2])).astype(np.int64)
     if len(index) >= 3:
         whole, gap_before = _beside_gaps(samples.time_s, index)
         time, value, side, gap_before = time[whole], value[whole], side[whole], gap_before[whole]
@@ -91,17 +91,6 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
         begin += count
     cut = slice(begin, begin + count)
     return Rough(number[:count], time[cut], side[cut], _level(value[cut])), stride
-
-
-def _of_any_size(values: FloatArray, least: float) -> tuple[IntArray, int]:
-    """Find extremes whose swings fall faster than a threshold by those before them can follow."""
-    index, first = find_extremes(values, least)
-    turns = without_ripples(values, index)
-    # The first and the last reading may be extremes: there the motion need not turn.
-    inner = (turns > 0) & (turns < len(values) - 1)
-    inner[-1:] = False
-    skipped = int(np.argmax(inner)) if inner.any() else 0
-    return turns[inner], first * (-1) ** skipped
 
 
 def _beside_gaps(time: FloatArray, index: IntArray) -> tuple[np.ndarray, IntArray]:
