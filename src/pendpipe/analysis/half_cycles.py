@@ -155,7 +155,9 @@ def thinned(
     # The grid hangs on the first sample's clock, not on its place: rest before changes nothing.
     thin_time, thin_values = np.empty(len(values)), np.empty(len(values))
     count = _thin(time_s, values, step, thin_time, thin_values)
-    return thin_time[:count].copy(), thin_values[:count].copy()
+    # Means over an eighth of a half cycle: mains hum makes no turning points, and a crest loses 0.6 %.
+    means = np.convolve(np.pad(thin_values[:count], 2, mode="edge"), np.full(5, 0.2), mode="valid")
+    return thin_time[:count].copy(), means
 
 
 @kernel()
