@@ -173,6 +173,22 @@ def test_clock_times_may_have_points(tmp_path: Path) -> None:
     same(read_text(tmp_path, "".join(f"{a};{x:.6f}\n" for a, x in zip(stamps, ANGLE, strict=True))))
 
 
+def test_an_oscilloscopes_input_is_no_drive(tmp_path: Path) -> None:
+    """The unused one reads zero."""
+    table = text(TIME, 0.0 * TIME, ANGLE, head="% Time (s),Input A (V),Input B (V)\n")
+    recording = read_text(tmp_path, table)
+    assert recording.unit == "V"
+    np.testing.assert_allclose(recording.values, ANGLE, atol=1e-6)
+
+
+@pytest.mark.parametrize("cells", [["38:05.6", "39:00.7"], ["38:05,6", "39:00,7"]])
+def test_a_spreadsheets_minutes_and_seconds_are_no_hours(cells: list[str]) -> None:
+    """It shows them as mm:ss.0, whatever the hour."""
+    seconds = column_of_clock_times(cells)
+    assert seconds is not None
+    np.testing.assert_allclose(seconds, [2285.6, 2340.7])
+
+
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_without_names_the_derivative_is_not_the_pendulum(
     tmp_path: Path, order: tuple[int, int]

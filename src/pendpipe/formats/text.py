@@ -614,7 +614,8 @@ _CLOCK: Final = re.compile(
     r"(?:0 days? )?"
     r"(?:(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})[T ,]+|(\d{1,2})[-/.](\d{1,2})[-/.](\d{4}|\d\d)[T ,]+)?"
     r"(?!\d+\.\d+\s*(?:[a-z+-]|$))"  # 12.50 is a number
-    r"(?:(\d{1,3})[:.])?(\d{1,2})[:.](\d{1,2}(?:[.,:]\d+)?)"
+    # Points part hours from minutes where they part these from seconds: 38:05.6 has no hours.
+    r"(?:(\d{1,3})(?::(?=\d+:)|\.(?=\d+\.)))?(\d{1,2})[:.](\d{1,2}(?:[.,:]\d+)?)"
     r"\s*(am|pm)?\s*(?:z|utc|[+-]\d{2}:?\d{2})?",
     re.I,
 )
