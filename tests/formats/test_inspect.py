@@ -77,6 +77,15 @@ def test_flat_tops_are_clipping_and_slow_turns_are_not() -> None:
     assert clipped_samples(np.clip(coarse, -0.1, 1.0), 0.01) == np.sum(coarse <= -0.1 + 1e-9)
 
 
+def test_one_flat_top_and_one_flat_bottom_are_clipped_but_no_held_readings() -> None:
+    time = np.arange(400)
+    strong = np.round(np.exp(-0.02 * time) * np.cos(0.25 * time), 3)
+    cut = np.clip(strong, -0.6, 0.7)
+    assert clipped_samples(cut, 1e-3) == np.sum((cut == -0.6) | (cut == 0.7))
+    assert clipped_samples(np.repeat(strong, 4), 1e-3) == 0
+    assert clipped_samples(np.repeat(np.round(np.cos(0.25 * time), 1), 4), 0.1) == 0
+
+
 def test_json_has_the_contracts_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "a.WDH"
     counts = np.rint(ANGLE * 20000).astype(np.int64)[:, None]
