@@ -59,6 +59,15 @@ def test_times_of_three_digits_are_counted_from_the_rows(tmp_path: Path) -> None
     assert any("rows are counted at 30" in note for note in recording.notes)
 
 
+def test_a_logger_that_slows_down_at_rest_is_counted_until_then(tmp_path: Path) -> None:
+    time = np.append(np.arange(1000) / 50, 20.0 + np.arange(100) / 10)
+    values = np.where(time < 20.0, 0.3 * np.exp(-time / 6) * np.cos(6 * time), 0.0)
+    stamps = np.floor(10 * time + 1e-9) / 10
+    recording = read_text(tmp_path, text(stamps, values, digits=5, head="t (s),theta (rad)\n"))
+    np.testing.assert_allclose(recording.time_s - recording.time_s[0], time, atol=0.12)
+    np.testing.assert_allclose(np.diff(recording.time_s[:1000]), 0.02, rtol=2e-3)
+
+
 def test_frames_that_are_missing_among_such_times_are_found(tmp_path: Path) -> None:
     kept = np.delete(np.arange(len(TIME)), [100, 101, 640])
     rows = "".join(f"{TIME[row]:.2E}\t{ANGLE[row]:.5f}\n" for row in kept)

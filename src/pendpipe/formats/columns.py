@@ -731,18 +731,25 @@ def _in_order(
 
 
 def _count_rows(_choice: Choice, base: TimeBase) -> None:
-    """Count the rows where stamps are rounded and repeat."""
-    even = _rounded(base.time_s)
-    if even is not None:
+    """Count the rows where stamps are rounded and repeat; a logger may slow down behind them."""
+    whole = len(base.time_s)
+    last = int(np.max(np.flatnonzero(np.diff(base.time_s) == 0.0), initial=-2)) + 2
+    for rows in sorted({whole, last}, reverse=True):
+        even = _rounded(base.time_s[:rows])
+        if even is None:
+            continue
         interval = np.diff(even).min()
         frames = round((even[-1] - even[0]) / interval) + 1 - len(even)
         lost = f", with {frames} missing" if frames else ""
+        until = f" until {even[-1]:.6g} s" if rows < whole else ""
+        exact = min(interval, np.ptp(base.time_s[:rows] - even))
         base.notes.append(
-            "time stamps are rounded and repeat: rows are counted at"
+            f"time stamps are rounded and repeat{until}: rows are counted at"
             f" {1.0 / interval:.6g} Hz{lost}, which all stamps agree with: the rate is known to"
-            f" {100.0 * min(interval, np.ptp(base.time_s - even)) / np.ptp(even):.1g} %"
+            f" {100.0 * exact / np.ptp(even):.1g} %"
         )
-        base.time_s = even
+        base.time_s = np.append(even, base.time_s[rows:])
+        return
 
 
 def _count_late_rows(choice: Choice, base: TimeBase) -> None:
