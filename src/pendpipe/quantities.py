@@ -46,6 +46,18 @@ def compact(value: float, unit: str) -> str:
     return f"{digits} {short}".rstrip()
 
 
+def stretch(start_s: float, stop_s: float) -> str:
+    """A stretch of time, to as many digits as tell its ends apart.
+
+    >>> stretch(0.0, 0.72941), stretch(45296.0, 45296.72941)
+    ('0 to 0.7294 s', '45296 to 45296.729 s')
+    """
+    largest, length = max(abs(start_s), abs(stop_s)), abs(stop_s - start_s)
+    finer = 3 + math.ceil(math.log10(largest / length)) if length > 0.0 else 0
+    digits = max(4, len(f"{largest:.0f}"), finer)
+    return f"{start_s:.{digits}g} to {stop_s:.{digits}g} s"
+
+
 def pretty_unit(unit: str) -> str:
     """A unit of the result files as it is printed.
 

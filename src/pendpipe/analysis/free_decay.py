@@ -579,7 +579,7 @@ def _refuse_without_fall(
         fall < 4.0 * sd,
         place,
         f"the amplitude does not fall over {len(swing)} half cycles by more than its error"
-        f" ({100.0 * fall:.2g} +- {100.0 * sd:.1g} %): the decay is too slow to be resolved",
+        f", {with_error(100.0 * fall, 100.0 * sd, '%')}: the decay is too slow to be resolved",
         "record longer, unless something drives it",
         NotAnalysableError,
     )

@@ -38,6 +38,7 @@ from pendpipe.diagnosis.weighing import (
 )
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.errors import NotAnalysableError
+from pendpipe.quantities import stretch
 from pendpipe.recording import Recording
 
 if TYPE_CHECKING:
@@ -196,7 +197,7 @@ def diagnose_recording(
     progress("finding the free decay and its turning points")
     points, part = measure_recording(recording.as_motion(place=place), place)
     for cut in points.cuts:
-        progress(f"left out: {cut.start_s:.4g} to {cut.stop_s:.4g} s, {cut.reason}")
+        progress(f"left out: {stretch(cut.start_s, cut.stop_s)}, {cut.reason}")
     return diagnose_decay(
         part,
         points,

@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 from pendpipe import physics
 from pendpipe.figures.data import Entry, error, number, typical_record, used
 from pendpipe.files import without_folders
-from pendpipe.quantities import compact, in_columns, pretty_unit, with_error
+from pendpipe.quantities import compact, in_columns, pretty_unit, stretch, with_error
 from pendpipe.templates import render as fill_template
 
 
@@ -80,7 +80,7 @@ def table_of_records(
             "entry": entry,
             "known": _resolved(entry),
             "cuts": [
-                f"{number(cut.get('start_s')):.4g} s to {number(cut.get('stop_s')):.4g} s:"
+                f"{stretch(number(cut.get('start_s')), number(cut.get('stop_s')))}:"
                 f" {cut.get('reason', '')}"
                 for cut in entry.get("cuts") or []
             ],

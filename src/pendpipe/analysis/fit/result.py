@@ -18,7 +18,7 @@ from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Estimate, number, quality_of_rate
 from pendpipe.files import read_json, write_json
-from pendpipe.quantities import compact, in_columns, with_error
+from pendpipe.quantities import compact, in_columns, stretch, with_error
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -559,7 +559,7 @@ def lines(result: FitResult, *, law: bool | None = None) -> list[str]:
         f"{result.light}: {result.light_reason}",
         f"  {result.equation} fitted to {count} {'turning points' if by_points else 'readings'}",
         *(
-            _line("left out", f"{cut['start_s']:.4g} to {cut['stop_s']:.4g} s: {cut['reason']}")
+            _line("left out", f"{stretch(cut['start_s'], cut['stop_s'])}: {cut['reason']}")
             for cut in result.cuts
         ),
     ]
