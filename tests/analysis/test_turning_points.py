@@ -359,6 +359,16 @@ def test_a_reading_that_is_held_counts_once(
     assert np.array_equal(samples.values, measured.values[: len(samples)])
 
 
+@pytest.mark.filterwarnings("error")
+def test_bursts_of_a_few_readings_are_refused_in_a_line() -> None:
+    """Ten readings a second apart, then 51 s without."""
+    row = np.arange(460)
+    values = 0.35 * np.exp(-row / 600) * np.cos(2 * np.pi * row / 19)
+    bursts = Recording(time_s=60.0 * (row // 10) + row % 10, values=values, quantity="angle_rad")
+    with pytest.raises(NotAnalysableError, match="nine readings in a cycle"):
+        find_turning_points(bursts)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_turning_points_of_readings_held_for_some_rows_have_the_errors_stated(seed: int) -> None:
     """Two to seven rows, at random: each reading is as old as its first row tells."""

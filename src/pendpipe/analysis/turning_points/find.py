@@ -402,12 +402,15 @@ def _refuse_few(samples: Samples, found: int, place: str | Path) -> None:
     refuse_if(found < 3, place, problem, "record longer", NotAnalysableError)
 
 
+@np.errstate(divide="ignore")  # bursts of readings tell no half period
 def _locate(samples: Samples, rough: Rough, stride: int) -> tuple[Places, Measured]:
     """Lock on to the half cycles with a bare cosine, and follow them into the tail."""
     places, steps = first_places(rough), 3
     while True:
         cosine = np.zeros((len(places.number), 4 + HARMONICS))
         measured = measure(samples, places, rough.level, cosine, stride=stride)
+        if not np.any(_known(measured)):
+            return places, measured
         late = measured.phase(samples.noise_rms)[~measured.one_sided]
         places = resmoothed(places, measured, samples.noise_rms)
         if np.nanmax(np.abs(late), initial=0.0) < _LOCKED or (steps := steps - 1) == 0:
