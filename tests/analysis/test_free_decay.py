@@ -416,3 +416,13 @@ def test_a_strongly_damped_decay_is_found(quality: float) -> None:
     found = find_free_decay(recording([values], noise=1e-4))
     assert found.start_s == 0.0
     assert found.half_cycles >= min(3.0 * quality, 11.0) - 1.0
+
+
+@pytest.mark.parametrize("amplitude", [0.8, 1.0])
+def test_a_decay_that_dry_friction_ends_after_four_half_cycles_is_found(amplitude: float) -> None:
+    swings = oscillation(amplitude, 0.0, 0.1, most=60.0)
+    decay = find_free_decay(
+        recording([still(amplitude, 2.0), swings, still(swings[-1], 3.0)], step=0.0015)
+    )
+    assert decay.half_cycles >= 3
+    assert decay.half_period_s == pytest.approx(PERIOD / 2, rel=0.01)

@@ -163,8 +163,10 @@ def _regular(run: Run) -> bool:
     # Where the sides differ, half cycles two apart are alike; of a few that says too little.
     apart = 2 if len(half) > 6 else 1
     waver = float(np.median(np.abs(half[apart:] - half[:-apart]))) / float(np.median(half))
-    # Viscous loss takes the same share of each half cycle, and so a strong one bends the amplitude.
-    kinks = float(np.median(np.abs(np.diff(np.log(run.swing), 2))))
+    # Viscous loss takes the same share of each half cycle, Coulomb friction the same amount: a
+    # strong one of either bends what is even under the other.
+    shares, amounts = np.diff(np.log(run.swing), 2), np.diff(run.swing, 2) / usual
+    kinks = min(float(np.median(np.abs(bends))) for bends in (shares, amounts))
     return waver < _WAVER + 0.5 * blur and kinks < _WAVER + 2.0 * blur
 
 
