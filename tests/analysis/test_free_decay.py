@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+import pendpipe
 from pendpipe.analysis.free_decay import FreeDecay, _running_median, find_free_decay
 from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording
@@ -192,6 +193,20 @@ def test_a_small_knock_and_a_wild_reading_stay(kick: float) -> None:
     found = find_free_decay(recording([swing], noise=1e-3))
     assert found.start_s == 0.0
     assert found.stop_s > len(swing) / RATE - PERIOD
+
+
+@pytest.mark.parametrize("hum_hz", [50.0, 60.0])
+def test_mains_hum_hides_no_decay(hum_hz: float) -> None:
+    """A photodiode in room light, read a thousand times a second."""
+    time_s = np.arange(0.0, 40.0, 1e-3)
+    swing = np.exp(-0.02 * time_s) * np.cos(2.0 * np.pi * 1.37 * time_s)
+    hum = 0.2 * np.sin(2.0 * np.pi * hum_hz * time_s)
+    noise = 0.005 * np.random.default_rng(3).standard_normal(len(time_s))
+    fitted = pendpipe.fit(Recording(time_s, swing + hum + noise, "volts"))
+    assert not fitted.cuts
+    assert fitted["frequency"].value == pytest.approx(1.37, rel=1e-4)
+    low, high = fitted["b"].bounds95
+    assert low < 0.02 < high < 0.022
 
 
 def holed(swing: Floats, first: float, last: float) -> Recording:

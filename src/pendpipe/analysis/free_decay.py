@@ -17,7 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.analysis.half_cycles import HalfCycles, half_cycles, usual_half_period
+from pendpipe.analysis.half_cycles import SEEN, HalfCycles, half_cycles, usual_half_period
 from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.find import find_turning_points
 from pendpipe.analysis.turning_points.table import BEAT, Cut, TurningPoints
@@ -356,7 +356,7 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
         why = "the reading never changes" if len(values) >= 8 else f"{len(values)} samples only"
         raise NotAnalysableError(place, why, "is this the right channel?")
     step = recording.resolution
-    least = max(6.5 * noise_rms(values, step, quieter=0.1), 1.6 * (step or 0.0))
+    least = max(SEEN * noise_rms(values, step, quieter=0.1), 1.6 * (step or 0.0))
     half_period = usual_half_period(time, values)
     # Noise alone spans about `least`. What hardly exceeds it many half cycles can prove.
     if half_period is None or span < 1.5 * least:

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.noise import noise_rms
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics.kernel import kernel
 
@@ -103,6 +104,8 @@ def _find_extremes(values: FloatArray, least: float, found: IntArray) -> int:
     return first * count
 
 
+SEEN: Final = 6.5
+"""Standard deviations of the noise from which a swing is seen."""
 _SMALL: Final = 0.15
 """Of both neighbours: a swing below is a ripple."""
 
@@ -155,7 +158,7 @@ def thinned(
     # The grid hangs on the first sample's clock, not on its place: rest before changes nothing.
     thin_time, thin_values = np.empty(len(values)), np.empty(len(values))
     count = _thin(time_s, values, step, thin_time, thin_values)
-    # Means over an eighth of a half cycle: mains hum makes no turning points, and a crest loses 0.6 %.
+    # Means over an eighth of a half cycle take mains hum out, and 0.6 % of a crest.
     means = np.convolve(np.pad(thin_values[:count], 2, mode="edge"), np.full(5, 0.2), mode="valid")
     return thin_time[:count].copy(), means
 
@@ -225,6 +228,8 @@ def half_cycles(
 ) -> HalfCycles:
     """Read off the half cycles whose swing exceeds `least`."""
     time, smooth = thinned(time_s, values, half_period_s)
+    # Mains hum may be left, which is slow beside the readings and no noise of theirs.
+    least = max(least, SEEN * noise_rms(smooth, quieter=0.1))
     turns = without_ripples(smooth, find_extremes(smooth, least)[0])
     # The last one found is where the record happens to end, or any point of the final rest.
     ending = float(np.abs(np.diff(smooth[turns[-2:]])).sum())

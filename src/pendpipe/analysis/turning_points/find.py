@@ -38,6 +38,8 @@ from pendpipe.recording import Recording
 _ENOUGH: Final = 24
 """Readings in a half cycle that a first look needs, and half cycles from which it is worth it."""
 _LOOK: Final = 200_000
+_GAP: Final = 0.4
+"""Half periods without a reading from which a turning point may be lost in them."""
 _EDGE: Final = 0.05
 """Half periods from the first reading within which an extreme may be that reading alone."""
 
@@ -96,7 +98,7 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
 def _beside_gaps(time: FloatArray, index: IntArray) -> tuple[np.ndarray, IntArray]:
     """Which extremes stand clear of gaps in the data; and which have one before them."""
     half_period = float(np.median(np.diff(time[index[: min(12, len(index))]])))
-    gaps = np.flatnonzero(np.diff(time) > 0.4 * half_period)
+    gaps = np.flatnonzero(np.diff(time) > _GAP * half_period)
     # An extreme at the very edge of a gap is where the data end, not where they turn.
     clear = (index > 1) & (index < len(time) - 2) & ~np.isin(index, [gaps, gaps + 1])
     before = np.searchsorted(gaps, index)
@@ -381,6 +383,10 @@ def _measured(samples: Samples, place: str | Path) -> TurningPoints:
     """Measure half cycle by half cycle."""
     rough, stride = rough_half_cycles(samples)
     _refuse_few(samples, len(rough.number), place)
+    gaps = np.diff(samples.time_s) > _GAP * float(np.median(np.diff(rough.time_s)))
+    bursts = 2 * np.count_nonzero(gaps) > len(rough.number)
+    problem, remedy = "most half cycles have a gap in them", "record without pauses"
+    refuse_if(bursts, place, problem, remedy, NotAnalysableError)
     places, first = _locate(samples, rough, stride)
     few, remedy = not np.any(_known(first)), "sample faster"
     refuse_if(few, place, "fewer than nine readings in a cycle", remedy, NotAnalysableError)
