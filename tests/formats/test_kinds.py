@@ -877,6 +877,16 @@ def test_the_name_of_a_section_is_no_unit(tmp_path: Path) -> None:
     same(read_text(tmp_path, head + text(np.degrees(ANGLE))))
 
 
+@pytest.mark.parametrize(("level", "said"), [(9.81, True), (0.0, False), (-9.81, True)])
+def test_a_pull_along_the_string_is_said_to_swing_twice_in_a_period(
+    level: float, said: bool, tmp_path: Path
+) -> None:
+    path = tmp_path / "phone.csv"
+    rows = zip(TIME, level + 0.5 * RATE**2, strict=True)
+    path.write_text("Time (s),Acceleration y (m/s^2)\n" + "".join(f"{t},{a}\n" for t, a in rows))
+    assert any("twice in a period" in note for note in read(path).notes) is said
+
+
 def test_readings_beside_gravity_are_an_accelerometers(tmp_path: Path) -> None:
     along = 9.81 * np.cos(ANGLE) + 0.5 * RATE**2
     for columns in ((along,), (9.81 * np.sin(ANGLE), along)):
