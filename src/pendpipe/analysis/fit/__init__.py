@@ -133,7 +133,7 @@ def _fit(
         linear = fit_waveform(samples, points, baseline=baseline, fixed=fixed, restoring="linear")
         # All readings may exclude the sin x that few or noisy half cycles do not.
         more = result.samples * (result.chi2_per_dof - linear.chi2_per_dof)
-        if linear.settled and more > SEEN**2 * max(linear.chi2_per_dof, 1.0):
+        if _stands(linear) and more > SEEN**2 * max(linear.chi2_per_dof, 1.0):
             result, restoring = linear, "linear"
     if method == "waveform" or _stands(result):
         return result
