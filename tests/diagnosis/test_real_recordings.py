@@ -92,7 +92,9 @@ def test_a_ship_hardens_rather_than_drifts() -> None:
     """A clock that drifts by 0.7 % would fit as well, and has a lower prior."""
     named = diagnose_recording(whole(SHIP)).diagnosis.effects
     assert named[0].identifier == "cubic-stiffness"
-    assert named[0].parameters["k3"].value == pytest.approx(0.27 / 0.375, abs=0.25)
+    k3 = named[0].parameters["k3"]
+    # The coefficient is known to 0.08, and has its own error beside the misfit that is left.
+    assert k3.value == pytest.approx(0.27 / 0.375, abs=0.08 / 0.375 + 2.0 * k3.sd)
     less = dict(named[0].indistinguishable)
     assert all(
         less.get(name, 0.0) < named[0].probability for name in ("clock-drift", "frequency-drift")

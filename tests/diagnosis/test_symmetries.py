@@ -106,7 +106,8 @@ def fits_agree(name: str, one: View, other: View) -> None:
     )
     assert second.chi2_per_dof == pytest.approx(first.chi2_per_dof, rel=1e-5)
     size = abs(change.larger)
-    assert second.noise_rms_rad == pytest.approx(size * first.noise_rms_rad, rel=1e-6)
+    # Of the half cycles, whose places are locked to a tenth of a radian from wherever they begin.
+    assert second.noise_rms_rad == pytest.approx(size * first.noise_rms_rad, rel=1e-5)
     assert second.residual_rms_rad == pytest.approx(size * first.residual_rms_rad, rel=1e-6)
     assert len(first.decrement_check) == len(second.decrement_check) > 0
     for before, after in zip(first.decrement_check, second.decrement_check, strict=True):

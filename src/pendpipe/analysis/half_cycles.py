@@ -19,6 +19,8 @@ from pendpipe.dynamics.kernel import kernel
 _PER_HALF_CYCLE: Final = 40
 """Samples a half cycle that are kept: a turning point is then low by 0.03 %."""
 
+_ASIDE: Final = 0.5 * (math.sqrt(5.0) - 1.0)
+"""Cells by which their edges lie beside even readings, so that no rounding error decides."""
 _SOME: Final = 4096
 """Readings, spread over the record, that tell its range and its usual interval."""
 
@@ -182,7 +184,7 @@ def _thin(
         if 0 < i < last:
             before, after = values[i - 1], values[i + 1]
             x = max(min(before, x), min(max(before, x), after))
-        here = math.floor(time_s[i] / step)
+        here = math.floor(time_s[i] / step + _ASIDE)
         if i > 0 and here != cell:
             thin_time[count], thin_values[count] = when / readings, total / readings
             count, readings, when, total = count + 1, 0, 0.0, 0.0

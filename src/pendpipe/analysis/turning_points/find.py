@@ -66,13 +66,16 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
         least = 40.0 * samples.noise_rms
     piece = samples.values[:_LOOK]
     half_period = usual_half_period(samples.time_s[:_LOOK], piece)
-    time = value = np.zeros(0)
+    time, value, index, stride = np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64), 1
     if half_period is not None:
-        cycles = half_cycles(samples.time_s, samples.values, least, half_period)
+        # From the first reading on, and no rounding error decides: not the clock's zero.
+        since_s = samples.time_s - samples.time_s[0]
+        cycles = half_cycles(since_s, samples.values, least, half_period)
         # Where the readings begin the motion need not turn.
-        turned = cycles.turn_time_s > samples.time_s[0] + _EDGE * half_period
+        turned = cycles.turn_time_s > _EDGE * half_period
         time, value = cycles.turn_time_s[turned], cycles.turn[turned]
-    index, stride = np.searchsorted(samples.time_s, time), 1
+        index = np.searchsorted(since_s, time - 1e-9 * half_period)
+        time = samples.time_s[0] + time
     if len(index) > _ENOUGH and not samples.counts:
         stride = max(1, int(np.median(np.diff(index))) // _ENOUGH)
     side = np.sign(np.diff(value, prepend=value[1:2])).astype(np.int64)
