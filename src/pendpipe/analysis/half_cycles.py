@@ -54,7 +54,7 @@ class HalfCycles:
         return len(self.swing)
 
 
-def find_extremes(values: FloatArray, least: float) -> tuple[IntArray, int]:
+def find_extremes(values: FloatArray, least: float) -> IntArray:
     """Find alternating extremes: each is followed by a return of more than a threshold.
 
     Nothing need be known of level or period. The first reading can be an extreme; and how far the
@@ -69,19 +69,18 @@ def find_extremes(values: FloatArray, least: float) -> tuple[IntArray, int]:
 
     Returns
     -------
-    index, first
-        Positions of the extremes; `first` is +1 if the first one is a maximum.
+    numpy.ndarray
+        Their positions.
     """
     found = np.empty(len(values) + 1, dtype=np.int64)
-    values = np.ascontiguousarray(values, dtype=np.float64)
-    count = _find_extremes(values, least, found)
-    return found[: abs(count)].copy(), (count > 0) - (count < 0)
+    count = _find_extremes(np.ascontiguousarray(values, dtype=np.float64), least, found)
+    return found[:count].copy()
 
 
 @kernel()
 def _find_extremes(values: FloatArray, least: float, found: IntArray) -> int:
-    """Fill `found`; return how many there are, negative if the first one is a minimum."""
-    count, direction, first, high, low = 0, 0, 0, 0, 0
+    """Fill `found`; return how many there are."""
+    count, direction, high, low = 0, 0, 0, 0
     top, bottom = -np.inf, np.inf
     for i in range(values.size):
         x = values[i]
@@ -90,20 +89,17 @@ def _find_extremes(values: FloatArray, least: float, found: IntArray) -> int:
         if x < bottom:
             low, bottom = i, x
         if direction >= 0 and top - x > least:
-            extreme, turned = high, -1
+            found[count], direction = high, -1
         elif direction <= 0 and x - bottom > least:
-            extreme, turned = low, 1
+            found[count], direction = low, 1
         else:
             continue
-        if direction == 0:
-            first = -turned
-        found[count] = extreme
         count += 1
-        direction, high, low, top, bottom = turned, i, i, x, x
+        high, low, top, bottom = i, i, x, x
     if direction != 0:
         found[count] = high if direction > 0 else low
         count += 1
-    return first * count
+    return count
 
 
 SEEN: Final = 6.5
@@ -138,7 +134,7 @@ def usual_half_period(time_s: FloatArray, values: FloatArray) -> float | None:
     low, high = np.percentile(values[:: max(1, len(values) // _SOME)], (0.5, 99.5))
     span = float(high - low) or float(np.ptp(values))
     for share in (0.2, 0.05, 0.02):
-        turns = without_ripples(values, find_extremes(values, share * span)[0])
+        turns = without_ripples(values, find_extremes(values, share * span))
         if len(turns) >= 4:
             return float(np.median(np.diff(time_s[turns])))
     return None
@@ -235,7 +231,7 @@ def half_cycles(
     time, smooth = thinned(time_s, values, half_period_s)
     # Mains hum may be left, which is slow beside the readings and no noise of theirs.
     least = max(least, SEEN * noise_rms(smooth, quieter=0.1))
-    turns = without_ripples(smooth, find_extremes(smooth, least)[0])
+    turns = without_ripples(smooth, find_extremes(smooth, least))
     # The last one found is where the record happens to end, or any point of the final rest.
     ending = float(np.abs(np.diff(smooth[turns[-2:]])).sum())
     turns = turns[:-1]

@@ -81,7 +81,7 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
     side = np.sign(np.diff(value, prepend=value[1:2])).astype(np.int64)
     if len(index) >= 3:
         whole, gap_before = _beside_gaps(samples.time_s, index)
-        time, value, side, gap_before = time[whole], value[whole], side[whole], gap_before[whole]
+        time, value, side = time[whole], value[whole], side[whole]
     if len(time) < 3:
         return Rough(np.arange(len(time)), time, side, float(np.median(piece))), stride
     begin = 0
@@ -99,12 +99,14 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
 
 
 def _beside_gaps(time: FloatArray, index: IntArray) -> tuple[np.ndarray, IntArray]:
-    """Which extremes stand clear of gaps in the data; and which have one before them."""
+    """Which extremes stand clear of gaps in the data; and which of these have one before them."""
     half_period = float(np.median(np.diff(time[index[: min(12, len(index))]])))
     gaps = np.flatnonzero(np.diff(time) > _GAP * half_period)
     # An extreme at the very edge of a gap is where the data end, not where they turn.
-    clear = (index > 1) & (index < len(time) - 2) & ~np.isin(index, [gaps, gaps + 1])
-    before = np.searchsorted(gaps, index)
+    edges = time[np.concatenate([gaps, gaps + 1])]
+    at_edge = np.abs(time[index, None] - edges) < _EDGE * half_period
+    clear = (index > 1) & (index < len(time) - 2) & ~at_edge.any(axis=1)
+    before = np.searchsorted(gaps, index[clear])
     return clear, (np.diff(before, prepend=before[:1]) > 0).astype(np.int64)
 
 
