@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.special import ellipk
 
@@ -237,6 +237,7 @@ def test_durations_are_times_of_which_none_is_near_zero(least: float, lasts: boo
     rate=st.floats(1.5, 8.0),
     start=st.floats(0.0, 100.0),
 )
+@example(decimals=1, rate=1.5, start=0.45)
 def test_rounded_stamps_of_even_rows_are_counted(decimals: int, rate: float, start: float) -> None:
     # More than one row in the last digit, so that stamps repeat.
     interval = 10.0**-decimals / rate
