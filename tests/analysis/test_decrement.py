@@ -341,3 +341,15 @@ def test_the_loss_is_that_of_the_cycle_about_the_amplitude(over_friction: float)
     amplitude = over_friction * fall
     expected = math.log((amplitude + fall) / (amplitude - fall)) / (2.0 * math.pi / OMEGA)
     assert loss_of(law, amplitude) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("law", "loss"),
+    [
+        (Eq8(OMEGA, quadratic=2.0, hysteretic=30.0, viscous=12.0, coulomb=0.5), 2.0 * 3.0 + 42.0),
+        (Eq8(OMEGA, quadratic=0.25, coulomb=60.0), 0.25 * 3.0),
+    ],
+)
+def test_where_nothing_turns_the_loss_is_that_of_eq_13(law: Eq8, loss: float) -> None:
+    """Overdamped, or stopped within the cycle: a y + b + c/y at y = 3."""
+    assert loss_of(law, 3.0) == pytest.approx(loss + law.coulomb / 3.0, rel=1e-12)

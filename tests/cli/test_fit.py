@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import sys
 from pathlib import Path
 
@@ -118,3 +119,16 @@ def test_a_law_at_its_bound_is_printed_as_an_upper_limit(tmp_path: Path) -> None
     at_bound = [fit for fit in fits if fit["a"].at_bound or fit["c"].at_bound]
     assert at_bound, "no fit of a purely viscous pendulum lies at the bound"
     assert all("below" in str(fit) for fit in at_bound)
+
+
+@pytest.mark.parametrize("content", ["{}", "[1, 2]", '{"volts": 3}'])
+def test_a_file_that_is_no_calibration_is_refused_in_a_line(
+    content: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording, calibration = tmp_path / "decay.csv", tmp_path / "calibration.json"
+    rows = (f"{0.01 * k:.2f},{math.exp(-k / 900) * math.cos(0.05 * k):.6f}" for k in range(3000))
+    recording.write_text("time_s,volts\n" + "\n".join(rows) + "\n")
+    calibration.write_text(content)
+    assert cli.main(["fit", str(recording), "--calibration", str(calibration)]) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said == f"pendpipe: {calibration}: this is no calibration; run pendpipe calibrate"

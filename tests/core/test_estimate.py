@@ -8,7 +8,7 @@ from dataclasses import asdict
 
 import pytest
 
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Estimate, over
 from pendpipe.files import finite
 
 
@@ -30,3 +30,16 @@ def test_what_could_not_be_estimated_is_nan() -> None:
     assert math.isnan(back.value)
     assert math.isnan(back.sd)
     assert str(back) == "–"
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "quotient"),
+    [(1.0, 4.0, (2.0, 8.0)), (1.0, math.inf, (0.0, 8.0)), (0.0, 4.0, (2.0, math.inf))],
+)
+def test_a_quotient_lies_between_those_by_the_ends(
+    low: float, high: float, quotient: tuple[float, float]
+) -> None:
+    """Q of a rate: no loss can't be told from a Q without end, an endless loss has Q 0."""
+    found = over(8.0, Estimate(2.0, 0.5, "1/s", (low, high)))
+    assert (found.value, found.sd) == (4.0, 1.0)
+    assert found.bounds95 == quotient
