@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.gauss_newton import damping_for
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import best_fit, refine
 from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
@@ -177,3 +178,11 @@ def test_a_start_beyond_all_numbers_is_none() -> None:
         found = best_fit(fit.model, data, noise, [beyond, fit.value])
     assert found is not None
     assert found.chi2 == pytest.approx(fit.chi2, rel=1e-6)
+
+
+def test_a_step_without_a_limit_is_not_damped_however_long_it_is() -> None:
+    """Where its length overflows, too: an imitation that leaves 1e152 of itself."""
+    pull, squares = np.array([-1e152, 1e142]), np.array([5.9, 1e-9])
+    with np.errstate(over="ignore"):
+        assert damping_for(pull, squares, np.inf) == 0.0
+    assert damping_for(np.array([3.0]), np.array([1.0]), 1.0) == pytest.approx(2.0, rel=1e-2)

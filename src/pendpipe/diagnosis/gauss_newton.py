@@ -182,7 +182,7 @@ def _step(
     left, singular, turned = np.linalg.svd(matrix, full_matrices=False)
     seen = singular > _PRECISE * np.max(singular, initial=0.0)
     pull, squares = (singular * (left.T @ right))[seen], singular[seen] ** 2
-    damping = _damping(pull, squares, radius)
+    damping = damping_for(pull, squares, radius)
     best = turned[seen].T @ (pull / (squares + damping))
     if np.any(best < floor) or np.any(best > ceiling):
         matrix = np.vstack([matrix, math.sqrt(damping) * np.eye(len(free))])
@@ -194,13 +194,14 @@ def _step(
     return step, float(np.linalg.norm(best))
 
 
-def _damping(pull: FloatArray, squares: FloatArray, radius: float) -> float:
+def damping_for(pull: FloatArray, squares: FloatArray, radius: float) -> float:
     """Return the least damping with which a step is no longer than `radius`."""
 
     def longer(damping: float) -> float:
         return float(np.linalg.norm(pull / (squares + damping))) - radius
 
-    if longer(0.0) <= 0.0:
+    # Without a limit there is nothing to damp, and the length may overflow.
+    if math.isinf(radius) or longer(0.0) <= 0.0:
         return 0.0
     # The step is shorter than the gradient over the damping.
     return float(brentq(longer, 0.0, float(np.linalg.norm(pull)) / radius, rtol=_RADIUS_MET))
