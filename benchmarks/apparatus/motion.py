@@ -116,7 +116,8 @@ def slope(u, side, turn, k, law, now, out):  # type: ignore[no-untyped-def]
     if k[10] > 0.0:
         th -= min(max(th, -0.5 * k[10]), 0.5 * k[10])
     torque = th + k[1] * (np.sin(th) - th) + k[7] * th * th + k[8] * th**3 + k[9] * th * abs(th)
-    energy = w * w * th * th + v * v
+    height = th * th + k[1] * (2.0 - 2.0 * np.cos(th) - th * th)
+    energy = w * w * height + v * v
     drag = (1.0 - k[6]) * energy * side + k[6] * 1.5 * v * abs(v)
     loss = 0.5 * np.pi * ((k[5] * w + k[4] * np.sqrt(energy)) * side + k[2] / w * drag)
     loss += 2.0 * k[3] * v

@@ -1,0 +1,428 @@
+"""Whether fit and diagnosis give the numbers of clean recordings of the law within their errors.
+
+    python -m benchmarks.consistency [--number 200] [--seed N] [--fits] [--diagnoses N]
+
+The recordings are integrated by `benchmarks.apparatus.motion`, which shares no code with the
+library: pendulums (sin x, angles) and every fourth a spring (x, displacements), Q 5 to 5000 at the
+first amplitude, 0.01 to 2.5 rad, white noise of 1e-6 to 1e-2 of that amplitude, 12 to 1000 readings
+a cycle, 5 to 1000 cycles; each loss alone and all together, the drag in the paper's energy form or
+v|v|. A recording ends where the amplitude meets the noise. Where the Cramer-Rao error of Q exceeds
+20 % a refusal is right: these are counted apart. It prints a line a recording as it goes, then the
+rates, over all and by region. Exit status 1 where a rate misses what is asked of it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+import pendpipe as pp
+from benchmarks.apparatus.motion import PARAMETERS, TIMES, Array, P, T, integrate
+from pendpipe.dynamics import Eq8, Release, sample_with_jacobian
+from pendpipe.errors import InputError
+
+MOST_READINGS: Final = 300_000
+_PIECE: Final = 1 << 17
+"""Steps of the integrator that are in memory at a time."""
+_BIAS: Final = 0.02
+"""Standard deviations of the frequency by which the integrator may be off."""
+KINDS: Final = ("a", "b hysteretic", "b viscous", "c", "all")
+QUANTITIES: Final = ("T0", "Q", "a", "b", "c")
+UNDECIDABLE: Final = 0.2
+"""Cramer-Rao error of Q, relative, from which a refusal is right."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """One recording's law and how it is recorded; SI, radians (metres for a spring)."""
+
+    number: int
+    sine: bool
+    speed: bool
+    kind: str
+    omega: float
+    amplitude: float
+    a: float
+    hysteretic: float
+    viscous: float
+    c: float
+    quality: float
+    noise: float
+    per_cycle: float
+    cycles: float
+    phase: float
+    offset: float
+
+    @property
+    def b(self) -> float:
+        return self.hysteretic + self.viscous
+
+    @property
+    def law(self) -> Eq8:
+        """The same in the energy form, for the Cramer-Rao bound."""
+        torque: Any = "sine" if self.sine else "linear"
+        return Eq8(self.omega, self.a, self.hysteretic, self.viscous, self.c, torque)
+
+    def value(self, name: str) -> float:
+        """T0 in s, Q at the first amplitude to first order, a, b, c."""
+        if name == "T0":
+            return 2.0 * math.pi / self.omega
+        return self.quality if name == "Q" else float(getattr(self, name))
+
+
+def draw(number: int, seed: int) -> Truth:
+    """Draw a recording's law."""
+    rng = np.random.default_rng([seed, number])
+
+    def log(low: float, high: float) -> float:
+        return float(np.exp(rng.uniform(math.log(low), math.log(high))))
+
+    frequency, amplitude, quality = log(0.3, 3.0), log(0.01, 2.5), log(5.0, 5000.0)
+    omega = 2.0 * math.pi * frequency
+    kind = KINDS[number % len(KINDS)]
+    share = rng.dirichlet(np.ones(4)) if kind == "all" else np.eye(4)[KINDS.index(kind)]
+    losses = 0.5 * omega / quality * share
+    relative = log(1e-6, 1e-2)
+    per_cycle, cycles = log(12.0, 1000.0), log(5.0, 1000.0)
+    cycles = min(cycles, _lasts(losses, relative) * frequency)
+    return Truth(
+        number=number,
+        sine=number % 4 != 3,
+        speed=bool(share[0] > 0.0 and rng.random() < 0.5),
+        kind=kind,
+        omega=omega,
+        amplitude=amplitude,
+        a=float(losses[0]) / amplitude,
+        hysteretic=float(losses[1]),
+        viscous=float(losses[2]),
+        c=float(losses[3]) * amplitude,
+        quality=quality,
+        noise=relative * amplitude,
+        per_cycle=min(per_cycle, MOST_READINGS / cycles),
+        cycles=cycles,
+        phase=float(rng.uniform(0.0, 1.0)),
+        offset=float(rng.uniform(-0.02, 0.02)) * amplitude,
+    )
+
+
+def _lasts(losses: Array, relative: float) -> float:
+    """Time until the amplitude has fallen to the noise, s."""
+    y = np.geomspace(1.0, relative, 4000)
+    fall = losses[0] * y**2 + (losses[1] + losses[2]) * y + losses[3]
+    return float(np.sum(-np.diff(y) * 0.5 * (1.0 / fall[1:] + 1.0 / fall[:-1])))
+
+
+def recorded(truth: Truth, seed: int) -> tuple[Array, Array]:
+    """Times from the release on and noisy readings, shape (n,)."""
+    rng = np.random.default_rng([seed, truth.number, 1])
+    period = 2.0 * math.pi / truth.omega
+    interval = period / truth.per_cycle
+    count = max(int(truth.cycles * truth.per_cycle), 24)
+    bias = math.sqrt(6.0 / count) * truth.noise / truth.amplitude / (math.pi * truth.cycles)
+    wide = 1.0 + truth.amplitude**2 if truth.sine else 1.0
+    finest = (120.0 * _BIAS * bias) ** 0.25 / wide
+    fine = max(math.ceil(interval * truth.omega / min(finest, 0.05)), 1)
+    k = np.zeros(PARAMETERS)
+    k[P.OMEGA], k[P.SINE], k[P.A], k[P.C] = truth.omega, float(truth.sine), truth.a, truth.c
+    k[P.B_VISCOUS], k[P.B_HYSTERETIC] = truth.viscous, truth.hysteretic
+    k[P.VELOCITY_FORM] = float(truth.speed)
+    state = np.array([truth.amplitude, 0.0, 0.0, 0.0, 0.0])
+    h, angles = interval / fine, []
+    # Up to the first reading, then from reading to reading.
+    begun = round(truth.phase * period / h)
+    left = begun + (count - 1) * fine
+    done = 0
+    while left > 0:
+        steps = min(left, _PIECE)
+        times = np.zeros((2 * steps + 1, TIMES))
+        times[:, T.STIFF] = times[:, T.LOSS] = 1.0
+        states, _ = integrate(state, h, k, 0, times, np.zeros(steps + 1))
+        index = np.arange(done, done + steps)
+        wanted = (index >= begun) & ((index - begun) % fine == 0)
+        angles.append(states[:-1, 0][wanted])
+        state, done, left = states[-1].copy(), done + steps, left - steps
+    angles.append(state[:1])
+    values = np.concatenate(angles)[:count] + truth.offset
+    time_s = h * (begun + fine * np.arange(len(values)))
+    return time_s, values + truth.noise * rng.standard_normal(len(values))
+
+
+def cramer_rao_of_quality(truth: Truth, time_s: Array) -> float:
+    """Relative error of Q at the first amplitude that no unbiased estimate falls below."""
+    thin = time_s[:: max(len(time_s) // 50_000, 1)]
+    release = Release(0.0, truth.amplitude, truth.offset)
+    _, jacobian = sample_with_jacobian(truth.law, release, thin)
+    jacobian = jacobian * math.sqrt(len(time_s) / len(thin)) / truth.noise
+    merged = np.delete(jacobian, 2, axis=1)
+    merged[:, 1] = 0.5 * (jacobian[:, 1] + jacobian[:, 2])
+    scale = np.linalg.norm(merged, axis=0)
+    keep = scale > 0.0
+    inverse = np.linalg.pinv((merged / np.where(keep, scale, 1.0)), rcond=1e-12)
+    y = truth.amplitude
+    slope = np.zeros(merged.shape[1])
+    slope[:3] = y, 1.0, 1.0 / y
+    relative = slope / (y * truth.a + truth.b + truth.c / y) / np.where(keep, scale, 1.0)
+    return float(np.linalg.norm(relative @ inverse))
+
+
+@dataclass
+class Found:
+    """What the library says of one recording."""
+
+    truth: Truth
+    bound: float
+    readings: int
+    seconds: float = 0.0
+    refused: str = ""
+    light: str = ""
+    reason: str = ""
+    pulls: dict[str, float] = field(default_factory=dict)
+    covered: dict[str, bool] = field(default_factory=dict)
+    """Of values at a bound: whether the interval covers the truth."""
+    noise: float = math.nan
+    p_value: float | None = None
+    restoring: str = ""
+    drag_form: str = ""
+    verdict: str = ""
+    names: tuple[str, ...] = ()
+    diagnosed_noise: float = math.nan
+    same_test: bool = True
+
+    @property
+    def decidable(self) -> bool:
+        return self.bound < UNDECIDABLE
+
+    @property
+    def noise_is_right(self) -> bool:
+        return _right_noise(self.noise, self)
+
+
+def _right_noise(noise: float, found: Found) -> bool:
+    allowed = max(0.05, 3.0 / math.sqrt(2.0 * found.readings))
+    return abs(noise / found.truth.noise - 1.0) <= allowed
+
+
+def judge(truth: Truth, seed: int, *, diagnose: bool) -> Found:
+    """Fit (and diagnose) one recording, and compare with the truth."""
+    time_s, values = recorded(truth, seed)
+    found = Found(truth, cramer_rao_of_quality(truth, time_s), len(values))
+    named: dict[str, Any] = {"angle_rad" if truth.sine else "displacement_m": values}
+    recording = pp.Recording(time_s=time_s, **named)
+    begun = time.process_time()
+    try:
+        result = pp.fit(recording)
+    except InputError as refusal:
+        found.refused = refusal.problem
+        return found
+    finally:
+        found.seconds = time.process_time() - begun
+    found.light, found.reason = result.light, result.light_reason
+    found.restoring = result.restoring
+    found.drag_form = str(getattr(result, "drag_form", "energy"))
+    found.noise = result.noise_rms_rad
+    found.p_value = getattr(result, "fit_p_value", None)
+    _compare(found, result)
+    if diagnose:
+        answer = pp.diagnose(recording).to_dict()
+        effects = [each for each in answer.get("effects", ()) if not each.get("presumed")]
+        found.verdict = answer["verdict"]
+        found.names = tuple(each["id"] for each in effects)
+        found.diagnosed_noise = answer.get("noise_rms_rad") or math.nan
+        p = answer.get("baseline", {}).get("fit_p_value")
+        found.same_test = found.p_value is None or p == found.p_value
+    return found
+
+
+def _compare(found: Found, result: Any) -> None:
+    truth, y = found.truth, found.truth.amplitude
+    frequency = result["frequency"]
+    relative = (frequency.value - truth.omega / (2.0 * math.pi)) / frequency.sd
+    found.pulls["T0"] = -relative
+    matrix = result.covariance_of("a", "b", "c")
+    slope = np.array([y, 1.0, 1.0 / y])
+    fitted = float(slope @ [result.value(name) for name in "abc"])
+    true = float(slope @ [truth.a, truth.b, truth.c])
+    bounded = any(result[name].at_bound for name in "abc")
+    sd = math.sqrt(max(float(slope @ matrix @ slope), 0.0))
+    if not bounded:
+        found.pulls["Q"] = -(fitted - true) / sd if sd > 0.0 else math.inf
+    for name in "abc":
+        estimate = result[name]
+        if bounded:
+            low, high = estimate.bounds95
+            slack = 1e-6 * abs(truth.value(name))
+            found.covered[name] = low - slack <= truth.value(name) <= high + slack
+        elif estimate.sd > 0.0:
+            found.pulls[name] = (estimate.value - truth.value(name)) / estimate.sd
+
+
+REGIONS: Final = {
+    "Q below 30": lambda f: f.truth.quality < 30,
+    "Q 30 to 300": lambda f: 30 <= f.truth.quality < 300,
+    "Q from 300": lambda f: f.truth.quality >= 300,
+    "below 0.1 rad": lambda f: f.truth.sine and f.truth.amplitude < 0.1,
+    "0.1 to 0.5 rad": lambda f: f.truth.sine and 0.1 <= f.truth.amplitude < 0.5,
+    "0.5 to 1 rad": lambda f: f.truth.sine and 0.5 <= f.truth.amplitude < 1.0,
+    "from 1 rad": lambda f: f.truth.sine and f.truth.amplitude >= 1.0,
+    "springs": lambda f: not f.truth.sine,
+    "noise below 3e-5": lambda f: f.truth.noise < 3e-5 * f.truth.amplitude,
+    "noise from 1e-3": lambda f: f.truth.noise >= 1e-3 * f.truth.amplitude,
+    "below 24 a cycle": lambda f: f.truth.per_cycle < 24,
+    "below 20 cycles": lambda f: f.truth.cycles < 20,
+    "from 200 cycles": lambda f: f.truth.cycles >= 200,
+    "drag v|v|": lambda f: f.truth.speed,
+    "hysteretic alone": lambda f: f.truth.kind == "b hysteretic",
+    "viscous alone": lambda f: f.truth.kind == "b viscous",
+    "friction alone": lambda f: f.truth.kind == "c",
+    "all losses": lambda f: f.truth.kind == "all",
+}
+
+
+def row(name: str, found: list[Found]) -> str:
+    """A line of the table: rates over some recordings."""
+    fitted = [each for each in found if not each.refused]
+    pulls = [abs(pull) for each in fitted for pull in each.pulls.values()]
+    covered = [is_so for each in fitted for is_so in each.covered.values()]
+    cells = (
+        name,
+        len(found),
+        sum(bool(each.refused) for each in found),
+        sum(each.light == "red" for each in fitted),
+        sum(each.light == "green" for each in fitted),
+        sum(pull > 3.0 for pull in pulls),
+        sum(pull > 4.0 for pull in pulls),
+        len(pulls),
+        *(f"{_rms(fitted, quantity):.2f}" for quantity in QUANTITIES),
+        f"{sum(covered)}/{len(covered)}",
+        sum(not each.noise_is_right for each in fitted),
+        sum(bool(each.names) for each in fitted),
+    )
+    return "| " + " | ".join(str(cell) for cell in cells) + " |"
+
+
+HEAD: Final = (
+    "| recordings | n | refused | red | green | pull > 3 | > 4 | of | rms T0 | Q | a | b | c |"
+    " at a bound: covered | noise wrong | false names |\n" + "|---" * 16 + "|"
+)
+
+
+def _rms(found: list[Found], quantity: str) -> float:
+    pulls = [each.pulls[quantity] for each in found if quantity in each.pulls]
+    return math.sqrt(sum(pull**2 for pull in pulls) / len(pulls)) if pulls else math.nan
+
+
+def line(found: Found) -> str:
+    """What one recording was and what came of it."""
+    truth = found.truth
+    law = f"{'sin x' if truth.sine else 'x'}{', v|v|' if truth.speed else ''}, {truth.kind}"
+    about = (
+        f"{truth.number:4d} {law:24s} Q {truth.quality:6.3g} {truth.amplitude:6.3g} rad"
+        f" noise {truth.noise / truth.amplitude:7.1e} {truth.per_cycle:5.3g} a cycle,"
+        f" {truth.cycles:5.3g} cycles: {found.seconds:5.2f} s"
+    )
+    if found.refused:
+        return f"{about}  refused: {found.refused} (bound {found.bound:.2g})"
+    pulls = " ".join(f"{name} {pull:+.1f}" for name, pull in found.pulls.items())
+    outside = [name for name, is_so in found.covered.items() if not is_so]
+    more = [
+        f"p {found.p_value:.2g}" if found.p_value is not None else "",
+        f"OUTSIDE {','.join(outside)}" if outside else "",
+        f"noise x {found.noise / truth.noise:.3g}" if not found.noise_is_right else "",
+        f"torque {found.restoring}" if (found.restoring == "sine") != truth.sine else "",
+        f"drag {found.drag_form}" if truth.a > 0.0 else "",
+        f"names {','.join(found.names)}" if found.names else "",
+        "" if found.decidable else f"(bound {found.bound:.2g})",
+        found.reason if found.light != "green" else "",
+    ]
+    return f"{about}  {found.light:5s} {pulls} {' '.join(each for each in more if each)}"
+
+
+def checks(found: list[Found]) -> list[tuple[str, bool]]:
+    """What is asked of the recordings that can be decided, and whether it holds."""
+    n = len(found)
+    fitted = [each for each in found if not each.refused]
+    lost = sum(bool(each.refused) or each.light == "red" for each in found)
+    green = sum(each.light == "green" for each in fitted)
+    pulls = [abs(pull) for each in fitted for pull in each.pulls.values()]
+    covered = [is_so for each in fitted for is_so in each.covered.values()]
+    far, farther = sum(pull > 3.0 for pull in pulls), sum(pull > 4.0 for pull in pulls)
+    rms = {quantity: _rms(fitted, quantity) for quantity in QUANTITIES}
+    wrong = sum(not each.noise_is_right for each in fitted)
+    diagnosed = [each for each in fitted if each.verdict]
+    noises = sum(not _right_noise(each.diagnosed_noise, each) for each in diagnosed)
+    names = sum(bool(each.names) for each in diagnosed)
+    apart = sum(not each.same_test for each in diagnosed)
+    # With fewer recordings chance alone may make one.
+    return [
+        (f"refused or red: {lost} of {n} (at most 1 %)", lost <= max(1, 0.01 * n)),
+        (f"green: {green} of {n} (at least 85 %)", green >= 0.85 * n),
+        (f"|pull| > 3: {far} of {len(pulls)} (at most 1 %)", far <= max(1, 0.01 * len(pulls))),
+        (f"|pull| > 4: {farther} (at most one)", farther <= 1),
+        *(
+            (f"rms pull of {name}: {rms[name]:.2f} (0.85 to 1.15)", 0.85 <= rms[name] <= 1.15)
+            for name in ("T0", "Q")
+        ),
+        *(
+            (f"rms pull of {name}: {rms[name]:.2f} (at most 1.15)", not rms[name] > 1.15)
+            for name in "abc"
+        ),
+        (
+            f"at a bound: {sum(covered)} of {len(covered)} covered by 95 % intervals",
+            sum(covered) >= 0.93 * len(covered) - 1,
+        ),
+        (f"noise wrong: {wrong}; in a diagnosis {noises} of {len(diagnosed)}", wrong + noises == 0),
+        (f"false names: {names} of {len(diagnosed)} diagnosed", True),
+        (f"tests of fit that differ: {apart} of {len(diagnosed)}", apart == 0),
+    ]
+
+
+def main() -> int:
+    """Judge recording after recording; print the rates."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--number", type=int, default=200, help="recordings")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--fits", action="store_true", help="no diagnoses")
+    parser.add_argument("--diagnoses", type=int, metavar="N", help="of the first N alone")
+    parser.add_argument("--only", type=int, metavar="K", help="recording K alone")
+    parser.add_argument("--minutes", type=float, default=20.0, help="none is begun after these")
+    arguments = parser.parse_args([each for each in sys.argv[1:] if each != "consistency"])
+    begun, found = time.monotonic(), list[Found]()
+    numbers = range(arguments.number) if arguments.only is None else [arguments.only]
+    for number in numbers:
+        if time.monotonic() - begun > 60.0 * arguments.minutes:
+            print(f"stopped after {arguments.minutes:g} minutes")
+            break
+        most = arguments.number if arguments.diagnoses is None else arguments.diagnoses
+        diagnose = not arguments.fits and number < most
+        found.append(judge(draw(number, arguments.seed), arguments.seed, diagnose=diagnose))
+        print(line(found[-1]), flush=True)
+    return report(found)
+
+
+def report(found: list[Found]) -> int:
+    """Print the rates; return 1 where one misses what is asked."""
+    decidable = [each for each in found if each.decidable]
+    apart = [each for each in found if not each.decidable]
+    print(f"\n{len(apart)} whose Q is open by more than {UNDECIDABLE:.0%} stand apart\n\n{HEAD}")
+    print(row("all", decidable))
+    for name, inside in REGIONS.items():
+        some = [each for each in decidable if inside(each)]
+        if some:
+            print(row(name, some))
+    if apart:
+        print(row("apart", apart))
+    print()
+    asked = checks(decidable)
+    for what, holds in asked:
+        print(f"{'yes' if holds else 'NO '} {what}")
+    return 0 if all(holds for _, holds in asked) else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
