@@ -38,6 +38,7 @@ rule all:
     input:
         f"{RESULTS}/campaign.json",
         f"{RESULTS}/report.html",
+        rules.records.output,
         figure_files(),
         # Whatever else is missing: Snakemake makes a lost file again only where a job that is
         # to run declares it.

@@ -17,6 +17,7 @@ def main() -> None:
         "workflow",
         "acquisition_speed",
         "diagnosis_cost",
+        "many_fits",
     )
     there = [name for name in known if (here / f"{name}.py").exists()]
     for name in sys.argv[1:] or there:

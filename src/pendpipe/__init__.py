@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         simulate,
         turning_points,
     )
+    from pendpipe.batch import fit_many
     from pendpipe.dynamics import Eq8
     from pendpipe.errors import InputError
     from pendpipe.estimate import Estimate
@@ -44,6 +45,7 @@ __all__ = [
     "effects",
     "find_free_decay",
     "fit",
+    "fit_many",
     "inspect",
     "physics",
     "read",
@@ -56,6 +58,7 @@ _HOMES = {
     "Estimate": "estimate",
     "InputError": "errors",
     "Recording": "recording",
+    "fit_many": "batch",
 }
 """Modules of the public names that are not in `api`."""
 

@@ -41,6 +41,7 @@ COMMANDS: Final = {
 STAGES: Final = {
     "separate": "the hysteretic and the viscous part of a campaign's losses",
     "compare": "a campaign's losses beside Eq. 16",
+    "records": "one table of a campaign's records, as Parquet and CSV",
     "diagnose-campaign": "what all records of a campaign together say is missing",
 }
 """Stages of a campaign that are commands themselves."""

@@ -131,6 +131,27 @@ def test_a_refused_record_is_told_of_and_stops_nobody(campaign: Campaign) -> Non
     assert "broken" not in {record["record"] for record in campaign.summary()["records"]}
 
 
+def test_the_table_of_the_records_says_what_their_results_say(campaign: Campaign) -> None:
+    """A row a record, in both forms alike: numbers of the fit, verdict, or the refusal."""
+    from pyarrow import csv, parquet
+
+    rows = parquet.read_table(campaign.results / "records.parquet").to_pylist()
+    spread = csv.read_csv(campaign.results / "records.csv").to_pylist()
+    assert [{name: cell or None for name, cell in row.items()} for row in spread] == rows
+    table = campaign.records.read_text(encoding="utf-8").splitlines()[1:]
+    assert [row["record"] for row in rows] == [line.partition("\t")[0] for line in table]
+    for row in rows:
+        folder = campaign.results / row["record"]
+        fit = json.loads((folder / "fit.json").read_text())
+        verdict = json.loads((folder / "diagnosis/diagnosis.json").read_text())["verdict"]
+        assert row["verdict"] == verdict
+        assert row["refusal"] == fit.get("refused")
+        if not row["refusal"]:
+            assert row["b"] == fit["parameters"]["b"]["value"]
+            assert row["T0_s"] == pytest.approx(1.0 / fit["parameters"]["frequency"]["value"])
+            assert row["Q_sd"] > 0.0
+
+
 def test_simulated_records_are_consistent_and_a_refused_one_is_not_analysable(
     campaign: Campaign,
 ) -> None:
