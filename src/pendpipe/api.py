@@ -263,8 +263,8 @@ def fit(
       a                         0.0069(49) rad⁻¹ s⁻¹
       b                         0.01066(53) s⁻¹
       c                         4.21(14) × 10⁻⁴ rad/s
-      Q at 73.5 mrad            162.40(20), 63 % viscous and hysteretic loss (b)
-      Q at 47.7 mrad            138.43(12), 54 % viscous and hysteretic loss (b)
+      Q at 73.5 mrad            162.40(20), 63 % viscous and internal loss (b)
+      Q at 47.7 mrad            138.43(12), 54 % viscous and internal loss (b)
       Q at 32.4 mrad            114.97(26), 54 % dry friction (c)
       Q limit πf/b              257(13)
       Quote these numbers with their errors.

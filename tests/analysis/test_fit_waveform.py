@@ -181,6 +181,8 @@ def test_fit_json_is_read_as_it_was_written() -> None:
         "method",
         "baseline",
         "parameters",
+        "period",
+        "quality_factors",
         "quality_factor_limit",
         "quality_factor_hysteretic",
         "quality_factor_viscous",

@@ -15,7 +15,8 @@ from scipy.interpolate import make_interp_spline
 
 from pendpipe import physics
 from pendpipe.analysis.fit.by_points import fit_envelope
-from pendpipe.analysis.fit.result import FitResult, read_fit, relative_loss_sd, seen_qualities
+from pendpipe.analysis.fit.quality import relative_loss_sd, seen_qualities
+from pendpipe.analysis.fit.result import FitResult, read_fit
 from pendpipe.analysis.turning_points import TurningPoints, read_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Release, turning_points
@@ -420,7 +421,10 @@ def draw_fit(decay: Decay, recording: Recording) -> Figure:
 def _quality_by_amplitude(decay: Decay, factor: float) -> Iterator[Mark]:
     amplitude, quality = decay.along(np.linspace(0.0, float(decay.elapsed_s[-1]), 400))
     yield curve(factor * amplitude, quality, label="fitted law")
-    seen = [(factor * y, quality.value, quality.sd) for y, quality in seen_qualities(decay.fit)]
+    seen = [
+        (factor * each.amplitude_rad, each.quality_factor.value, each.quality_factor.sd)
+        for each in seen_qualities(decay.fit)
+    ]
     yield _measured_quality(*np.array(seen).reshape(-1, 3).T)
     limit = decay.fit.quality_factor_limit
     if limit is not None and 3.0 * limit.sd < limit.value < 2.0 * float(np.nanmax(quality)):

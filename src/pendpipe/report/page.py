@@ -13,15 +13,8 @@ from typing import Any, Final
 
 from markupsafe import Markup
 
-from pendpipe.analysis.fit.result import (
-    WITHOUT_LAW,
-    FitResult,
-    qualities,
-    quotable,
-    rate_with_error,
-    seen_qualities,
-    small_period,
-)
+from pendpipe.analysis.fit.quality import qualities, small_period
+from pendpipe.analysis.fit.result import FitResult, cause, quotable, rate_with_error
 from pendpipe.figures.data import error, number, used
 from pendpipe.files import read_json, without_folders
 from pendpipe.quantities import compact, with_error
@@ -353,11 +346,6 @@ def render_recording(
             for letter, title in titles.items()
         ),
     ]
-    rows = (
-        [(each.amplitude_rad, each.quality_factor, each.cause) for each in qualities(result)]
-        if has_law
-        else [(amplitude, seen, WITHOUT_LAW) for amplitude, seen in seen_qualities(result)]
-    )
     drawn, title = io.StringIO(), "The decay with its fit"
     result.plot().savefig(drawn, format="svg", metadata={"Date": None, "Creator": "pendpipe"})
     return fill_template(
@@ -369,8 +357,12 @@ def render_recording(
         reason=result.light_reason,
         numbers=numbers,
         qualities=[
-            (compact(amplitude, unit), with_error(quality.value, quality.sd), cause)
-            for amplitude, quality, cause in rows
+            (
+                compact(each.amplitude_rad, unit),
+                with_error(each.quality_factor.value, each.quality_factor.sd),
+                cause(each),
+            )
+            for each in qualities(result)
         ],
         advice=quotable(result),
         checks=[check.sentence(unit) for check in result.decrement_check],

@@ -6,12 +6,21 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from pendpipe.analysis.fit.decrement import Decrement, Light, check_decrement, light_of, loss_of
+from pendpipe.analysis.fit.decrement import Decrement, Light, check_decrement, light_of
 from pendpipe.analysis.fit.least_squares import CHI2_95
+from pendpipe.analysis.fit.quality import (
+    LOSSES,
+    Quality,
+    qualities,
+    quality_at,
+    released_quality,
+    seen_qualities,
+    small_period,
+)
 from pendpipe.analysis.turning_points import BEAT, TurningPoints, write_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
@@ -123,8 +132,44 @@ class FitResult:
     decay: Recording | None = field(default=None, repr=False, compare=False)
 
     def __getitem__(self, name: str) -> Estimate:
-        """Return one parameter: ``fit["b"].value``, ``fit["b"].sd``."""
-        return self.parameters[name]
+        """Return one number: a parameter, ``"Q"`` at the amplitude released, or ``"period"``.
+
+        Examples
+        --------
+        >>> import pendpipe as pp
+        >>> fit = pp.fit("examples/rod-pendulum.csv")
+        >>> print(fit["period"], fit["Q"], sep="; ")
+        (1.1454713 ± 0.0000025) s; 170.06 ± 0.56
+        """
+        if name == "Q":
+            return released_quality(self)
+        return self.period if name == "period" else self.parameters[name]
+
+    @property
+    def period(self) -> Estimate:
+        """Period of small swings, s."""
+        return small_period(self)
+
+    @property
+    def quality_factors(self) -> tuple[Quality, ...]:
+        """Q and the shares of the losses at a large, a middle and a small amplitude."""
+        return qualities(self)
+
+    def quality_factor(self, amplitude_rad: float) -> Estimate:
+        """Return Q at an amplitude, ``pi/(T loss)`` with the period and the loss there.
+
+        Parameters
+        ----------
+        amplitude_rad
+            In rad, or in the unit of the recording.
+
+        Raises
+        ------
+        InputError
+            If it is no amplitude; or, where no law describes the decay, none at which its
+            turning points show Q.
+        """
+        return quality_at(self, amplitude_rad)
 
     def __str__(self) -> str:
         """Return the light, what can be quoted, and how to quote it."""
@@ -174,15 +219,31 @@ class FitResult:
         return draw_fit(Decay("", self.points, self), self.decay)
 
     def to_frame(self) -> DataFrame:
-        """Return a table with a row a parameter: value, sd, low95, high95, unit."""
+        """Return a table with a row a number: value, sd, low95, high95, unit.
+
+        The parameters, the period of small swings, Q at the amplitude released (``Q``), at the
+        three amplitudes (``Q(0.51 rad)``) and its limit (``Q limit``), and the shares of the
+        losses (``share of a at 0.51 rad``).
+        """
         from pandas import DataFrame
 
         rows = [
             (name, entry.value, entry.sd, *entry.bounds95, entry.unit)
-            for name, entry in self.parameters.items()
+            for name, entry in self.numbers().items()
         ]
         columns = ["parameter", "value", "sd", "low95", "high95", "unit"]
         return DataFrame(rows, columns=columns).set_index("parameter")
+
+    def numbers(self) -> dict[str, Estimate]:
+        """Return every number of the fit by its name; see `to_frame`."""
+        found = {**self.parameters, "period": self.period}
+        unit, limit = self.parameters["amplitude"].unit, self.quality_factor_limit
+        shares: dict[str, Estimate] = {}
+        for each in self.quality_factors:
+            where = compact(each.amplitude_rad, unit)
+            found[f"Q({where})"] = each.quality_factor
+            shares |= {f"share of {name} at {where}": of for name, of in each.losses.items()}
+        return found | {"Q": self["Q"]} | ({} if limit is None else {"Q limit": limit}) | shares
 
     def save(self, folder: str | Path) -> Path:
         """Write ``fit.json`` and, with the readings, ``turning_points.csv`` and ``fit.svg``.
@@ -221,6 +282,8 @@ class FitResult:
             "light_reason": self.light_reason,
             "decrement_check": [check._asdict() for check in self.decrement_check],
             "parameters": {name: self.parameters[name].as_json() for name in PARAMETERS},
+            "period": self.period.as_json(),
+            "quality_factors": [each.as_json() for each in self.quality_factors],
             "quality_factor_limit": limit.as_json(),
             **{name: getattr(self, name) and getattr(self, name).as_json() for name in PARTS},
             "covariance": {
@@ -394,110 +457,18 @@ def read_fit(path: str | Path) -> FitResult:
         raise InputError(path, f"this is no fit ({fault})", "run pendpipe fit") from None
 
 
-LOSSES: Final = {
-    "quadratic": "drag that grows with the square of the speed (a)",
-    "linear": "viscous and hysteretic loss (b)",
-    "coulomb": "dry friction (c)",
-}
-
-
 WITHOUT_LAW: Final = "from the turning points alone"
-_TOLD: Final = 0.15
-"""Standard deviation of a loss's share up to which it is printed: a third is told from two."""
 _TOP: Final = 3.13
 """Amplitude in rad beyond which no correction is made for sin x."""
 
 
-class Quality(NamedTuple):
-    """The quality factor at one amplitude, with what loses most there."""
-
-    amplitude_rad: float
-    quality_factor: Estimate
-    """pi/(T loss): T the period and loss the relative loss of amplitude at this amplitude."""
-    period_s: float
-    dominant: str
-    """A key of `LOSSES`."""
-    share: Estimate
-    """The dominant loss over all losses."""
-
-    @property
-    def cause(self) -> str:
-        """The dominant loss and its share, in words, as far as the fit tells them."""
-        if not self.share.sd < _TOLD:
-            return "by losses that this fit does not tell apart"
-        return f"{100.0 * self.share.value:.0f} % {LOSSES[self.dominant]}"
-
-
-def qualities(result: FitResult) -> list[Quality]:
-    """Evaluate the fitted law at a large, a middle and a small amplitude of the decay."""
-    first = result.parameters["amplitude"].value
-    seen = [check.amplitude_rad for check in result.decrement_check] or [first]
-    return [_quality(result, amplitude) for amplitude in dict.fromkeys(seen)]
-
-
-def seen_qualities(result: FitResult) -> list[tuple[float, Estimate]]:
-    """Amplitudes and the quality factors there that the turning points show without a law."""
-    found = [
-        (check, math.pi / (period_of(result, check.amplitude_rad) * check.seen))
-        for check in result.decrement_check
-        if check.seen > 0.0
-    ]
-    return [
-        (check.amplitude_rad, Estimate(q, q * check.seen_sd / check.seen, "")) for check, q in found
-    ]
-
-
-def _quality(result: FitResult, amplitude: float) -> Quality:
-    law = result.law
-    parts = {
-        "quadratic": replace(law, hysteretic=0.0, viscous=0.0, coulomb=0.0),
-        "linear": replace(law, quadratic=0.0, coulomb=0.0),
-        "coulomb": replace(law, quadratic=0.0, hysteretic=0.0, viscous=0.0),
-    }
-    losses = {name: loss_of(part, amplitude) for name, part in parts.items()}
-    loss = loss_of(law, amplitude)
-    dominant = max(losses, key=lambda name: losses[name])
-    period = period_of(result, amplitude)
-    value = math.pi / (period * loss) if loss > 0.0 else math.inf
-    covariance = _covariance_of_losses(result, amplitude)
-    error = Estimate(value, value * relative_loss_sd(result, amplitude), "")
-    index = list(losses).index(dominant)
-    share = losses[dominant] / sum(losses.values())
-    of_it = Estimate(share, _sd(np.eye(3)[index] - share, covariance), "")
-    return Quality(amplitude, error, period, dominant, of_it)
-
-
-def relative_loss_sd(result: FitResult, amplitude: float) -> float:
-    """Relative standard deviation of the law's loss, and so of Q, at one amplitude."""
-    return _sd(np.ones(3), _covariance_of_losses(result, amplitude))
-
-
-def _sd(weights: FloatArray, covariance: FloatArray) -> float:
-    return math.sqrt(max(float(weights @ covariance @ weights), 0.0))
-
-
-def _covariance_of_losses(result: FitResult, amplitude: float) -> FloatArray:
-    """Return the covariance of a y, b and c/y, over their sum squared, shape (3, 3)."""
-    slope = np.array([amplitude, 1.0, 1.0 / amplitude])
-    loss = float(slope @ [result.value(name) for name in "abc"])
-    relative = slope / loss if loss > 0.0 else np.full(3, math.inf)
-    return relative[:, None] * result.covariance_of("a", "b", "c") * relative
-
-
-def period_of(result: FitResult, amplitude: float) -> float:
-    """Period at one amplitude, s; that of small amplitudes where the law cannot swing there."""
-    lossless = Eq8(2.0 * math.pi * result.value("frequency"), restoring=result.restoring)
-    try:
-        cycle = turning_points(lossless, Release(0.0, amplitude), count=3)
-    except ValueError:
-        return 1.0 / result.value("frequency")
-    return float(cycle.time_s[2])
-
-
-def small_period(result: FitResult) -> Estimate:
-    """Period 1/f of Eq. 8's frequency, s: with the torque of sin x that of small amplitudes."""
-    frequency = result.parameters["frequency"]
-    return Estimate(1.0 / frequency.value, frequency.sd / frequency.value**2, "s")
+def cause(quality: Quality) -> str:
+    """Say which loss takes most at an amplitude, and how much, as far as it is told."""
+    if not quality.losses:
+        return WITHOUT_LAW
+    if (name := quality.dominant) is None:
+        return "by losses that this fit does not tell apart"
+    return f"{100.0 * quality.losses[name].value:.0f} % {LOSSES[name]} ({name})"
 
 
 def gravity_line(
@@ -549,9 +520,9 @@ def lines(result: FitResult, *, law: bool | None = None) -> list[str]:
     """
     unit = result.parameters["amplitude"].unit
 
-    def quality(amplitude: float, found: Estimate, cause: str) -> str:
-        q = with_error(found.value, found.sd, short=True)
-        return _line(f"Q at {compact(amplitude, unit)}", f"{q}, {cause}")
+    def quality(found: Quality) -> str:
+        q = with_error(found.quality_factor.value, found.quality_factor.sd, short=True)
+        return _line(f"Q at {compact(found.amplitude_rad, unit)}", f"{q}, {cause(found)}")
 
     by_points = result.method == "turning-points"
     count = result.turning_points if by_points else result.samples
@@ -565,7 +536,7 @@ def lines(result: FitResult, *, law: bool | None = None) -> list[str]:
     ]
     if not (result.light != "red" if law is None else law):
         checks = (f"  {check.sentence(unit)}" for check in result.decrement_check)
-        seen = (quality(*each, WITHOUT_LAW) for each in seen_qualities(result))
+        seen = (quality(each) for each in seen_qualities(result))
         return [*head, *checks, *seen, "  " + quotable(result)]
     period, limit = small_period(result), result.quality_factor_limit
     name = "period, small amplitude" if result.restoring == "sine" else "period"
@@ -574,10 +545,7 @@ def lines(result: FitResult, *, law: bool | None = None) -> list[str]:
         *head,
         _line(name, with_error(period.value, period.sd, "s", short=True)),
         *(_line(letter, rate_with_error(result[letter])) for letter in "abc"),
-        *(
-            quality(each.amplitude_rad, each.quality_factor, each.cause)
-            for each in qualities(result)
-        ),
+        *(quality(each) for each in qualities(result)),
         *(_line("Q limit πf/b", with_error(each.value, each.sd, short=True)) for each in told),
         "  " + quotable(result),
     ]
@@ -598,7 +566,7 @@ def rate_with_error(rate: Estimate, *, short: bool = True) -> str:
 def quotable(result: FitResult) -> str:
     """Advise which of the numbers to quote."""
     if result.light == "green":
-        if all(each.share.sd < _TOLD for each in qualities(result)):
+        if all(each.dominant for each in qualities(result)):
             return "Quote these numbers with their errors."
         return (
             "Quote the period and Q with their errors: this decay does not tell a, b and c apart."

@@ -1,0 +1,212 @@
+"""Period, quality factor and shares of the losses at an amplitude.
+
+What a fitted law says of them, and what the turning points show without one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from pendpipe.analysis.fit.decrement import loss_of
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Eq8, Release, turning_points
+from pendpipe.errors import InputError, refuse_if
+from pendpipe.estimate import Estimate
+from pendpipe.quantities import after_number
+
+if TYPE_CHECKING:
+    from pendpipe.analysis.fit.result import FitResult
+
+LOSSES: Final = {
+    "a": "drag that grows with the square of the speed",
+    "b": "viscous and internal loss",
+    "c": "dry friction",
+}
+"""The three losses of Eq. 13 in words."""
+TOLD_APART: Final = 0.15
+"""Standard deviation of a loss's share up to which it is told from the others."""
+
+
+@dataclass(frozen=True)
+class Quality:
+    """The quality factor at one amplitude, with the shares of the three losses.
+
+    Parameters
+    ----------
+    amplitude_rad
+        Amplitude y, in the unit of the recording.
+    quality_factor
+        ``pi/(T loss)``: T the period and loss the relative loss of amplitude at y.
+    period_s
+        The period at y.
+    losses
+        Share of a y, b and c/y in the loss, by ``"a"``, ``"b"``, ``"c"``; empty where the
+        turning points show Q without a law.
+    """
+
+    amplitude_rad: float
+    quality_factor: Estimate
+    period_s: float
+    losses: Mapping[str, Estimate]
+
+    @property
+    def dominant(self) -> str | None:
+        """The loss that takes most, ``"a"``, ``"b"`` or ``"c"``; None where it is not told."""
+        if not self.losses or not all(each.sd < TOLD_APART for each in self.losses.values()):
+            return None
+        return max(self.losses, key=lambda name: self.losses[name].value)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return an entry of ``quality_factors`` in ``fit.json``."""
+        return {
+            "amplitude_rad": self.amplitude_rad,
+            "value": self.quality_factor.value,
+            "sd": self.quality_factor.sd,
+            "interval95": list(self.quality_factor.bounds95),
+            "period_s": self.period_s,
+            "losses": {name: each.value for name, each in self.losses.items()} or None,
+            "losses_sd": {name: each.sd for name, each in self.losses.items()} or None,
+        }
+
+
+def qualities(result: FitResult) -> tuple[Quality, ...]:
+    """Return Q at a large, a middle and a small amplitude of the decay.
+
+    The fitted law's, or what the turning points show where the light is red.
+    """
+    if result.light == "red":
+        return seen_qualities(result)
+    first = result.parameters["amplitude"].value
+    seen = [check.amplitude_rad for check in result.decrement_check] or [first]
+    return tuple(quality_by_law(result, amplitude) for amplitude in dict.fromkeys(seen))
+
+
+def seen_qualities(result: FitResult) -> tuple[Quality, ...]:
+    """Return the amplitudes and quality factors that the turning points show without a law."""
+    found = [
+        (check, period_of(result, check.amplitude_rad))
+        for check in result.decrement_check
+        if check.seen > 0.0
+    ]
+    return tuple(
+        Quality(
+            check.amplitude_rad,
+            Estimate(
+                math.pi / (period * check.seen),
+                math.pi / (period * check.seen) * check.seen_sd / check.seen,
+                "",
+            ),
+            period,
+            {},
+        )
+        for check, period in found
+    )
+
+
+def quality_at(result: FitResult, amplitude: float) -> Estimate:
+    """Return Q at any amplitude: of the law, or with a red light between the turning points' three.
+
+    Raises
+    ------
+    InputError
+        If the amplitude is none, or lies outside of what a red fit's turning points show.
+    """
+    unit = result.parameters["amplitude"].unit
+    refuse_if(
+        not (math.isfinite(amplitude) and amplitude > 0.0),
+        "amplitude_rad",
+        f"{amplitude!r} is no amplitude",
+        f"give a positive number of {unit}",
+    )
+    if result.light != "red":
+        return quality_by_law(result, amplitude).quality_factor
+    seen = sorted(seen_qualities(result), key=lambda each: each.amplitude_rad)
+    ends = [seen[0].amplitude_rad, seen[-1].amplitude_rad] if seen else []
+    if not seen or not 0.9 * ends[0] <= amplitude <= 1.2 * ends[1]:
+        where = f"from {ends[0]:.3g} to {ends[1]:.3g}{after_number(unit)}" if seen else "nowhere"
+        raise InputError(
+            "amplitude_rad",
+            f"no law describes this decay, and its turning points show Q {where}",
+            "ask within, or fit a part of the recording",
+        )
+    place = math.log(amplitude)
+    x = [math.log(each.amplitude_rad) for each in seen]
+    value, sd = (
+        float(np.interp(place, x, [getattr(each.quality_factor, name) for each in seen]))
+        for name in ("value", "sd")
+    )
+    return Estimate(value, sd, "")
+
+
+def released_quality(result: FitResult) -> Estimate:
+    """Return Q at the first turning point kept; with a red light at the largest where it is seen.
+
+    NaN where the turning points of a decay without a law do not show it.
+    """
+    if result.light != "red":
+        return quality_by_law(result, result.value("amplitude")).quality_factor
+    seen = seen_qualities(result)
+    return seen[0].quality_factor if seen else Estimate(math.nan, math.nan, "")
+
+
+def quality_by_law(result: FitResult, amplitude: float) -> Quality:
+    """Evaluate the fitted law at one amplitude."""
+    law = result.law
+    parts = {
+        "a": replace(law, hysteretic=0.0, viscous=0.0, coulomb=0.0),
+        "b": replace(law, quadratic=0.0, coulomb=0.0),
+        "c": replace(law, quadratic=0.0, hysteretic=0.0, viscous=0.0),
+    }
+    losses = {name: loss_of(part, amplitude) for name, part in parts.items()}
+    loss, total = loss_of(law, amplitude), sum(losses.values())
+    period = period_of(result, amplitude)
+    covariance = _covariance_of_losses(result, amplitude)
+    value = math.pi / (period * loss) if loss > 0.0 else math.inf
+    shares = {name: each / total if total > 0.0 else math.nan for name, each in losses.items()}
+    return Quality(
+        amplitude,
+        Estimate(value, value * relative_loss_sd(result, amplitude), ""),
+        period,
+        {
+            name: Estimate(share, _sd(np.eye(3)[index] - share, covariance), "")
+            for index, (name, share) in enumerate(shares.items())
+        },
+    )
+
+
+def relative_loss_sd(result: FitResult, amplitude: float) -> float:
+    """Relative standard deviation of the law's loss, and so of Q, at one amplitude."""
+    return _sd(np.ones(3), _covariance_of_losses(result, amplitude))
+
+
+def _sd(weights: FloatArray, covariance: FloatArray) -> float:
+    return math.sqrt(max(float(weights @ covariance @ weights), 0.0))
+
+
+def _covariance_of_losses(result: FitResult, amplitude: float) -> FloatArray:
+    """Return the covariance of a y, b and c/y, over their sum squared, shape (3, 3)."""
+    slope = np.array([amplitude, 1.0, 1.0 / amplitude])
+    loss = float(slope @ [result.value(name) for name in "abc"])
+    relative = slope / loss if loss > 0.0 else np.full(3, math.inf)
+    return relative[:, None] * result.covariance_of("a", "b", "c") * relative
+
+
+def period_of(result: FitResult, amplitude: float) -> float:
+    """Period at one amplitude, s; that of small amplitudes where the law cannot swing there."""
+    lossless = Eq8(2.0 * math.pi * result.value("frequency"), restoring=result.restoring)
+    try:
+        cycle = turning_points(lossless, Release(0.0, amplitude), count=3)
+    except ValueError:
+        return 1.0 / result.value("frequency")
+    return float(cycle.time_s[2])
+
+
+def small_period(result: FitResult) -> Estimate:
+    """Period 1/f of Eq. 8's frequency, s: with the torque of sin x that of small amplitudes."""
+    frequency = result.parameters["frequency"]
+    return Estimate(1.0 / frequency.value, frequency.sd / frequency.value**2, "s")
