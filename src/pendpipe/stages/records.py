@@ -9,7 +9,7 @@ import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from pendpipe.analysis.fit.result import FitResult, qualities, seen_qualities, small_period
+from pendpipe.analysis.fit.result import FitResult
 from pendpipe.arguments import Arguments, load, shared
 from pendpipe.configuration.load import Campaign
 from pendpipe.errors import refuse_if
@@ -85,13 +85,10 @@ def _row(campaign: Campaign, result: RecordResult) -> dict[str, Any]:
 def _of_fit(fit: FitResult) -> dict[str, Any]:
     """The numbers of a fit; of a law that contradicts the decay only what needs no law."""
     row: dict[str, Any] = {"light": fit.light, "unit": fit["amplitude"].unit}
-    numbers: dict[str, Estimate] = {"T0": small_period(fit)}
-    if fit.light == "red":
-        for row["amplitude"], numbers["Q"] in seen_qualities(fit)[:1]:
-            pass
-    else:
-        largest = qualities(fit)[0]
-        row["amplitude"], numbers["Q"] = largest.amplitude_rad, largest.quality_factor
+    numbers: dict[str, Estimate] = {"T0": fit.period}
+    for each in fit.quality_factors[:1]:
+        row["amplitude"], numbers["Q"] = each.amplitude_rad, each.quality_factor
+    if fit.light != "red":
         numbers |= {name: fit[name] for name in "abc"}
     for name, estimate in numbers.items():
         end = "_s" if name == "T0" else ""
