@@ -29,6 +29,8 @@ ROOT: Final = Path(__file__).resolve().parents[1]
 Array = NDArray[np.float64]
 RELATIVE_SD_B: Final = {"water": 1e-3, "air": 1.5e-4}
 RELATIVE_SD_F: Final = 3e-6
+GRAVITY_SD: Final = 0.01
+CLOCK_SD: Final = 1e-4
 CLASS: Final = 6.0
 COULD_SAY: Final = 25.0
 """Delta chi^2 above which the oracle is sure that something is missing."""
@@ -46,7 +48,7 @@ CAUSES: Final[dict[str, tuple[float, float]]] = {
     "hysteretic-damping": (0.3, 0.6),
     "air-drag-in-benchmark": (0.5, 1.5),
     "grease-drag": (3e-6, 3e-5),
-    "support-loss": (3e-5, 3e-4),
+    "support-loss": (2e-6, 2e-5),
     "moment-of-inertia": (2e-4, 1e-3),
 }
 """Causes with the sizes that are drawn, evenly."""
@@ -96,12 +98,17 @@ class Generator:
             "kelvin",
             "air",
             "ratio",
+            "gravity",
+            "clock",
         ]
         self.at = {name: number for number, name in enumerate([*self.nuisances, *CAUSES])}
         self.free = np.array([name == "coefficient" for name in self.nuisances])
 
-    def read(self, theta: Array) -> Array:
-        """Frequency and b, shape (n, records, 2), for theta of shape (n, unknowns)."""
+    def read(self, theta: Array, *, viscous: bool = False) -> Array:
+        """Frequency and b, shape (n, records, 2), for theta of shape (n, unknowns).
+
+        With `viscous` the Q that the sphere's drag alone would give, shape (n, records).
+        """
 
         def z(name: str) -> Array:
             return theta[:, self.at[name], None]
@@ -134,7 +141,8 @@ class Generator:
         volume = 4.0 / 3.0 * np.pi * radius**3
         stem, thick, at = z("stem-drag"), 0.0024, ball["screw_distance_m"]
         lift = rho * self.wet * (volume * lever + np.pi * thick**2 * stem * at)
-        torque = own["gravity_m_per_s2"] * (moment - lift)
+        static = moment - lift
+        torque = (own["gravity_m_per_s2"] + GRAVITY_SD * z("gravity")) * static
         close = z("wall-confinement")
         drag_near = (1.0 + np.abs(close) ** (4.0 / 3.0)) / (1.0 - close) ** 2
         mass_near = 0.5 * ((1.0 + 2.0 * close) / (1.0 - close) - 1.0)
@@ -142,8 +150,23 @@ class Generator:
         wide, gas = np.sqrt(area / np.pi), (1.825e-5, 1.204)
         air = 1.0 + 0.1 * z("air") + z("air-drag-in-benchmark")
 
+        solid = 4.0 * np.pi**2 * 0.1 / 3940.0 * np.exp(-z("coefficient"))
+        solid = solid * np.exp((0.05 * z("ratio") + z("hysteretic-damping")) * self.wet)
+        quadratic = 2.0 / 3.0 * rho * radius**2 * lever**3 * 0.068 * self.wet
+
         def impedance(s: Any) -> Any:
-            """Torque over angle at a complex rate: fluids and grease."""
+            """Torque over angle at a complex rate: fluids, solids, grease, support."""
+            omega = np.abs(s)
+            turned = (torque / omega**2 / 0.1) ** z("hysteresis-inertia-scaling")
+            real = solid * turned / omega + z("support-loss") * static**2 * omega**3
+            real = real + z("grease-drag") + z("drag-law-transition") * quadratic * omega
+            return fluids(s) + real * s
+
+        def fluids(s: Any) -> Any:
+            """Torque over angle of water and air."""
+            return ball_in_water(s) + screw(s) + gas_on_rod_and_weights(s)
+
+        def ball_in_water(s: Any) -> Any:
             slip = np.sqrt(s * rho / eta) * radius
             omega2 = np.abs(s) ** 2
             slosh = z("free-surface") * omega2 / ((2.0 * np.pi * 1.3) ** 2 - omega2)
@@ -156,37 +179,38 @@ class Generator:
             whole = whole + turning / (3.0 * (1.0 + slip)) * s - 8.0 * np.pi * eta * radius**3 * s
             extra = mass_near + z("added-mass") + 0.6 * slosh
             whole = whole + extra * rho * volume * lever**2 * s**2
+            return whole * self.wet
+
+        def screw(s: Any) -> Any:
+            """The immersed part of the screw, a cylinder."""
             thin = np.sqrt(s * rho / eta) * thick
             carried = 1.0 + 4.0 * kv(1, thin) / (thin * kv(0, thin))
-            whole = whole + np.pi * rho * thick**2 * stem * at**2 * carried * s**2
-            whole = whole * self.wet
+            return np.pi * rho * thick**2 * stem * at**2 * carried * s**2 * self.wet
+
+        def gas_on_rod_and_weights(s: Any) -> Any:
             speed = np.sqrt(s * gas[1] / gas[0])
             light = 6.0 * np.pi * gas[0] * wide * (1.0 + speed[..., None] * wide)
-            whole = whole + air * (light * there**2).sum(axis=-1) * s
+            whole = air * (light * there**2).sum(axis=-1) * s
             slim = speed * rod["radius_m"]
             across = (
                 np.pi * gas[1] * rod["radius_m"] ** 2 * 4.0 * kv(1, slim) / (slim * kv(0, slim))
             )
-            whole = whole + air * across * length**3 / 12.0 * s**2
-            return whole + z("grease-drag") * s
+            return whole + air * across * length**3 / 12.0 * s**2
 
-        rate = 1j * np.sqrt(torque / (inertia + 0.6 * rho * volume * lever**2 * self.wet))
-        for _ in range(12):  # secant steps from a point beside
-            beside = rate * (1.0 + 1e-6j)
-            here = inertia * rate**2 + torque + impedance(rate)
-            there_ = inertia * beside**2 + torque + impedance(beside)
-            rate = rate - here * (beside - rate) / (there_ - here)
-        omega = np.abs(rate)
-        whole_inertia = torque / omega**2
-        solid = 4.0 * np.pi**2 * 0.1 / 3940.0 * np.exp(-z("coefficient"))
-        solid = solid * np.exp((0.05 * z("ratio") + z("hysteretic-damping")) * self.wet)
-        solid = solid * (whole_inertia / 0.1) ** z("hysteresis-inertia-scaling")
-        frequency = omega / (2.0 * np.pi)
-        quadratic = 2.0 / 3.0 * omega * rho * radius**2 * lever**3 * 0.068 * self.wet
-        b = -rate.real + solid / (2.0 * whole_inertia * omega)
-        b = b + z("drag-law-transition") * quadratic / (2.0 * whole_inertia)
-        b = b + z("support-loss") * frequency**3
-        return np.stack([frequency, b], axis=-1)
+        def root(acting: Any) -> Any:
+            rate = 1j * np.sqrt(torque / (inertia + 0.6 * rho * volume * lever**2 * self.wet))
+            for _ in range(12):  # secant steps from a point beside
+                beside = rate * (1.0 + 1e-6j)
+                here = inertia * rate**2 + torque + acting(rate)
+                there_ = inertia * beside**2 + torque + acting(beside)
+                rate = rate - here * (beside - rate) / (there_ - here)
+            return rate
+
+        rate = root(impedance)
+        if viscous:  # Q of what the water does to the sphere, by itself
+            return np.asarray(np.abs(rate) / (-2.0 * root(ball_in_water).real))
+        read = np.stack([np.abs(rate) / (2.0 * np.pi), -rate.real], axis=-1)
+        return np.asarray(read * (1.0 + CLOCK_SD * z("clock"))[..., None])
 
     def derivatives(self, theta: Array) -> Array:
         """Change of the readings with each unknown, shape (unknowns, records, 2)."""

@@ -21,6 +21,23 @@ def test_root_is_that_of_an_independent_solver() -> None:
     assert root.imag == pytest.approx(float(exact.imag), rel=1e-13)
 
 
+@pytest.mark.parametrize("exponent", [0.0, -2.0])
+def test_solid_friction_is_inside_the_root(exponent: float) -> None:
+    mpmath.mp.dps = 30
+    torque = 0.02
+
+    def equation(real: mpmath.mpf, imaginary: mpmath.mpf) -> list[mpmath.mpf]:
+        s = mpmath.mpc(real, imaginary)
+        solid = torque * abs(s) ** (exponent - 1.0) * s
+        left = INERTIA * s**2 + (STEADY * s + solid) + HISTORY * s ** mpmath.mpf("1.5") + TORQUE
+        return [left.real, left.imag]
+
+    exact = mpmath.findroot(equation, (-0.02, mpmath.sqrt(TORQUE / INERTIA)))
+    root = physics.free_decay_root(INERTIA, STEADY, HISTORY, TORQUE, torque, exponent)
+    assert root.real == pytest.approx(float(exact[0]), rel=1e-12)
+    assert root.imag == pytest.approx(float(exact[1]), rel=1e-12)
+
+
 def test_without_memory_it_is_the_damped_oscillator() -> None:
     root = physics.free_decay_root(0.1, 0.02, 0.0, 1.0)
     assert -root.real == pytest.approx(0.1, rel=1e-14)  # D/(2 I)

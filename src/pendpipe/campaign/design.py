@@ -93,6 +93,11 @@ class Inputs:
     inertia_exponent: FloatArray
     higher: FloatArray
     """Of the sphere in the tank, in depths of the fluid."""
+    gravity: FloatArray
+    fast_clock: FloatArray
+    """Relative excess of the recorded frequencies and rates over the true ones."""
+    rate_exponent: FloatArray
+    """Of the loss torque in omega: 0 for internal friction that doesn't depend on the rate."""
 
 
 def height_sd(tank: Tank) -> float:
@@ -113,8 +118,11 @@ class Design:
     air: Fluid | None
     coefficient_s2: float = 3940.0
     """k about which the fit counts."""
-    reference_inertia: float = 0.1
-    """I_0 of Q_h = k f^2 (I/I_0)^(1 - p), kg m^2: the k of a campaign is that of this inertia."""
+
+    @property
+    def reference_inertia(self) -> float:
+        """I_0 of Q_h = k f^2 (I/I_0)^(1 - p), kg m^2: k is that of this inertia."""
+        return self.apparatus.hysteresis.reference_inertia_kg_m2
 
     @cached_property
     def weights(self) -> tuple[str, ...]:
@@ -160,6 +168,8 @@ class Design:
             Nuisance("height in the tank", "depths", height_sd(tank) if tank else 0.0),
             Nuisance("thermometer", "K", max((f.temperature_sd_k for f in fluids), default=0.0)),
             Nuisance("immersed screw", "m", sphere.screw_length_sd_m if fluids and sphere else 0.0),
+            Nuisance("gravity", "m/s^2", own.gravity_sd_m_per_s2),
+            Nuisance("clock", "", own.clock_relative_sd),
             Nuisance("air drag", "", AIR_DRAG_RELATIVE_SD if drags_in_air else 0.0),
             *(
                 Nuisance(f"loss torque in {name}", "", law.assembly_relative_sd)
@@ -247,6 +257,9 @@ class Design:
             inertia_exponent=own.hysteresis.inertia_exponent
             + deviation("exponent of the loss torque"),
             higher=deviation("height in the tank"),
+            gravity=own.gravity_m_per_s2 + deviation("gravity"),
+            fast_clock=deviation("clock"),
+            rate_exponent=np.zeros((*moved.shape[:-1], 1)),
         )
 
     def fluids(self, warmer_k: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -323,10 +336,9 @@ def design_of(campaign: Campaign, records: Sequence[Record]) -> Design:
 
 @dataclass(frozen=True)
 class Terms:
-    """The equation of motion of every record: ``I s^2 + D1 s + D2 s^(3/2) + K = 0``.
+    """The equation of motion of every record, as `physics.free_decay_root` has it.
 
-    Arrays of shape (..., records), SI units. Solid friction stands beside: it changes the rate
-    and not Eq. 8's frequency.
+    Arrays of shape (..., records), SI units.
 
     Parameters
     ----------
@@ -340,8 +352,6 @@ class Terms:
         Drag of the air on rod and weights, N m s.
     displaced
         rho V L^2 of the sphere: an added mass counts in it.
-    rate
-        What else is added to b, 1/s.
     inputs
         What they were made of.
     """
@@ -354,7 +364,6 @@ class Terms:
     screw_history: FloatArray
     air: FloatArray
     displaced: FloatArray
-    rate: FloatArray
     inputs: Inputs
 
     @property
@@ -367,7 +376,7 @@ class Terms:
 
 def terms_of(design: Design, inputs: Inputs) -> Terms:
     """Put the equation of motion of every record together."""
-    gravity = design.apparatus.gravity_m_per_s2
+    gravity = inputs.gravity
     sphere, spheres, wet = design.apparatus.sphere, design.spheres, design.wet
     places, masses = inputs.positions_m, inputs.masses_kg
     sizes = [design.apparatus.weights[name].radius_m for name in design.weights]
@@ -401,7 +410,6 @@ def terms_of(design: Design, inputs: Inputs) -> Terms:
         screw_history=4.0 * np.pi * thick * around * length * at**2,
         air=np.zeros_like(steady),
         displaced=displaced * lever**2,
-        rate=np.zeros_like(steady),
         inputs=inputs,
     )
     if design.air is None:
@@ -422,19 +430,20 @@ def terms_of(design: Design, inputs: Inputs) -> Terms:
 def solve(design: Design, terms: Terms) -> FloatArray:
     """Return frequency in Hz and b in 1/s of every record, shape (..., records, 2).
 
-    Both are those of Eq. 8: the frequency is |s|/(2 pi), and b holds the loss torque too,
-    ``b_h = (pi/(k f)) (I_0/I)^(1 - p)``.
+    Both are those of Eq. 8, by the recorder's clock: the frequency is |s|/(2 pi), and b holds the
+    loss torque too.
     """
     inputs = terms.inputs
+    exponent = inputs.inertia_exponent
     root = physics.free_decay_root(
         terms.inertia,
         terms.steady + terms.screw + inputs.air_drag * terms.air,
         terms.history + terms.screw_history,
         terms.torque,
+        physics.hysteretic_loss_torque(
+            np.exp(inputs.log_coefficient), terms.torque, design.reference_inertia, exponent
+        ),
+        inputs.rate_exponent - 2.0 * exponent,
     )
-    omega = np.abs(root)
-    frequency = omega / (2.0 * np.pi)
-    relative = terms.torque / omega**2 / design.reference_inertia
-    lighter = relative ** (inputs.inertia_exponent - 1.0)
-    hysteretic = np.pi / frequency * np.exp(-inputs.log_coefficient) * lighter
-    return np.stack(np.broadcast_arrays(frequency, hysteretic + terms.rate - root.real), axis=-1)
+    read = np.stack(np.broadcast_arrays(np.abs(root) / (2.0 * np.pi), -root.real), axis=-1)
+    return np.asarray(read * (1.0 + inputs.fast_clock[..., None]))

@@ -407,9 +407,9 @@ def added_mass(terms: Terms, size: FloatArray) -> Terms:
     Parameter("excess", "", -0.5, 1.0),
     0.02,
 )
-def buoyancy(terms: Terms, size: FloatArray, design: Design) -> Terms:
+def buoyancy(terms: Terms, size: FloatArray) -> Terms:
     """A density of the fluid, or a displaced volume, beyond its error."""
-    lift = design.apparatus.gravity_m_per_s2 * terms.displaced / terms.inputs.lever_m
+    lift = terms.inputs.gravity * terms.displaced / terms.inputs.lever_m
     return replace(terms, torque=terms.torque - size * lift)
 
 
@@ -472,14 +472,18 @@ def grease(terms: Terms, size: FloatArray) -> Terms:
     "terms",
     "support-loss",
     "a support that takes energy along",
-    r"b \mathrel{+}= \beta f^3",
-    Parameter("beta", "s^2", 0.0, 1.0),
-    1e-3,
+    r"b \mathrel{+}= C'' S^2 \omega^3/(2 I), \quad S = K/g",
+    Parameter("compliance_loss", "m/N", 0.0, 1.0),
+    1e-5,
 )
 def support(terms: Terms, size: FloatArray) -> Terms:
-    """A support that flexes and dissipates: its 1/Q is proportional to f^2."""
-    frequency = terms.angular_frequency / (2.0 * np.pi)
-    return replace(terms, rate=terms.rate + size * frequency**3)
+    """A support that flexes and dissipates, C'' being the imaginary part of its compliance.
+
+    The pendulum pulls at its axis with S theta'', S its mass times its centre's distance.
+    """
+    static = terms.torque / terms.inputs.gravity
+    more = size * static**2 * terms.angular_frequency**3
+    return replace(terms, steady=terms.steady + more)
 
 
 def _branches_and_weights(design: Design) -> Sequence[Any]:

@@ -90,6 +90,9 @@ class Hysteresis(Section):
         description="of the loss torque per angle: 0 for a constant one (Q_h = I omega^2 over"
         " it), 1 for the paper's k f^2 whatever the moment of inertia",
     )
+    reference_inertia_kg_m2: Positive = Field(
+        0.1, description="I_0, the moment of inertia to which k belongs"
+    )
     inertia_exponent_sd: NotNegative = Field(
         0.0, description="standard uncertainty of that exponent"
     )
@@ -104,6 +107,14 @@ class Apparatus(Section):
     """The compound pendulum, before the weights are clamped."""
 
     gravity_m_per_s2: Positive = Field(9.80665, description="local acceleration of free fall")
+    gravity_sd_m_per_s2: NotNegative = Field(
+        0.01,
+        description="its standard uncertainty; 0.01 where only the standard value is known, which"
+        " latitude changes by 0.5 % from the equator to the poles",
+    )
+    clock_relative_sd: NotNegative = Field(
+        1.0e-4, description="relative standard uncertainty of the recorder's clock"
+    )
     rod: Rod = Field(description="the rod")
     weights: dict[str, Weight] = Field(description="the weights, by name")
     sphere: Sphere | None = Field(None, description="the sphere that swings in the fluid")

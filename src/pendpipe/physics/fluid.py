@@ -238,15 +238,22 @@ _ROUNDS: Final = 50
 
 @equation
 def free_decay_root(
-    inertia_kg_m2: Numbers, steady: Numbers, history: Numbers, torque_n_m_per_rad: Numbers
+    inertia_kg_m2: Numbers,
+    steady: Numbers,
+    history: Numbers,
+    torque_n_m_per_rad: Numbers,
+    loss_torque: Numbers = 0.0,
+    loss_exponent: Numbers = 0.0,
 ) -> npt.NDArray[np.complex128]:
-    """Complex rate s of a free decay ``exp(s t)``, damped by Stokes' drag with its memory.
+    """Complex rate s of a free decay ``exp(s t)``, damped by Stokes' drag and by solid friction.
 
-    The root with positive imaginary part of ``I s^2 + D1 s + D2 s^(3/2) + K = 0``. A harmonic
+    The root with positive imaginary part of
+    ``I s^2 + (D1 + kappa''/|s|) s + D2 s^(3/2) + K = 0``. A harmonic
     motion, s = i omega, would meet the drag of Eq. 2 and the added mass of
     `added_mass_coefficient`; a decay meets a little more drag: to first order
-    ``-Re s = D/(2 (I_all - I_layer/4))`` with D the drag of Eq. 16, I_all the inertia with all
-    added mass and I_layer that of the boundary layer, ``D2/sqrt(2 omega)``.
+    ``-Re s = D/(2 (I_all - I_layer/4))`` with D the drag of Eq. 16 and ``kappa''/omega``, I_all
+    the inertia with all added mass and I_layer that of the boundary layer, ``D2/sqrt(2 omega)``:
+    the fluid remembers larger velocities, whatever makes the motion decay.
 
     Parameters
     ----------
@@ -257,6 +264,9 @@ def free_decay_root(
         ``6 pi a^2 sqrt(rho eta) L^2``.
     torque_n_m_per_rad
         K, positive.
+    loss_torque, loss_exponent
+        ``kappa'' = loss_torque |s|^loss_exponent``, N m/rad with |s| in 1/s: the hysteretic
+        torque for each radian, by default independent of the rate.
 
     Returns
     -------
@@ -270,11 +280,12 @@ def free_decay_root(
     (0.01, 2.0)
     """
     inertia, torque = inertia_kg_m2, torque_n_m_per_rad
-    root = 1j * np.sqrt(torque / (inertia + 0.0 * (steady + history)))
+    root = 1j * np.sqrt(torque / (inertia + 0.0 * (steady + history + loss_torque)))
     for _ in range(_ROUNDS):
         half = np.sqrt(root)
-        value = inertia * root**2 + steady * root + history * root * half + torque
-        step = value / (2.0 * inertia * root + steady + 1.5 * history * half)
+        drag = steady + loss_torque * np.abs(root) ** (loss_exponent - 1.0)
+        value = inertia * root**2 + drag * root + history * root * half + torque
+        step = value / (2.0 * inertia * root + drag + 1.5 * history * half)
         root = root - step
         if np.all(np.abs(step) <= 1e-15 * np.abs(root)):
             break

@@ -126,6 +126,36 @@ def hysteretic_quality_factor(
 
 
 @equation
+def hysteretic_loss_torque(
+    hysteretic_coefficient_s2: Numbers,
+    torque_n_m_per_rad: Numbers,
+    reference_inertia_kg_m2: Numbers,
+    inertia_exponent: Numbers = 0.0,
+) -> FloatArray:
+    """Loss torque of ``Q_h = k f^2 (I/I_0)^(1 - p)``, as `free_decay_root` takes it.
+
+    ``kappa'' = I omega^2/Q_h = (4 pi^2 I_0/k) (I/I_0)^p``. With ``I = K/omega^2`` that is this
+    number times ``omega^(-2 p)``.
+
+    Parameters
+    ----------
+    hysteretic_coefficient_s2, torque_n_m_per_rad
+        k in s^2 and K in N m/rad; all broadcast.
+    reference_inertia_kg_m2, inertia_exponent
+        I_0 in kg m^2, to which k belongs, and p: 0 for a torque of the material, 1 for
+        ``Q_h = k f^2`` whatever the moment of inertia.
+
+    Returns
+    -------
+    FloatArray
+        N m/rad times s^(-2 p).
+    """
+    inertia = reference_inertia_kg_m2
+    torque = 4.0 * np.pi**2 * inertia / hysteretic_coefficient_s2
+    return torque * (torque_n_m_per_rad / inertia) ** inertia_exponent
+
+
+@equation
 def without_hysteresis(
     quality_factor_measured: Numbers, quality_factor_hysteretic: Numbers
 ) -> FloatArray:

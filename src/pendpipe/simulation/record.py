@@ -28,36 +28,48 @@ def generator(campaign: Campaign, name: str) -> np.random.Generator:
 def equation_of_motion(campaign: Campaign, record: Record) -> Eq8:
     """Eq. 8 of a simulated record, from geometry and the configured truth.
 
-    a from C_d, c from the bearing's torque, the viscous part of b from Eq. 16 times the
-    drag factor, the hysteretic part from Q_hys = k f^2.
+    a from C_d, c from the bearing's torque; frequency and b from the free decay in a fluid that
+    remembers, with Stokes' drag times the drag factor and the loss torque of k.
     """
     settings = campaign.configuration
     truth, built = settings.simulated, pendulum(campaign, record)
     assert truth is not None
     apparatus = built.apparatus
-    omega = float(built.swing.angular_frequency_per_s)
-    inertia = float(built.swing.moment_of_inertia_kg_m2)
-    hysteretic = physics.hysteretic_quality_factor(
-        built.swing.frequency_hz, truth.hysteretic_coefficient_s2
+    ball = apparatus.sphere if built.geometry.sphere else None
+    moving = physics.swing(
+        built.parts,
+        built.fluid if ball else None,
+        apparatus.gravity_m_per_s2,
+        plain_added_mass=True,
     )
-    viscous = 0.0
-    if built.geometry.sphere and apparatus.sphere and settings.fluids[record.fluid].boundary_layer:
-        quality = physics.viscous_quality_factor(
-            inertia,
-            omega,
-            apparatus.sphere.diameter_m / 2,
-            apparatus.sphere.distance_m,
-            built.fluid.viscosity_pa_s,
-            built.fluid.density_kg_per_m3,
-            truth.history_coefficient,
+    steady = history = 0.0
+    if ball and settings.fluids[record.fluid].boundary_layer:
+        radius, lever = ball.diameter_m / 2, ball.distance_m
+        density, viscosity = (float(np.asarray(each)) for each in built.fluid)
+        steady = 6.0 * np.pi * viscosity * radius * lever**2 * truth.drag_factor
+        turning = 1.0 + float(physics.rotation_of_sphere(radius, lever))
+        history = steady * turning * truth.history_coefficient
+        history *= radius * float(np.sqrt(density / viscosity))
+    torque = float(moving.restoring_torque_n_m_per_rad)
+    stiff = apparatus.hysteresis
+    loss = float(
+        physics.hysteretic_loss_torque(
+            truth.hysteretic_coefficient_s2,
+            torque,
+            stiff.reference_inertia_kg_m2,
+            stiff.inertia_exponent,
         )
-        viscous = truth.drag_factor * omega / (2.0 * float(quality))
+    )
+    solid = float(moving.moment_of_inertia_kg_m2), steady, history, torque
+    root = complex(physics.free_decay_root(*solid, loss, -2.0 * stiff.inertia_exponent))
+    viscous, omega = -complex(physics.free_decay_root(*solid)).real, abs(root)
+    friction = physics.bearing_friction_rate(apparatus.bearing_torque_n_m, torque / omega**2, omega)
     return Eq8(
         angular_frequency=omega,
         quadratic=quadratic_rate(campaign, record, built),
-        hysteretic=omega / (2.0 * float(hysteretic)),
+        hysteretic=-root.real - viscous,
         viscous=viscous,
-        coulomb=float(physics.bearing_friction_rate(apparatus.bearing_torque_n_m, inertia, omega)),
+        coulomb=float(friction),
     )
 
 
