@@ -42,8 +42,21 @@ def without_sudden(t: float, x: float, v: float, s: float, turn: float) -> float
     return 0.0
 
 
+def friction_by_energy(x: float, v: float, s: float) -> float:
+    """What Eq. 8's losses are larger where rho^2 = v^2 + 2 omega^2 (1 - cos x)."""
+    linear, sine = (
+        B * SHARE * speed + A / OMEGA * speed**2
+        for speed in (math.hypot(OMEGA * x, v), math.hypot(2.0 * OMEGA * math.sin(0.5 * x), v))
+    )
+    return 0.5 * math.pi * (sine - linear) * s
+
+
 CASES: dict[str, tuple[tuple[float, ...], Any, dict[str, Any]]] = {
-    "circular-error": ((1.0,), lambda t, x, v, s, turn: OMEGA**2 * (x - math.sin(x)), {}),
+    "circular-error": (
+        (1.0,),
+        lambda t, x, v, s, turn: OMEGA**2 * (x - math.sin(x)) - friction_by_energy(x, v, s),
+        {},
+    ),
     "quadratic-stiffness": ((0.1,), lambda t, x, v, s, turn: -0.1 * OMEGA**2 * x**2, {}),
     "drag-form": (
         (1.0,),

@@ -80,6 +80,8 @@ MEASUREMENT = [
 BASE = baseline(a=7.2e-3, b=7.8e-3, c=1.3e-4, share=0.4, offset=0.01)
 RECORD = times(60.0)
 WITH_TEMPLATE = [effect.identifier for effect in CATALOGUE if effect.has_signature]
+WITH_SIZE = [name for name in WITH_TEMPLATE if not by_identifier(name).form]
+"""Another form of Eq. 8 is there, or it is not."""
 
 
 def test_the_catalogue_holds_every_identifier_once() -> None:
@@ -155,7 +157,7 @@ def test_at_size_zero_it_is_absent(identifier: str) -> None:
     np.testing.assert_allclose(found, model.reading(BASE), rtol=0.0, atol=3e-10)
 
 
-@pytest.mark.parametrize("identifier", WITH_TEMPLATE)
+@pytest.mark.parametrize("identifier", WITH_SIZE)
 def test_it_changes_the_readings_in_proportion_to_its_size(identifier: str) -> None:
     """Half the (small) size, half the change, to first order."""
     effect = by_identifier(identifier)
@@ -183,7 +185,7 @@ FREQUENCIES = ("f_2", "f_d", "f_h", "f_a", "detuning")
 BASELINE_STEPS = {A: 1e-5, B: 1e-5, C: 1e-6, OMEGA: 1e-5, START: 1e-5, TIME: 1e-5, OFFSET: 1e-5}
 
 
-@pytest.mark.parametrize("identifier", WITH_TEMPLATE)
+@pytest.mark.parametrize("identifier", WITH_SIZE)
 def test_derivatives_by_the_effects_own_values(identifier: str) -> None:
     """Derivatives against central differences, an instant's own neighbourhood apart."""
     effect = by_identifier(identifier)

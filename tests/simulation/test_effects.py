@@ -44,6 +44,7 @@ release_time_s = -0.2
 sample_rate_hz = 20.0
 duration_s = 40.0
 """
+LINEAR = TOML.replace("[pendulum]", '[pendulum]\nrestoring = "linear"')
 MEASURED = "[sensor]\nnoise_volts = 1e-4\n[converter]\n"
 
 
@@ -69,8 +70,8 @@ def named(identifier: str) -> dict[str, float]:
 @pytest.mark.parametrize("identifier", [effect.identifier for effect in CATALOGUE])
 def test_each_effect_can_be_switched_on(identifier: str, tmp_path: Path) -> None:
     """And changes the recording by more than its rounding."""
-    without = simulate(model(tmp_path, MEASURED))
-    found = simulate(model(tmp_path, MEASURED + table(identifier, **named(identifier))))
+    effect = MEASURED + table(identifier, **named(identifier))
+    without, found = (simulate(model(tmp_path, each, LINEAR)) for each in (MEASURED, effect))
     assert found.metadata["effects"] == identifier
     change = np.abs(found.values - without.values)
     assert np.max(change) > 2e-4, "about a code of 16 bits"
@@ -100,7 +101,7 @@ def test_effects_add_up(tmp_path: Path) -> None:
 
 def test_friction_stops_it_near_eq8s_own_stop(tmp_path: Path) -> None:
     """With an effect that does nothing, the motion is the engine's, and it rests within delta."""
-    text = TOML.replace("c = 1e-4", "c = 5e-3").replace("1e-5", "0.0")
+    text = LINEAR.replace("c = 1e-4", "c = 5e-3").replace("1e-5", "0.0")
     described = model(tmp_path, table("cubic-stiffness", k3=0.0), text)
     found = simulate(described)
     expected = sample(described.pendulum.equation(), Release(-0.2, 0.15), found.time_s)
@@ -274,20 +275,29 @@ def test_a_pendulum_with_sin_x_swings_as_the_engine_has_it(tmp_path: Path) -> No
     assert 0.5 * 0.9 < turned < 0.9 * 0.9
 
 
-def test_sin_x_is_not_combined_with_effects_and_ends_at_the_top(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="circular-error"):
-        simulate(model(tmp_path, table("sensor-cubic", s3=0.05), SINE))
+def test_sin_x_goes_with_effects_and_ends_at_the_top(tmp_path: Path) -> None:
+    plain = simulate(model(tmp_path, text=SINE)).values
+    curved = simulate(model(tmp_path, table("sensor-cubic", s3=0.05), SINE)).values
+    np.testing.assert_allclose(curved, plain + 0.05 * plain**3, rtol=0, atol=1e-6)
     with pytest.raises(InputError, match="beyond pi"):
         simulate(model(tmp_path, text=SINE.replace("2.5", "3.2")))
 
 
+@pytest.mark.parametrize("drag", ["energy", "speed"])
 @pytest.mark.parametrize("angle", [1.0, 2.0, 2.6])
-def test_two_engines_agree_on_sin_x_with_losses_that_are_the_same_in_both(angle: float) -> None:
-    # Viscous damping and dry friction depend on no energy, and so not on the torque.
-    pendulum = {"frequency_hz": 0.5, "quality_factor_viscous": 100.0, "c": 1e-3}
-    pendulum["release_angle_rad"] = angle
+def test_sin_x_as_an_effect_is_the_pendulum_with_sin_x(angle: float, drag: str) -> None:
+    """By the general engine and by the compiled one, with every loss."""
+    pendulum = {
+        "frequency_hz": 0.5,
+        "quality_factor_viscous": 100.0,
+        "quality_factor_hysteretic": 300.0,
+        "a": 3e-3,
+        "c": 1e-3,
+        "release_angle_rad": angle,
+    }
     sampling = {"sample_rate_hz": 50.0, "duration_s": 60.0}
-    effect = {"pendulum": pendulum, "sampling": sampling, "effects": [{"id": "circular-error"}]}
-    torque = {"pendulum": pendulum | {"restoring": "sine"}, "sampling": sampling}
-    values = [simulate(read_model(each)).values for each in (effect, torque)]
+    plain = {"pendulum": pendulum | {"restoring": "linear"}, "sampling": sampling}
+    forms = [{"id": "circular-error"}, *([{"id": "drag-form"}] if drag == "speed" else [])]
+    sine = {"pendulum": pendulum | {"drag": drag}, "sampling": sampling}
+    values = [simulate(read_model(each)).values for each in (plain | {"effects": forms}, sine)]
     np.testing.assert_allclose(*values, rtol=0, atol=2e-7 * angle)

@@ -39,7 +39,7 @@ PARAMETERS: Final = {
     "drag": 0.0,  # |v| v, 1/rad
     "power": 0.0,  # |v|^n sgn v
     "power_exponent": 1.5,
-    "energy": 0.0,  # (w^2 x^2 + v^2)^lambda sgn v
+    "energy": 0.0,  # rho^(2 lambda) sgn v
     "energy_exponent": 0.75,
     "reynolds": 0.0,  # Schiller-Naumann drag: rate of its linear part, 1/s
     "reynolds_speed": 0.01,  # speed at which Re is 1, rad/s
@@ -265,7 +265,9 @@ def friction(
     """What multiplies sgn v; `turn` is the last turning point, reached at `turned_at`."""
     force = p.coulomb + extra
     if p.hysteretic != 0.0 or p.quadratic != 0.0 or p.energy != 0.0:
-        square = (p.omega * x) ** 2 + v * v
+        # Twice the energy: of a pendulum, where it swings by sin x.
+        potential = x * x + p.sine * (4.0 * math.sin(0.5 * x) ** 2 - x * x)
+        square = p.omega**2 * potential + v * v
         force += p.hysteretic * math.sqrt(square) + p.quadratic * square
         if p.energy != 0.0 and square > 0.0:
             force += p.energy * square**p.energy_exponent

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 import numpy as np
 
@@ -30,6 +30,12 @@ BASELINE: Final = ("a", "b", "c", "share", "omega", "start_rad", "start_s", "off
 turning point from which the motion starts (about the equilibrium) and when; and the reading of the
 equilibrium."""
 A, B, C, SHARE, OMEGA, START, TIME, OFFSET = range(8)
+
+
+Restoring = Literal["linear", "sine"]
+"""The torque: omega^2 x, or omega^2 sin x."""
+Drag = Literal["energy", "speed"]
+"""The form of the quadratic loss: the paper's rho^2 sgn v, or v|v|."""
 
 
 @dataclass(frozen=True)
@@ -66,11 +72,20 @@ class Eq8:
     A drag that follows :math:`\dot x |\dot x|` has another cycle integral with the sine. If it has
     the same a at small amplitudes, it takes :math:`3 (\sin y - y \cos y)/[2 y (1 - \cos y)]` of
     what the energy form takes in half a swing: :math:`1 - y^2/60`, 0.98 at 1 rad, 0.87 at 2.5 rad.
-    By so much the a of such a drag comes out too small where most of the loss is at y.
+    With ``drag="speed"`` that is the law: the quadratic term is
+
+    .. math::
+
+        \tfrac{3}{2} f_q\, \dot x |\dot x| \quad \text{in place of} \quad
+        f_q \rho^2\, \mathrm{sgn}\,\dot x,
+
+    whose a is the same first-order rate of Eq. 13; the other losses keep their form. The two
+    forms differ in the third harmonic at small amplitudes, and with the sine in the envelope.
 
     At rest at an amplitude y the friction is that of the square bracket with
     :math:`\rho = \omega y` (sine: :math:`2 \omega \sin(y/2)`), whatever its terms; the pendulum
-    moves only if :math:`\omega^2 y` (:math:`\omega^2 \sin y`) exceeds it. So hysteretic friction
+    moves only if :math:`\omega^2 y` (:math:`\omega^2 \sin y`) exceeds it. (A drag that follows
+    the speed holds nothing at rest.) So hysteretic friction
     alone locks it for
     :math:`Q_h = \omega/(2 b_h) \le \pi/4`, and quadratic friction locks it beyond a largest
     amplitude; see `stop_rad`.
@@ -87,6 +102,8 @@ class Eq8:
         c, rad/s; c = omega y0/(2 Q_c0).
     restoring
         The torque: ``"linear"``, omega^2 x, or ``"sine"``, omega^2 sin x.
+    drag
+        The form of the quadratic term: ``"energy"``, the paper's, or ``"speed"``, v\|v\|.
 
     Examples
     --------
@@ -104,11 +121,14 @@ class Eq8:
     hysteretic: float = 0.0
     viscous: float = 0.0
     coulomb: float = 0.0
-    restoring: Literal["linear", "sine"] = "linear"
+    restoring: Restoring = "linear"
+    drag: Drag = "energy"
 
     def __post_init__(self) -> None:
-        if self.restoring not in ("linear", "sine"):
-            raise ValueError(f'restoring must be "linear" or "sine", not {self.restoring!r}')
+        for name, known in (("restoring", get_args(Restoring)), ("drag", get_args(Drag))):
+            if getattr(self, name) not in known:
+                either = " or ".join(f'"{each}"' for each in known)
+                raise ValueError(f"{name} must be {either}, not {getattr(self, name)!r}")
         if not 0.0 < self.angular_frequency < math.inf:
             raise ValueError(
                 f"angular_frequency must be positive and finite, not {self.angular_frequency}"
@@ -123,6 +143,26 @@ class Eq8:
         """Return the losses in the order of `RATES`."""
         return self.quadratic, self.hysteretic, self.viscous, self.coulomb
 
+    def torque(self, angle: FloatArray) -> FloatArray:
+        """Return omega^2 x, or omega^2 sin x, at any angles, rad/s^2."""
+        bent = np.sin(angle) if self.restoring == "sine" else angle
+        return np.asarray(self.angular_frequency**2 * bent)
+
+    def energy(self, angle: FloatArray, velocity: FloatArray) -> FloatArray:
+        """Return rho^2, twice the energy, at any angles and velocities, rad^2/s^2."""
+        s = 2.0 * np.sin(0.5 * angle) if self.restoring == "sine" else angle
+        return np.asarray((self.angular_frequency * s) ** 2 + velocity**2)
+
+    def friction(
+        self, angle: FloatArray, velocity: FloatArray, direction: FloatArray
+    ) -> FloatArray:
+        """Return the acceleration by all four losses, rad/s^2; `direction` is sgn v."""
+        omega, square = self.angular_frequency, self.energy(angle, velocity)
+        drag = 1.5 * velocity**2 if self.drag == "speed" else square
+        dry = omega * self.coulomb + self.hysteretic * np.sqrt(square)
+        dry = dry + self.quadratic / omega * drag
+        return np.asarray(-0.5 * math.pi * dry * direction - 2.0 * self.viscous * velocity)
+
     @property
     def stop_rad(self) -> float:
         """The amplitude at and below which the pendulum, once at rest, stays; inf if locked.
@@ -135,11 +175,16 @@ class Eq8:
         m = self._stop()
         return 2.0 * math.asin(0.5 * m) if self.restoring == "sine" and m < math.inf else m
 
+    @property
+    def _quadratic_at_rest(self) -> float:
+        """What holds a pendulum at rest of a."""
+        return self.quadratic if self.drag == "energy" else 0.0
+
     def _stop(self) -> float:
         """Return the m of `panel.py`."""
         half_turn = 0.5 * math.pi / self.angular_frequency
         h, free = half_turn * self.hysteretic, 1.0 - half_turn * self.hysteretic
-        delta, q = half_turn * self.coulomb, half_turn * self.quadratic
+        delta, q = half_turn * self.coulomb, half_turn * self._quadratic_at_rest
         discriminant = free * free - 4.0 * q * delta
         if free <= 0.0 or discriminant < 0.0:
             return math.inf
@@ -158,8 +203,8 @@ class Eq8:
                 return m
         return math.inf
 
-    def shape(self) -> tuple[float, float, float, float, float]:
-        """Return m, h, q, g, k: Eq. 8 with time in radians (see `panel.py`)."""
+    def shape(self) -> tuple[float, float, float, float, float, float]:
+        """Return m, h, q, g, k, f: Eq. 8 with time in radians (see `panel.py`)."""
         half_turn = 0.5 * math.pi / self.angular_frequency
         return (
             self._stop(),
@@ -167,19 +212,21 @@ class Eq8:
             half_turn * self.quadratic,
             self.viscous / self.angular_frequency,
             1.0 if self.restoring == "sine" else 0.0,
+            1.0 if self.drag == "speed" else 0.0,
         )
 
     def shape_derivatives(self) -> FloatArray:
         """Return derivatives of m, h, q, g (columns) by the amplitude (none), a, b_h, b_v, c."""
-        m, h, q, _, k = self.shape()
+        m, h, _, _, k, f = self.shape()
         half_turn = 0.5 * math.pi / self.angular_frequency
+        q = half_turn * self._quadratic_at_rest
         stop = 0.0 if math.isinf(m) else m
         steepness = (1.0 - 0.5 * k * stop**2) / math.sqrt(1.0 - 0.25 * k * stop**2)
         by_delta = 0.0 if math.isinf(m) else 1.0 / (steepness - h - 2.0 * q * m)
         return np.array(
             [
                 [0.0, 0.0, 0.0, 0.0],
-                [half_turn * by_delta * stop * stop, 0.0, half_turn, 0.0],
+                [half_turn * by_delta * stop * stop * (1.0 - f), 0.0, half_turn, 0.0],
                 [half_turn * by_delta * stop, half_turn, 0.0, 0.0],
                 [0.0, 0.0, 0.0, 1.0 / self.angular_frequency],
                 [half_turn * by_delta, 0.0, 0.0, 0.0],

@@ -54,6 +54,7 @@ from pendpipe.dynamics.panel import (
     WEIGHT,
     angle_of,
     curve,
+    drag_lever,
     horner,
     multiply,
     place,
@@ -82,20 +83,24 @@ def _differentiate(node: FloatArray, shape: FloatArray, radius: float) -> None:
         # Where s and u vanish together R has no derivative; its direction is then of no weight.
         direction = 1.0 / distance if distance > 0.0 else 0.0
         lever = r + 2.0 * m * cos
-        stiffness = h * inverse + q
+        sin = node[SIN + j]
+        drag = drag_lever(shape, lever, r, sin)
         drop = lever * h * inverse * inverse
-        nu = (lever * stiffness + 2.0 * g * node[SIN + j] + node[LEAN + j]) * bend
+        nu = (lever * h * inverse + q * drag + 2.0 * g * sin + node[LEAN + j]) * bend
         # d ln(1/C)/ds, and the same of the sum C + C(m) in the denominator of LEAN
         steeper = 0.25 * k * s * bend * bend
         whole = 1.0 / (1.0 / bend + centre)
         by_s, by_m = 0.25 * s * bend * whole, 0.25 * m / centre * whole
         scale = 0.25 * k * cos * whole * bend
-        node[BY_RADIUS + j] = r * (stiffness - drop * (r + m * cos) * direction) * bend
+        by_r, by_centre = drag_lever(shape, r, r, sin), drag_lever(shape, 2.0 * cos, 0.0, sin)
+        node[BY_RADIUS + j] = r * (h * inverse - drop * (r + m * cos) * direction) * bend
+        node[BY_RADIUS + j] += q * by_r * bend
         node[BY_RADIUS + j] += r * cos * (scale * m * (1.0 + (s + m) * by_s) + nu * steeper)
-        node[BY_CENTRE + j] = (2.0 * cos * stiffness - drop * (1.0 + s * direction)) * bend
+        node[BY_CENTRE + j] = 2.0 * cos * h * inverse + q * by_centre
+        node[BY_CENTRE + j] = (node[BY_CENTRE + j] - drop * (1.0 + s * direction)) * bend
         node[BY_CENTRE + j] += scale * (s + m + m * (2.0 + (s + m) * (by_s + by_m))) + nu * steeper
         node[BY_H + j] = lever * inverse * bend
-        node[BY_Q + j] = lever * bend
+        node[BY_Q + j] = drag * bend
         weight = node[WEIGHT + j] * node[SLIP + j] ** 2
         node[PULL + j] = -weight * node[SIN + j]
         node[LAG + j] = weight * cos * bend

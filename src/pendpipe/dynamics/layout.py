@@ -41,7 +41,7 @@ Work = Any
 """A record of `WORK`."""
 WORK: Final = np.dtype(
     [
-        ("shape", "f8", 5),  # m, h, q, g, k of `panel.py`
+        ("shape", "f8", 6),  # m, h, q, g, k, f of `panel.py`
         ("omega", "f8"),
         ("release_s", "f8"),
         ("offset", "f8"),
@@ -75,5 +75,5 @@ WORK: Final = np.dtype(
 )
 WORK_SIZE: Final = WORK.itemsize // 8
 """In numbers: Python hands it over as an array of them."""
-REQUEST: Final = struct.Struct("=12d6q")
+REQUEST: Final = struct.Struct("=13d6q")
 """The first fields, from the shape to the length of a panel's part."""

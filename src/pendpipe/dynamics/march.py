@@ -27,6 +27,7 @@ from pendpipe.dynamics.panel import (
     complement_for,
     curve,
     log_amplitude,
+    quadratic_at_rest,
 )
 from pendpipe.dynamics.table import (
     DONE,
@@ -49,9 +50,11 @@ from pendpipe.dynamics.table import (
 def sticks(shape: FloatArray, y: float) -> bool:
     """Return whether the pendulum, at rest at amplitude y, stays: delta + h y + q y^2 >= y C(y).
 
+    q is that of `quadratic_at_rest`.
+
     So it does, for all that could ever matter, below 1e-120 rad, where squares soon underflow.
     """
-    m, h, q = shape[0], shape[1], shape[2]
+    m, h, q = shape[0], shape[1], quadratic_at_rest(shape)
     if y <= m or y < 1e-120:
         return True
     # The friction less the restoring torque is (y - m) [h + q (y + m) - (y C(y) - m C(m))/(y - m)].

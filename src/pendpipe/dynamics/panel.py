@@ -5,17 +5,20 @@ Time is counted in radians, tau = omega t, and u = dx/dtau. The place is s, with
 sqrt(1 - s^2/4) for the sine. The restoring torque is then s C, twice its potential s^2, and in
 a half cycle in which the pendulum moves towards negative x, Eq. 8 reads
 
-    ds/dtau = C u,    du/dtau = -s C + delta + h R + q R^2 - 2 g u,    R = sqrt(s^2 + u^2),
-    delta = pi c/(2 omega), h = pi b_h/(2 omega), q = pi a/(2 omega), g = b_v/omega.
+    ds/dtau = C u,    du/dtau = -s C + delta + h R + q D - 2 g u,    R = sqrt(s^2 + u^2),
+    delta = pi c/(2 omega), h = pi b_h/(2 omega), q = pi a/(2 omega), g = b_v/omega,
 
+where the drag is D = R^2 in the energy's form (f = 0), and D = 3/2 u^2 where it follows the
+speed (f = 1).
 Counted in C dtau the sine is therefore the linear pendulum with its friction divided by C.
-m, the smallest root of delta + h m + q m^2 = m C(m), is where the sliding pendulum would be in
-equilibrium (m = delta if h = q = 0 and C = 1), and the amplitude at and below which it sticks.
+m, the smallest root of delta + h m + (1 - f) q m^2 = m C(m), is where the sliding pendulum would
+be in equilibrium (delta if h = q = 0 and C = 1), and the amplitude at and below which it sticks.
 About this centre, s = m + r cos(psi), u = -r sin(psi), and with k = 0 (linear) or 1 (sine)
 
     dr/dpsi   = -r nu sin(psi)/(1 - nu cos(psi)),     dtau/dpsi = 1/[C (1 - nu cos(psi))],
-    C nu = (r + 2 m cos(psi)) [h/(R + m) + q] + 2 g sin(psi)
+    C nu = (r + 2 m cos(psi)) h/(R + m) + q E + 2 g sin(psi)
            + k m cos(psi) (s + m)/(4 [C + C(m)]),
+    E = r + 2 m cos(psi)   (f = 0),    3/2 r sin(psi)^2   (f = 1),
 
 so the turning points (u = 0) are exactly psi = 0 and pi, and everything between them is smooth.
 delta itself has dropped out: the difference to m is taken analytically.
@@ -48,8 +51,8 @@ PLACED = 500  # start, half width and complementary modulus of the panel that it
 
 PHASE_BELOW = -1.2
 """Up to this `log_amplitude` (0.3 rad) w = psi."""
-CENTRE, HYSTERETIC, QUADRATIC, VISCOUS, CURVATURE = range(5)
-"""m, h, q, g and k in the array `shape`."""
+CENTRE, HYSTERETIC, QUADRATIC, VISCOUS, CURVATURE, SPEED = range(6)
+"""m, h, q, g, k and f in the array `shape`."""
 
 
 @kernel(inline=True)
@@ -186,14 +189,33 @@ def _renew(node: FloatArray, half_width: float) -> tuple[float, float]:
 
 
 @kernel(inline=True)
+def drag_lever(shape: FloatArray, lever: float, r: float, sin: float) -> float:
+    """Return E, the drag's part of C nu over q."""
+    return lever + float(shape[SPEED]) * (1.5 * r * sin * sin - lever)
+
+
+@kernel(inline=True)
+def quadratic_at_rest(shape: FloatArray) -> float:
+    """Return what of q holds a pendulum at rest: none where the drag follows the speed."""
+    return float(shape[QUADRATIC] * (1.0 - shape[SPEED]))
+
+
+@kernel(inline=True)
 def _force(node: FloatArray, shape: FloatArray, radius: float, j: int) -> tuple[float, float]:
     """Return R + m, and nu (R + m), at a node."""
     m, cos = shape[CENTRE], node[COS + j]
     r = radius * (1.0 + node[LOSS + j])
     # |.| because rounding can make the square negative where s and u vanish together
     reach = m + math.sqrt(abs(r * r + m * (2.0 * r * cos + m)))
-    force = (r + 2.0 * m * cos) * (shape[HYSTERETIC] + shape[QUADRATIC] * reach)
-    force += (2.0 * shape[VISCOUS] * node[SIN + j] + node[LEAN + j]) * reach
+    lever, sin = r + 2.0 * m * cos, node[SIN + j]
+    force = (
+        lever * shape[HYSTERETIC]
+        + (
+            shape[QUADRATIC] * drag_lever(shape, lever, r, sin)
+            + (2.0 * shape[VISCOUS] * sin + node[LEAN + j])
+        )
+        * reach
+    )
     return reach, force * node[BEND + j]
 
 
@@ -211,7 +233,7 @@ def solve(
         On return LOSS holds r/radius - 1, SLOPE its derivative by psi,
         SLIP 1/(1 - nu cos psi), and EXCESS tau - psi since the start of the panel.
     shape
-        m, h, q, g.
+        m, h, q, g, k, f.
     radius
         r at the start of the panel.
     """

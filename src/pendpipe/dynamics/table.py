@@ -23,6 +23,7 @@ from pendpipe.dynamics.panel import (
     amplitude_at,
     complement_for,
     curve,
+    quadratic_at_rest,
 )
 
 _WIDEST, _FEW = 5.2, 0.31
@@ -77,7 +78,7 @@ def half_cycles_and_span(
     only used to lay out tables: nothing is lost but time if it is wrong.
     """
     m, h, q, g = shape[0], shape[1], shape[2], shape[3]
-    delta = m * (curve(shape, m) - h - q * m)
+    delta = m * (curve(shape, m) - h - quadratic_at_rest(shape) * m)
     step = min(0.125, room / 8.0)
     count, span = 0.0, 0.0
     while span < room:

@@ -6,8 +6,8 @@ Behind it stands what the scans and the shapes of several effects have in common
 import itertools
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from inspect import get_annotations
 from typing import Any, ClassVar, Final, Literal, NamedTuple, TypeVar, cast
 
@@ -76,20 +76,16 @@ class Pendulum(Eq8):
         """The sum b = b_h + b_v, 1/s."""
         return self.hysteretic + self.viscous
 
-    def acceleration(self, motion: Motion | Sampled) -> FloatArray:
+    def losses(self, motion: Motion) -> FloatArray:
+        """Return the acceleration by Eq. 8's losses at the nodes, rad/s^2."""
+        return self.friction(motion.angle, motion.velocity, motion.direction)
+
+    def acceleration(self, motion: Motion) -> FloatArray:
         """Return x'' + omega^2 x of Eq. 8 at the nodes, rad/s^2."""
-        omega = self.angular_frequency
-        speed = omega * motion.amplitude
-        friction = (
-            0.5
-            * math.pi
-            * (
-                omega * self.coulomb
-                + self.hysteretic * speed
-                + self.quadratic / omega * speed * speed
-            )
-        )
-        return -motion.direction * friction - 2.0 * self.viscous * motion.velocity
+        found = self.losses(motion)
+        if self.restoring == "sine":
+            found = found + self.angular_frequency**2 * motion.angle - self.torque(motion.angle)
+        return found
 
 
 class Span(NamedTuple):
@@ -154,6 +150,8 @@ class Effect:
     sizes: ClassVar[int] = 1
     parameter_free: ClassVar[bool] = False
     """True where the effect has no free size: it is there, or it is not (size 1 or 0)."""
+    form: ClassVar[Mapping[str, Any]] = {}
+    """What it makes of the law itself, by names of `Eq8`: sin x for x, or another form of drag."""
     needs: ClassVar[tuple[str, ...]] = ()
     """Parameters of the baseline without which it is nothing (a drag's form needs a drag)."""
     inside: ClassVar[tuple[str, ...]] = ()
@@ -214,8 +212,15 @@ class Effect:
     def acceleration(
         self, motion: Motion, pendulum: Pendulum, values: FloatArray
     ) -> FloatArray | None:
-        """Return the extra acceleration, rad/s^2, at the nodes of a motion."""
-        return None
+        """Return the extra acceleration, rad/s^2, at the nodes of a motion.
+
+        Of another form of the law it is the difference between the two.
+        """
+        if not self.form:
+            return None
+        usual = {name: getattr(Eq8, name) for name in self.form}
+        with_it, without = replace(pendulum, **self.form), replace(pendulum, **usual)
+        return np.asarray(values[0] * (with_it.acceleration(motion) - without.acceleration(motion)))
 
     def believable(self, values: FloatArray) -> bool:
         """Whether fitted values are those of the thing that is named."""
@@ -304,6 +309,13 @@ def enters(
         return subclass(base, function.__name__, function.__doc__, own | given)()
 
     return declare
+
+
+def other_form(module: str, text: str, form: Mapping[str, Any], **attributes: Any) -> Effect:
+    """Declare another form of Eq. 8 (see `Effect.form`), by its text in the manual."""
+    own = {"__module__": module, "kind": "dynamics", "parameter_free": True, "form": form}
+    own["example"] = (1.0,)
+    return subclass(Effect, str(attributes["identifier"]), text, own | attributes)()
 
 
 def without_template(module: str, text: str, **attributes: Any) -> Effect:

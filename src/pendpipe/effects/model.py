@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from pendpipe.dynamics.any_law import (
     sample_motion,
     sample_pieces,
 )
+from pendpipe.dynamics.eq8 import Drag, Restoring
 from pendpipe.effects.baseline import (
     BASELINE,
     HIGH,
@@ -141,6 +142,8 @@ class Model:
         The parts of b that are held (``"hysteretic"``, ``"viscous"``), with their rates in 1/s.
     scale
         The amplitude where readings are no angles: what effects are bounded by is for 1 rad.
+    restoring, drag
+        The forms of Eq. 8, which an effect may change (`Effect.form`).
     """
 
     time_s: FloatArray
@@ -152,6 +155,8 @@ class Model:
     first_s: float = -math.inf
     parts: Mapping[str, float] = field(default_factory=dict)
     scale: float = 1.0
+    restoring: Restoring = "linear"
+    drag: Drag = "energy"
     _last: dict[str, Motion] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -220,8 +225,12 @@ class Model:
         return with_parts(value, self.held_parts())
 
     def pendulum(self, value: FloatArray) -> Pendulum:
-        """The baseline's constants, and when the first reading was taken."""
-        return replace(pendulum_of(value), first_s=self.first_s)
+        """Eq. 8 in its forms, and when the first reading was taken."""
+        form: dict[str, Any] = {"restoring": self.restoring, "drag": self.drag}
+        for effect, place in self.places():
+            if effect.form and value[place.start]:
+                form |= effect.form
+        return replace(pendulum_of(value), first_s=self.first_s, **form)
 
     def span(self, value: FloatArray, sampled: Sampled) -> Span:
         """What the scans of effects must know."""
@@ -242,7 +251,8 @@ class Model:
         return self._added(
             pendulum.acceleration(motion),
             value,
-            lambda effect, own: effect.acceleration(motion, pendulum, own),
+            # Another form is in the pendulum already.
+            lambda effect, own: None if effect.form else effect.acceleration(motion, pendulum, own),
         )
 
     def _added(

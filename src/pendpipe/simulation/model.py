@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, NamedTuple, Self
+from typing import Annotated, Any, Final, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
@@ -19,6 +19,7 @@ from pendpipe.configuration.load import as_input_error, nearest
 from pendpipe.configuration.models import NotNegative, Positive, Section, Sensor
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.any_law import Motion, NoMotionError, sample_pieces
+from pendpipe.dynamics.eq8 import Drag, Restoring
 from pendpipe.effects.baseline import BASELINE, TIME
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.effect import Effect, Parameter
@@ -36,9 +37,10 @@ class PendulumModel(Section):
     quality_factor_viscous: Positive | None = Field(None, description="Q_v; blank: none")
     a: NotNegative = Field(0.0, description="quadratic drag's rate in Eq. 13, 1/(rad s)")
     c: NotNegative = Field(0.0, description="Coulomb friction's rate in Eq. 13, rad/s")
-    restoring: Literal["linear", "sine"] = Field(
-        "linear", description="torque omega^2 x, or omega^2 sin x for any amplitude below pi"
+    restoring: Restoring = Field(
+        "sine", description="torque omega^2 sin x, or omega^2 x: a spring, a torsion wheel"
     )
+    drag: Drag = Field("energy", description="quadratic drag as Eq. 8 has it, or v|v|: speed")
     release_angle_rad: float = Field(description="angle from which it is let go, at rest")
     release_time_s: float = Field(
         0.0, le=0.0, description="when it is let go; the record starts at 0"
@@ -55,6 +57,7 @@ class PendulumModel(Section):
             viscous=omega / (2.0 * viscous) if viscous else 0.0,
             coulomb=self.c,
             restoring=self.restoring,
+            drag=self.drag,
         )
 
 
@@ -420,18 +423,11 @@ def _angles(
     release = Release(model.pendulum.release_time_s, model.pendulum.release_angle_rad)
     taken = instrument.times(time)
     moving = [one for one in given if one.effect.has_signature]
-    is_sine = equation.restoring == "sine"
     refuse_if(
-        is_sine and not abs(release.angle_rad) < math.pi,
+        equation.restoring == "sine" and not abs(release.angle_rad) < math.pi,
         place,
         "with sin x it is released beyond pi",
         "release it below 3.14 rad",
-    )
-    refuse_if(
-        is_sine and moving,
-        place,
-        "effects are solved for a linear torque",
-        'leave restoring out and add the effect "circular-error"',
     )
     angle = (
         _with_effects(equation, release, moving, taken, place)
@@ -474,7 +470,9 @@ def _with_effects(
     )
     value = np.concatenate([value, *(one.values for one in given)])
     interval = float(time_s[1] - time_s[0]) if len(time_s) > 1 else 1.0
-    model = EffectsModel(time_s, interval, effects, _ORDER)
+    model = EffectsModel(
+        time_s, interval, effects, _ORDER, restoring=equation.restoring, drag=equation.drag
+    )
     pieces = _longest(model, value, equation.angular_frequency, place)
     stamps = model.taken_at(value)
     end = float(pieces[-1][1].time_s[-1, -1])

@@ -203,7 +203,7 @@ def parametric_drive(
     Amplitude and phase beat with the difference to twice the pendulum's frequency.
     """
     torque = tone_at(cosine, sine, 2.0 * math.pi * f_h * since_release(motion, pendulum))
-    return np.asarray(-(pendulum.angular_frequency**2) * motion.angle * torque)
+    return np.asarray(-pendulum.torque(motion.angle) * torque)
 
 
 BROADBAND_DRIVE: Final[Effect] = without_template(
@@ -234,7 +234,7 @@ BROADBAND_DRIVE: Final[Effect] = without_template(
 def frequency_drift(motion: Motion, pendulum: Pendulum, rate: float, tau: float) -> FloatArray:
     """omega (1 + eps tau (1 - e^(-t/tau))): the rod warms up; straight where tau is long."""
     change = rate * relaxed(since_release(motion, pendulum), tau)
-    return np.asarray(-2.0 * change * pendulum.angular_frequency**2 * motion.angle)
+    return np.asarray(-2.0 * change * pendulum.torque(motion.angle))
 
 
 @enters(
@@ -353,8 +353,8 @@ def frequency_step(
     motion: Motion, pendulum: Pendulum, change: float, instant_s: float
 ) -> FloatArray:
     """omega changes at an instant: the flexure seats itself anew."""
-    size = -2.0 * change * pendulum.angular_frequency**2
-    return np.asarray(size * smooth_step(motion, instant_s) * motion.angle)
+    torque = pendulum.torque(motion.angle)
+    return np.asarray(-2.0 * change * smooth_step(motion, instant_s) * torque)
 
 
 @enters(
@@ -373,7 +373,7 @@ def frequency_step(
 )
 def damping_step(motion: Motion, pendulum: Pendulum, change: float, instant_s: float) -> FloatArray:
     """All losses of the baseline change by a factor 1 + eps at an instant: a rub begins."""
-    return np.asarray(change * smooth_step(motion, instant_s) * pendulum.acceleration(motion))
+    return np.asarray(change * smooth_step(motion, instant_s) * pendulum.losses(motion))
 
 
 @enters(

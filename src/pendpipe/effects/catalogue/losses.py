@@ -15,6 +15,7 @@ from pendpipe.effects.effect import (
     between,
     enters,
     half_cycle_of_release,
+    other_form,
     phase_since_reversal,
     rows,
 )
@@ -58,35 +59,31 @@ def coulomb_friction(motion: Motion, pendulum: Pendulum, c: float) -> FloatArray
 def quadratic_drag(motion: Motion, pendulum: Pendulum, a: float) -> FloatArray:
     """Fluid drag in Eq. 8's energy form: 1/amplitude grows by a a second (a of Eq. 13)."""
     size = 0.5 * math.pi * pendulum.angular_frequency * a
-    return np.asarray(-size * motion.direction * motion.amplitude**2)
+    square = pendulum.energy(motion.angle, motion.velocity) / pendulum.angular_frequency**2
+    return np.asarray(-size * motion.direction * square)
 
 
-@enters(
-    "acceleration",
+drag_form: Final = other_form(
+    __name__,
+    """v|v| with the same envelope as Eq. 8's fluid term; the third harmonic changes its sign.
+
+    Both fall as dr/dt = -a r^2 if v|v| is 1.5 times as strong; the friction's third harmonic
+    is 1/5 of its first for v|v|, and -1/3 for the energy form. With sin x the envelopes part at
+    large amplitudes.
+    """,
+    {"drag": "speed"},
     identifier="drag-form",
     name="drag that follows the square of the velocity",
     equation=(
         r"f_q (\omega^2 x^2 + \dot x^2) \operatorname{sgn}\dot x"
         r" \to \tfrac{3}{2} f_q\, \dot x |\dot x|"
     ),
-    parameter_free=True,
     needs=("a",),
-    example=(1.0,),
     discriminating_test=(
         "release it with several times the amplitude: the third harmonic in quadrature must "
         "grow with its square, with the sign of v|v|"
     ),
 )
-def drag_form(motion: Motion, pendulum: Pendulum, size: float) -> FloatArray:
-    """v|v| with the same envelope as Eq. 8's fluid term; the third harmonic changes its sign.
-
-    Both fall as dr/dt = -a r^2 if v|v| is 1.5 times as strong; the friction's third harmonic
-    is 1/5 of its first for v|v|, and -1/3 for the energy form.
-    """
-    speed = pendulum.angular_frequency * motion.amplitude
-    swapped = speed**2 - 1.5 * motion.velocity**2
-    fluid = 0.5 * math.pi * pendulum.quadratic / pendulum.angular_frequency
-    return np.asarray(size * fluid * motion.direction * swapped)
 
 
 SPEED: Final = 0.1
@@ -131,7 +128,7 @@ def power_law_damping(
     law = (1.0 - energy) * np.abs(motion.velocity / SPEED) ** exponent
     if energy:
         alike = 0.5 * math.pi * envelope_factor(exponent)
-        speed = pendulum.angular_frequency * motion.amplitude
+        speed = np.sqrt(pendulum.energy(motion.angle, motion.velocity))
         law = law + energy * alike * (speed / SPEED) ** exponent
     return np.asarray(-size * motion.direction * law)
 

@@ -7,27 +7,26 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.any_law import Motion
-from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span, enters
+from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span, enters, other_form
 
+circular_error: Final = other_form(
+    __name__,
+    """omega^2 sin(x) in place of omega^2 x: the period grows by the amplitude squared/16.
 
-@enters(
-    "acceleration",
+    It is Eq. 8 with the energy of a pendulum: the losses that follow rho have
+    rho^2 = v^2 + 2 omega^2 (1 - cos x).
+    """,
+    {"restoring": "sine"},
     identifier="circular-error",
     name="circular error",
     equation=r"\omega^2 x \to \omega^2 \sin x",
-    parameter_free=True,
     expected=True,
     prior=12.0,
     angular=True,
-    example=(1.0,),
     discriminating_test=(
         "release it again with half the amplitude: the period must follow 1 + y^2/16"
     ),
 )
-def circular_error(motion: Motion, pendulum: Pendulum, size: float) -> FloatArray:
-    """omega^2 sin(x) in place of omega^2 x: the period grows by the amplitude squared/16."""
-    omega = pendulum.angular_frequency
-    return np.asarray(size * omega * omega * (motion.angle - np.sin(motion.angle)))
 
 
 @enters(
