@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pendpipe.analysis.fit.by_points import fit_envelope, fit_period, fit_points, period_excess
+from pendpipe.analysis.fit.by_points import fit_envelope, fit_points
+from pendpipe.analysis.fit.period import fit_period, period_excess
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points

@@ -14,8 +14,9 @@ from scipy.special import ellipe, ellipk
 
 from pendpipe import cli
 from pendpipe.analysis.fit import fit_recording
-from pendpipe.analysis.fit.by_points import elliptic, fit_energies, start_of
+from pendpipe.analysis.fit.by_points import fit_energies, start_of
 from pendpipe.analysis.fit.least_squares import covariance
+from pendpipe.analysis.fit.period import elliptic
 from pendpipe.analysis.turning_points import TurningPoints, find_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, turning_points

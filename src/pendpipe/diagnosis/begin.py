@@ -7,8 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import held_values, start_of, swing_phase
+from pendpipe.analysis.fit.by_points import held_values, start_of
 from pendpipe.analysis.fit.by_waveform import start_values, usable_span
+from pendpipe.analysis.fit.period import swing_phase
 from pendpipe.analysis.fit.result import Baseline
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples

@@ -19,13 +19,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.fit.by_points import (
-    TOP,
-    Period,
     clear,
     envelope_and_period,
     held_values,
     loss_rates_of,
-    period_excess,
     share_of,
 )
 from pendpipe.analysis.fit.least_squares import (
@@ -36,6 +33,7 @@ from pendpipe.analysis.fit.least_squares import (
     intervals95,
     minimise,
 )
+from pendpipe.analysis.fit.period import TOP, Period, period_excess
 from pendpipe.analysis.fit.result import Baseline, FitResult, Restoring, misfit, result_of
 from pendpipe.analysis.noise import quantisation_rms, white_rms
 from pendpipe.analysis.turning_points import TurningPoints
