@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -104,6 +105,24 @@ def test_a_comb_of_missing_codes_is_no_coarser_step(period: int, code: FloatArra
     assert asked(readings, "coarse-quantisation").kind == "property"
 
 
+@pytest.mark.parametrize("stuck", [False, True])
+def test_codes_of_a_fine_step_are_asked_by_residue_alone(stuck: bool) -> None:
+    """Of tens of millions of codes for 4,000 readings none alone is expected once."""
+    step = STEP_16 / 2**14
+    noise = 30.0 * step * np.random.default_rng(73).normal(size=AIR.count)
+    code = np.round((AIR.model().reading(AIR.values()) + noise) / step)
+    record = fitted(AIR, step * (code + (stuck & (code % 64 == 3))))
+    samples = replace(record.samples, step=step, promised_step=None)
+    tracemalloc.start()
+    finding = TESTS["missing-codes"](record.data, record.fit, record.noise, samples)
+    peak_bytes = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert (finding.p_value < 1e-6) == stuck
+    if stuck:
+        assert finding.parameters["period"].value == 64
+    assert peak_bytes < 4000 * AIR.count
+
+
 def test_a_good_converters_codes_lie_on_its_own_lattice(code: FloatArray) -> None:
     record = fitted(AIR, STEP_16 * code)
     assert with_true_step(record.samples) is record.samples
@@ -113,7 +132,8 @@ def test_a_good_converters_codes_lie_on_its_own_lattice(code: FloatArray) -> Non
 def test_combs_that_chance_makes_are_as_rare_as_their_p_value() -> None:
     """Codes drawn at random from their expectation."""
     generator, seldom = np.random.default_rng(5), 0
-    due = np.pad(np.full((3, 398), 8000 / 398), ((0, 0), (1, 1)))
+    due = np.zeros((3, 512))
+    due[:, 2:398] = 8000 / 398
     for _ in range(200):
         codes = generator.integers(1, 399, 8000)
         codes[:2] = 1, 398

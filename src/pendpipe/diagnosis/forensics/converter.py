@@ -6,6 +6,7 @@ import math
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
+from scipy.fft import irfft, rfft
 from scipy.special import gammaincc, log_ndtr, ndtr, xlogy
 
 from pendpipe.analysis.turning_points.measure import Samples
@@ -226,11 +227,11 @@ def find_missing_codes(data: Data, fit: Fit, noise: Noise, samples: Samples) -> 
     missing, sd = expected - found, math.sqrt(max(expected, 1.0))
     parameters = {
         "share": Estimate(missing / readings, sd / readings, ""),
-        "number": Estimate(float(len(codes)), 0.0, ""),
+        "number": Estimate(float(comb.number), 0.0, ""),
         "found": Estimate(found, math.sqrt(max(found, 1.0)), ""),
         "expected": Estimate(expected, 0.0, ""),
     }
-    named = ", ".join(map(str, codes[:5])) + (", ..." if len(codes) > 5 else "")
+    named = ", ".join(map(str, codes[:5])) + (", ..." if comb.number > 5 else "")
     lead = ""
     if comb.period:
         parameters["period"] = Estimate(float(comb.period), 0.0, "")
@@ -244,38 +245,56 @@ def find_missing_codes(data: Data, fit: Fit, noise: Noise, samples: Samples) -> 
         comb.p_value,
         counts.gain,
         parameters,
-        Location(adc_codes=tuple(int(code) for code in codes[:_MOST_LISTED])),
-        summary=f"{lead}{len(codes)} code(s) ({named}, in steps of {coded.lattice.step:.4g}"
+        Location(adc_codes=tuple(int(code) for code in codes)),
+        summary=f"{lead}{comb.number} code(s) ({named}, in steps of {coded.lattice.step:.4g}"
         f"{after_number(data.unit)}) occurred {found:.0f} times where {expected:.0f} were expected",
     )
 
 
 def _expectations(coded: Coded) -> FloatArray:
-    """Return expected numbers of each code for shifted and unshifted angles, (3, codes)."""
-    first, last = int(coded.code.min()) - 1, int(coded.code.max()) + 1
+    """Return expected numbers of the codes between the outermost, for shifted and unshifted angles.
+
+    Each code has its own column where there is a reading a code on average. Of more codes none
+    alone is expected often enough, and all that are equal modulo the longest period share a column.
+
+    Returns
+    -------
+    ndarray
+        Shape (3, modulus): column j is of the codes that are j modulo `modulus`.
+    """
+    code, position, longest = coded.code, coded.position, 2**_MOST_BITS
+    first, last = int(code.min()), int(code.max())
     spread = max(math.hypot(coded.ratio, coded.blur), 0.02)
     shift = _COMMON_ERROR + 2.0 * coded.blur
-    size = last - first + 1
-    return np.stack(
-        [_expected(coded.position + move, first, size, spread) for move in (-shift, 0.0, shift)]
-    )
+    moves = (-shift, 0.0, shift)
+    if last - first > len(code):
+        inner = position[(code > first) & (code < last)]
+        return np.stack([_expected(inner + move, longest, spread) for move in moves])
+    # So wide that no angle is near both ends.
+    wide = last - first + 3 + 2 * math.ceil(5.0 * spread)
+    modulus = math.ceil(wide / longest) * longest
+    near = np.clip(position, first - 1.0, last + 1.0)
+    expected = np.stack([_expected(near + move, modulus, spread) for move in moves])
+    outside = np.arange(last, first + modulus + 1) % modulus
+    expected[:, outside] = 0.0
+    return expected
 
 
-def _expected(position: FloatArray, first: int, size: int, spread: float) -> FloatArray:
-    """Sum P(code) over readings, by a fine histogram of the angles."""
+def _expected(position: FloatArray, modulus: int, spread: float) -> FloatArray:
+    """Sum P(code) over readings by a fine histogram of the angles, for codes modulo `modulus`."""
     fine = 10 if spread < 1.0 else 4
-    cells = np.bincount(
-        np.clip(((position - first + 0.5) * fine).astype(np.int64), 0, size * fine - 1),
-        minlength=size * fine,
-    ).astype(np.float64)
+    size = modulus * fine
+    cells = np.bincount(np.floor((position + 0.5) * fine).astype(np.int64) % size, minlength=size)
+    # From one turn of the codes on, all are equally probable.
+    spread = min(spread, float(modulus))
     reach = (math.ceil(5.0 * spread + 0.5) + 1) * fine
     # Expectation of a code: its probability about its middle, summed over the cells.
-    offset = (np.arange(-reach, reach) + 0.5) / fine
-    kernel = ndtr((offset + 0.5) / spread) - ndtr((offset - 0.5) / spread)
-    length = 2 ** math.ceil(math.log2(len(cells) + 2 * reach))
-    smooth = np.fft.irfft(np.fft.rfft(cells, length) * np.fft.rfft(kernel, length), length)
-    start = reach + fine // 2 - 1
-    return np.asarray(np.maximum(smooth[start : start + size * fine : fine], 0.0))
+    cell = np.arange(-reach, reach)
+    offset = (cell + 0.5) / fine
+    chance = ndtr((offset + 0.5) / spread) - ndtr((offset - 0.5) / spread)
+    kernel = np.bincount((cell + 1 - fine // 2) % size, chance, size)
+    smooth = irfft(rfft(cells) * rfft(kernel), size)
+    return np.asarray(np.maximum(smooth[::fine], 0.0))
 
 
 class Comb(NamedTuple):
@@ -285,13 +304,16 @@ class Comb(NamedTuple):
     ----------
     period
         The power of two modulo which they are equal; 0 for single codes.
-    codes, counts
-        The codes, and how often those of each residue occur.
+    number, codes
+        How many they are, and the first of them.
+    counts
+        How often those of each residue occur.
     p_value
         With all periods, residues and codes that were tested.
     """
 
     period: int
+    number: int
     codes: IntArray
     counts: Counts
     p_value: float
@@ -309,23 +331,34 @@ def worst_comb(code: IntArray, expected: FloatArray) -> Comb:
     code
         Of each reading.
     expected
-        Expected number of each code from ``code.min() - 1`` on, a row for each common error of
-        the angles; shape (errors, codes), the middle row without error.
+        Expected number of the codes that are 0, 1, ... modulo its length, a row for each common
+        error of the angles; shape (errors, modulus), the middle row without error. The modulus
+        is a multiple of the longest period; single codes are asked if it is not below their number.
     """
-    codes, tried = np.arange(int(code.min()) + 1, int(code.max())), 0
-    inside = code[(code >= codes[0]) & (code <= codes[-1])]
-    periods = [2**bit for bit in range(1, _MOST_BITS + 1) if 2 ** (bit + 1) <= len(codes) + 2]
-    combs = []
-    for period in (*periods, len(codes)):
-        rows = [np.bincount(codes % period, row, period) for row in expected[:, 2:-2]]
-        counts = Counts.of(np.arange(period), inside % period, np.array(rows))
+    first, last, tried = int(code.min()) + 1, int(code.max()) - 1, 0
+    inside, modulus = code[(code >= first) & (code <= last)], expected.shape[1]
+    number = last - first + 1
+    periods = [2**bit for bit in range(1, _MOST_BITS + 1) if 2 ** (bit + 1) <= number + 2]
+    tables = []
+    for period in (*periods, *([modulus] if number <= modulus else [])):
+        rows = expected.reshape(len(expected), -1, period).sum(axis=1)
+        counts = Counts.of(np.arange(period), inside % period, rows)
         tried += int(np.count_nonzero(np.min(rows, axis=0) > _FEWEST_EXPECTED))
-        worst = float(counts.chance.min())
-        seldom = counts.chosen(counts.chance <= max(_SIGNIFICANT / period, worst))
-        members = codes[np.isin(codes % period, seldom.code)]
-        combs.append(Comb(period if period in periods else 0, members, seldom, worst))
-    best = min(combs, key=lambda comb: comb.p_value)
-    return best._replace(p_value=min(1.0, tried * best.p_value))
+        tables.append((period, counts, float(counts.chance.min())))
+    period, counts, worst = min(tables, key=lambda table: table[2])
+    seldom = counts.chosen(counts.chance <= max(_SIGNIFICANT / period, worst))
+    # The first code of each residue, and those a period apart from it.
+    start = first + (seldom.code - first) % period
+    start = start[start <= last]
+    many = int(np.sum((last - start) // period + 1))
+    codes = np.sort((start + period * np.arange(_MOST_LISTED)[:, None]).ravel())
+    return Comb(
+        period if period in periods else 0,
+        many,
+        codes[codes <= last][:_MOST_LISTED],
+        seldom,
+        min(1.0, tried * worst),
+    )
 
 
 def find_coarse_steps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
