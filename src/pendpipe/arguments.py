@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import argparse
 import hashlib
-import json
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from pendpipe.errors import InputError
-from pendpipe.files import finite, read_json
+from pendpipe.files import check_output, is_stream, json_text, read_json, writing
 from pendpipe.version import __version__
 
 if TYPE_CHECKING:
@@ -26,6 +26,15 @@ Flags = dict[str, dict[str, Any]]
 Arguments: TypeAlias = argparse.Namespace
 """What one call gave for them."""
 ALTERNATIVES: Final = "alternatives"
+INPUT: Final[dict[str, Any]] = {"file": "input"}
+OUTPUT: Final[dict[str, Any]] = {"file": "output"}
+OUTPUTS: Final[dict[str, Any]] = {"file": "outputs"}
+"""What an argument names: a file that is read; one that is written, and looked at before any work;
+a folder, or a file, that the command looks at itself. The last two give a command ``--force``."""
+_FORCE: Final = {
+    "action": "store_true",
+    "help": "replace files that pendpipe did not make (never an input, nor a raw file)",
+}
 
 
 def under(heading: str, arguments: Flags) -> Flags:
@@ -64,8 +73,10 @@ _OVERRIDES: Final[Flags] = {
 """Overrides of a reader's guesses, one a field of `pendpipe.formats.ReadOptions`."""
 _READING: Final = under("where a guess is wrong", _OVERRIDES)
 _A_RECORDING: Final = "a recording in any supported format; - is standard input"
-FILE: Final[Flags] = {"file": {"metavar": "FILE", "help": _A_RECORDING}} | _READING
-FILES: Final[Flags] = {"files": {"metavar": "FILE", "nargs": "+", "help": _A_RECORDING}} | _READING
+FILE: Final[Flags] = {"file": {"metavar": "FILE", "help": _A_RECORDING} | INPUT} | _READING
+FILES: Final[Flags] = {
+    "files": {"metavar": "FILE", "nargs": "+", "help": _A_RECORDING} | INPUT
+} | _READING
 """The argument of a command that reads a recording, or several, with the overrides."""
 
 SHARED: Final[Flags] = {
@@ -74,12 +85,14 @@ SHARED: Final[Flags] = {
         "type": Path,
         "metavar": "JSON",
         "help": "the sensor's, from pendpipe calibrate",
-    },
+    }
+    | INPUT,
     "--turning-points": {
         "type": Path,
         "metavar": "CSV",
         "help": "of an earlier stage, with their cuts",
-    },
+    }
+    | INPUT,
     "--baseline": {
         "choices": ("eq8", "viscous"),
         "default": "eq8",
@@ -92,18 +105,20 @@ SHARED: Final[Flags] = {
         "help": "hold a parameter, as for a prediction (a, b, c, frequency, amplitude, offset,"
         " quality_factor_hysteretic, quality_factor_viscous); repeatable",
     },
-    "--campaign": {"type": Path, "metavar": "CONFIG", "help": "a campaign's configuration"},
+    "--campaign": {"type": Path, "metavar": "CONFIG", "help": "a campaign's configuration"} | INPUT,
     "--comparison": {
         "type": Path,
         "metavar": "FILE",
         "help": "comparison.json, from pendpipe compare",
-    },
+    }
+    | INPUT,
     "--record": {"metavar": "NAME", "help": "the campaign's name for this record"},
     "--refused": {
         "type": Path,
         "metavar": "FILE",
         "help": "write here why the record can't be used, and end with 0, instead of ending with 2",
-    },
+    }
+    | OUTPUT,
 }
 """Arguments of more than one command."""
 
@@ -132,10 +147,12 @@ def number_within(low: float, high: float = math.inf) -> Callable[[str], float]:
 def declare(parser: argparse.ArgumentParser, arguments: Flags) -> None:
     """Declare a command's arguments, each by its name and the options of argparse.
 
-    One option is our own: the `heading` that it stands under in the help. Of those under
-    `ALTERNATIVES` a call gives one at most.
+    Two options are our own: the `heading` that it stands under in the help (of those under
+    `ALTERNATIVES` a call gives one at most), and the `file` that it names (`INPUT`, `OUTPUT`).
     """
     groups: dict[str | None, argparse._ActionsContainer] = {None: parser}
+    if any(options.get("file", "input") != "input" for options in arguments.values()):
+        arguments = arguments | {"--force": _FORCE}
     for name, options in arguments.items():
         heading = options.get("heading")
         if heading == ALTERNATIVES and heading not in groups:
@@ -143,8 +160,29 @@ def declare(parser: argparse.ArgumentParser, arguments: Flags) -> None:
         elif heading not in groups:
             groups[heading] = parser.add_argument_group(heading)
         groups[heading].add_argument(
-            name, **{key: value for key, value in options.items() if key != "heading"}
+            name,
+            **{key: value for key, value in options.items() if key not in ("heading", "file")},
         )
+
+
+@contextmanager
+def checked_outputs(arguments: Arguments, declared: Flags) -> Iterator[None]:
+    """Refuse outputs that are not to be replaced, before any work; guard those that are written.
+
+    Raises
+    ------
+    InputError
+        See `pendpipe.files.check_output`.
+    """
+    named: dict[str, list[str | Path]] = {"input": [], "output": [], "outputs": []}
+    for name, options in declared.items():
+        value = getattr(arguments, options.get("dest", name.lstrip("-").replace("-", "_")))
+        if "file" in options and value:
+            named[options["file"]] += value if isinstance(value, list) else [value]
+    with writing(inputs=named["input"], force=getattr(arguments, "force", False)):
+        for output in named["output"]:
+            check_output(output)
+        yield
 
 
 def read_options(arguments: Arguments) -> ReadOptions:
@@ -210,6 +248,11 @@ def tell(line: str) -> None:
     print(line, file=sys.stderr)
 
 
+def tell_written(out: str | Path, line: str) -> None:
+    """Say what was written: beside the data, where these go to standard output."""
+    print(f"{out}: {line}", file=sys.stderr if is_stream(out) else sys.stdout)
+
+
 def print_answer(arguments: Arguments, content: Any, text: str) -> None:
     """Print a command's answer: in words, or with ``--json`` as one object."""
     if arguments.json:
@@ -220,4 +263,4 @@ def print_answer(arguments: Arguments, content: Any, text: str) -> None:
 
 def print_json(content: Any) -> None:
     """Print one JSON object for programs; what is not finite is null."""
-    print(json.dumps(finite(content), indent=1, ensure_ascii=False))
+    print(json_text(content))

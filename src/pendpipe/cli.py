@@ -108,14 +108,15 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
             description=module.__doc__,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        if hasattr(module, "ARGUMENTS"):
+        declared = getattr(module, "ARGUMENTS", {})
+        if declared:
             from pendpipe.arguments import declare
 
-            declare(parser, module.ARGUMENTS)
+            declare(parser, declared)
         else:
             module.add_arguments(parser)
         arguments = parser.parse_args(argv[1:])
-        arguments.run = module.run
+        arguments.run, arguments.declared = module.run, declared
         return arguments
     # Looking for added commands takes longer than all the rest.
     descriptions = COMMANDS if list(argv) == ["--version"] else _descriptions()
@@ -135,8 +136,18 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("command", nargs="?", metavar="COMMAND", help="see below")
     arguments = parser.parse_args(argv)
     # Whoever gave no command sees where to begin.
-    arguments.run = lambda _: print(FIRST_STEPS)
+    arguments.run, arguments.declared = lambda _: print(FIRST_STEPS), {}
     return arguments
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    """Run the command, its outputs guarded."""
+    if not arguments.declared:
+        return int(arguments.run(arguments) or 0)
+    from pendpipe.arguments import checked_outputs
+
+    with checked_outputs(arguments, arguments.declared):
+        return int(arguments.run(arguments) or 0)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -154,7 +165,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     one_thread()
     try:
         arguments = _parse(sys.argv[1:] if argv is None else argv)
-        return int(arguments.run(arguments) or 0)
+        return _run(arguments)
     except InputError as fault:
         print(f"pendpipe: {fault}", file=sys.stderr)
         return 2

@@ -1,20 +1,135 @@
-"""Files that are either whole or absent: written beside their place, then moved into it."""
+"""Files that are whole or absent, and that replace nothing that is not ours to replace.
+
+Everything that is written passes `check_output`, the one place that decides. An input is never
+replaced, nor an instrument's raw file; what pendpipe did not make, only with ``--force``. What
+it makes says so inside (`MADE_BY`), and that is how it is known again.
+"""
 
 import errno
 import hashlib
 import json
 import math
+import os
 import re
 import secrets
+import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from contextvars import ContextVar
+from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import IO, Any, Final
 
 from pendpipe.errors import DamagedError, InputError, UnwritableError, refuse_if
+from pendpipe.version import __version__
 
 _NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG)
+MADE_BY: Final = f"pendpipe {__version__}"
+"""What stands in every file that can be made again."""
+MARK: Final = "made_by"
+"""Its key in JSON and in the head of a table."""
+RECORDED_BY: Final = "recorded_by"
+"""The key in a recording that an instrument has made: it is the user's own, as its raw file is."""
+_MARKS: Final = re.compile(
+    rb'\A(?:\xef\xbb\xbf)?\{\s*"made_by": ?"pendpipe '  # JSON
+    rb'|\A\{\n "schema_version": 1,\n "'  # JSON of the first versions
+    rb"|\A(?:\xef\xbb\xbf)?(?:# refused: |(?:#.*\r?\n)*# made_by: pendpipe )"  # a table
+    rb'|<meta name="generator" content="pendpipe '
+    rb"|<(?:dc:title|desc)>pendpipe\b"  # SVG
+    rb"|\A\x89PNG(?s:.){0,200}tEXtSoftware\0pendpipe"
+    rb"|\A%PDF(?s:.)*/(?:Creator|Producer) \(pendpipe"
+    rb"|\0made by pendpipe [^\0]*\0\Z"  # WinDaq: behind its last comment
+)
+_HEAD: Final = 1 << 13
+_RAW: Final = re.compile(rb'\A\{"format": "pendpipe-raw"')
+_OUT: Final = ("-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
+_STREAM: Final = re.compile(r"/dev/stderr|(/dev|/proc/self)/fd/\d+")
+
+
+@dataclass(frozen=True)
+class _Call:
+    """What one call reads, and whether it may replace files of others."""
+
+    inputs: tuple[str | Path, ...] = ()
+    force: bool = False
+
+
+_NOTHING: Final = _Call()
+_CALL: Final[ContextVar[_Call]] = ContextVar("_CALL", default=_NOTHING)
+
+
+@contextmanager
+def writing(*, inputs: Iterable[str | Path] = (), force: bool = False) -> Iterator[None]:
+    """Name what a call reads, for as long as it writes.
+
+    Parameters
+    ----------
+    inputs
+        Files that no output may be, beside those of an outer call; ``-`` is standard input.
+    force
+        Replace files that pendpipe did not make.
+    """
+    outer = _CALL.get()
+    token = _CALL.set(_Call((*outer.inputs, *inputs), outer.force or force))
+    try:
+        yield
+    finally:
+        _CALL.reset(token)
+
+
+def check_output(path: str | Path) -> None:
+    """Refuse an output that is not ours to replace.
+
+    Streams, devices and pipes are no files, and nothing of them is lost. An empty file may be
+    replaced as well.
+
+    Raises
+    ------
+    InputError
+        If it is one of the inputs by any name or link, the raw file of an instrument, or,
+        without ``--force``, a file that pendpipe did not make.
+    """
+    call, target = _CALL.get(), Path(path)
+    if is_stream(path) or not target.is_file():
+        return
+    refuse_if(
+        any(_same_file(target, given) for given in call.inputs),
+        target,
+        "this output is one of the inputs",
+        "name another file",
+    )
+    with target.open("rb") as stream:
+        head = stream.read(_HEAD)
+        stream.seek(-min(64, target.stat().st_size), 2)
+        tail = stream.read()
+    refuse_if(
+        _RAW.search(head),
+        target,
+        "it holds the raw bytes of an instrument, which nothing replaces",
+        "name another file",
+    )
+    ours = _MARKS.search(head) or _MARKS.search(tail)
+    refuse_if(
+        head and not ours and not call.force,
+        target,
+        "pendpipe did not make this file",
+        "name another one, or add --force to replace it",
+    )
+
+
+def is_stream(path: str | Path) -> bool:
+    """Whether a name stands for a stream: ``-`` and ``/dev/stdout`` are no files."""
+    return str(path) in _OUT or _STREAM.fullmatch(str(path)) is not None
+
+
+def _same_file(target: Path, given: str | Path) -> bool:
+    """Whether two names mean the same file."""
+    try:
+        status = os.fstat(0) if str(given) in ("-", "/dev/stdin") else Path(given).stat()
+    except (OSError, ValueError):
+        return False
+    return os.path.samestat(status, target.stat())
 
 
 @contextmanager
@@ -31,15 +146,20 @@ def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
     Raises
     ------
     InputError
-        Where no file can be written: no folder, no right to it, a folder of that name, or
-        no room on the disk.
+        Where no file can be written: no folder, no right to it, a folder of that name, no
+        room on the disk, or a file that is not ours to replace (`check_output`).
     """
+    if str(path) in _OUT:
+        with nullcontext(sys.stdout.buffer if "b" in mode else sys.stdout) as stream:
+            yield stream
+        return
     target = Path(path)
     make_folder(target.parent)
     text = {} if "b" in mode else {"encoding": "utf-8", "newline": "\n"}
     try:
         refuse_if(target.is_dir(), target, "this is a folder", "name a file in it")
-        if target.exists() and not target.is_file():
+        check_output(target)
+        if is_stream(target) or (target.exists() and not target.is_file()):
             # A device or a pipe is written to: it is not for us to replace it.
             with target.open(mode, **text) as stream:  # type: ignore[call-overload]
                 yield stream
@@ -115,10 +235,15 @@ def write_whole(path: str | Path, content: str | bytes) -> None:
         stream.write(content)
 
 
+def json_text(content: Mapping[str, Any]) -> str:
+    """Return `content` as indented JSON that says who made it; what is not finite is null."""
+    marked = {MARK: MADE_BY, **finite(content)}
+    return json.dumps(marked, indent=1, ensure_ascii=False, allow_nan=False)
+
+
 def write_json(path: str | Path, content: Mapping[str, Any]) -> None:
     """Write `content` as indented JSON; a number without a finite value becomes null."""
-    text = json.dumps(finite(content), indent=1, ensure_ascii=False, allow_nan=False)
-    write_whole(path, text + "\n")
+    write_whole(path, json_text(content) + "\n")
 
 
 def read_json(path: str | Path) -> Any:
@@ -133,7 +258,7 @@ def read_json(path: str | Path) -> Any:
     """
     place = Path(path)
     try:
-        return json.loads(place.read_bytes())
+        content = json.loads(place.read_bytes())
     except FileNotFoundError:
         raise InputError(place, "there is no such file", "run the stage that makes it") from None
     except OSError as fault:
@@ -141,6 +266,9 @@ def read_json(path: str | Path) -> Any:
     except (ValueError, RecursionError) as fault:
         problem = f"this is no JSON ({fault})" if place.stat().st_size else "it is empty"
         raise DamagedError(place, problem, "delete it and run again") from None
+    if isinstance(content, dict):
+        content.pop(MARK, None)
+    return content
 
 
 def read_text(path: str | Path, remedy: str, *, absent: str = "file", form: str = "a table") -> str:

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from pendpipe.errors import DamagedError, InputError
-from pendpipe.files import digest, read_json, sha256, write_json
+from pendpipe.files import digest, read_json, sha256, write_json, writing
 from pendpipe.version import __version__
 
 FOLDER: Final = "manifest"
@@ -246,15 +246,18 @@ def job(
         If an input is not what its stage wrote, or was made from other files than those
         that are there now.
     """
+    inputs, sources = tuple(inputs), tuple(sources)
     checked = check(inputs)
     if outputs and not outputs[0].absolute().is_relative_to(home.absolute()):
-        yield Job()
+        with writing(inputs=(*inputs, *sources)):
+            yield Job()
         return
     repaired = read_manifest(home, stage).repaired
     # Until the stage has ended its old results are nobody's.
     Manifest(home, stage, repaired=repaired).write()
     running = Job(list(outputs))
-    yield running
+    with writing(inputs=(*inputs, *sources)):
+        yield running
     Manifest(
         home,
         stage,

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from pendpipe.arrays import AnyArray, BoolArray, ByteArray, FloatArray
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.files import read_text, replaced
+from pendpipe.files import MADE_BY, MARK, RECORDED_BY, read_text, replaced
 
 Quantity = Literal["angle_rad", "volts", "displacement_m", "reading"]
 QUANTITIES: Final = ("angle_rad", "volts", "displacement_m", "reading")
@@ -303,17 +303,18 @@ def _column(name: str, values: ArrayLike) -> FloatArray:
 
 
 def table_lines(
-    told: Iterable[tuple[str, object]], columns: Mapping[str, AnyArray]
+    told: Iterable[tuple[str, object]], columns: Mapping[str, AnyArray], *, made: str = MARK
 ) -> Iterator[str]:
-    """Give the lines of a table of ours: what is told of it, its header, and rows, all digits."""
+    """Give the lines of a table of ours: who made it, what is told of it, header and rows."""
+    yield f"# {made}: {MADE_BY}\n"
     yield from (f"# {key}: {' '.join(str(value).split())}\n" for key, value in told)
     yield ",".join(columns) + "\n"
     for row in zip(*(map(repr, values.tolist()) for values in columns.values()), strict=True):
         yield ",".join(row) + "\n"
 
 
-def plain_lines(recording: Recording) -> Iterator[str]:
-    """Give the lines of the plain CSV form."""
+def plain_lines(recording: Recording, *, original: bool = False) -> Iterator[str]:
+    """Give the lines of the plain CSV form; an `original` comes from an instrument."""
     columns = {
         "time_s": recording.time_s,
         recording.quantity: recording.values,
@@ -323,13 +324,16 @@ def plain_lines(recording: Recording) -> Iterator[str]:
     there = {name: values for name, values in columns.items() if values is not None}
     guesses = enumerate(recording.weak_guesses, start=1)
     told = [*recording.metadata.items(), *((f"{_WEAK}{number}", said) for number, said in guesses)]
-    return table_lines(told, there)
+    return table_lines(told, there, made=RECORDED_BY if original else MARK)
 
 
-def write_plain(path: str | Path, recording: Recording) -> None:
-    """Write the plain CSV form: metadata lines, header, a row a sample, all digits."""
+def write_plain(path: str | Path, recording: Recording, *, original: bool = False) -> None:
+    """Write the plain CSV form: metadata lines, header, a row a sample, all digits.
+
+    An `original`, the recording of an instrument, is the user's own from then on.
+    """
     with replaced(path) as stream:
-        stream.writelines(plain_lines(recording))
+        stream.writelines(plain_lines(recording, original=original))
 
 
 def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
@@ -362,6 +366,8 @@ def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
     refuse_if(first == len(lines), place, "the file is empty", "record again, or give another file")
     told = (line.lstrip("# ").partition(":") for line in above)
     metadata = {key.strip(): value.strip() for key, _, value in told if value}
+    for key in (MARK, RECORDED_BY):
+        metadata.pop(key, None)
     names = [name.strip() for name in lines[first].split(",")]
     quantity, picked = _columns(place, first + 1, names)
     table = _numbers(place, lines, first + 1, [*picked.values()], len(names))

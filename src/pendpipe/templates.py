@@ -4,6 +4,8 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from pendpipe.files import MADE_BY
+
 
 def render(package: str, name: str, **content: Any) -> str:
     """Fill a template of ``<package>/templates``; what goes into HTML is escaped.
@@ -25,4 +27,4 @@ def render(package: str, name: str, **content: Any) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=not name.endswith(".html"),
     )
-    return environment.get_template(name).render(**content)
+    return environment.get_template(name).render(made_by=MADE_BY, **content)

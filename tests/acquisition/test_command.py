@@ -105,7 +105,7 @@ def test_a_second_call_records_beside_the_first(tmp_path: Path) -> None:
     assert main([*QUICK.split(), str(out)]) == 0
     first = raw_files(tmp_path)
     assert list(first) == ["decay.raw"]
-    assert main([*QUICK.split(), str(out)]) == 0
+    assert main([*QUICK.split(), str(out), "--force"]) == 0
     both = raw_files(tmp_path)
     assert first.items() < both.items()
     assert len(both) == 2
@@ -133,7 +133,7 @@ def test_a_csv_that_could_not_be_written_is_made_at_the_next_call(
 ) -> None:
     out = tmp_path / "decay.csv"
 
-    def full(*_: object) -> None:
+    def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:

@@ -15,11 +15,11 @@ from pendpipe.files import read_json, replaced, write_json
 
 def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
     path = tmp_path / "result.csv"
-    path.write_text("old")
+    path.write_text("# made_by: pendpipe 0\n")
     with pytest.raises(RuntimeError), replaced(path) as stream:
         stream.write("half")
         raise RuntimeError
-    assert path.read_text() == "old"
+    assert path.read_text() == "# made_by: pendpipe 0\n"
     assert list(tmp_path.iterdir()) == [path]
 
 

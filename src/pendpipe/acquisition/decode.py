@@ -37,6 +37,7 @@ from pendpipe.acquisition.raw import (
 from pendpipe.acquisition.slips import Cut, find_slips
 from pendpipe.arrays import AnyArray, ByteArray, FloatArray, IntArray
 from pendpipe.errors import InputError, refuse_if
+from pendpipe.files import is_stream
 from pendpipe.recording import GOOD, MISSING, SUSPECT, Recording
 
 _NUMBERS: Final[Mapping[str, tuple[float, float]]] = {
@@ -676,7 +677,8 @@ def new_path_beside(out: Path) -> Path:
 
 
 def _file_of(out: Path) -> Path:
-    return Path("recording.csv") if out.exists() and not out.is_file() else out
+    no_file = is_stream(out) or (out.exists() and not out.is_file())
+    return Path("recording.csv") if no_file else out
 
 
 def paths_beside(out: Path) -> list[Path]:

@@ -18,14 +18,26 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Final
 
-from pendpipe.arguments import ALTERNATIVES, Arguments, Flags, load, number_within, shared, under
+from pendpipe.arguments import (
+    ALTERNATIVES,
+    INPUT,
+    OUTPUTS,
+    Arguments,
+    Flags,
+    load,
+    number_within,
+    shared,
+    tell_written,
+    under,
+)
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.files import check_writable
+from pendpipe.files import check_output, check_writable, is_stream
 
 _SOURCES: Final[Flags] = {
     "--port": {"help": "serial port of a real instrument: /dev/ttyUSB0, COM3"},
     "--device": {"metavar": "simulated:MODEL", "help": "a simulated instrument"},
-    "--recover": {"metavar": "RAW", "help": "decode a raw file, for instance after a crash"},
+    "--recover": {"metavar": "RAW", "help": "decode a raw file, for instance after a crash"}
+    | INPUT,
     "--serve": {
         "metavar": "MODEL",
         "help": "simulate an instrument for other programs: di2108, ...",
@@ -49,7 +61,7 @@ _OWN: Final[Flags] = {
         "metavar": "S",
         "help": "how long a device that was unplugged is waited for (30)",
     },
-    "--out": {"metavar": "FILE", "help": "the recording; FILE.wdh for WinDaq"},
+    "--out": {"metavar": "FILE", "help": "the recording; FILE.wdh for WinDaq"} | OUTPUTS,
     "--raw": {
         "metavar": "FILE",
         "help": "a new file for the bytes off the wire (FILE.raw, FILE.<time stamp>.raw)",
@@ -68,7 +80,8 @@ _OWN: Final[Flags] = {
     "--signal": {
         "metavar": "TOML",
         "help": "with --serve: what it reads, as for pendpipe simulate",
-    },
+    }
+    | INPUT,
     "--link": {"choices": ("pty", "socket"), "help": "with --serve: on which line"},
 }
 _OF_A_STAGE: Final[Flags] = shared("--campaign", "--record", "--refused") | {
@@ -128,7 +141,8 @@ def _record(arguments: Arguments) -> None:
     check_name(out)
     # Before anything is recorded: a place where no recording can be written.
     refuse_if(out.is_dir(), out, "this is a folder", "name a file in it")
-    if out.is_file() or not out.exists():  # else it is a device or a pipe
+    check_output(out)
+    if not is_stream(out) and (out.is_file() or not out.exists()):  # else a device or a pipe
         check_writable(out.parent)
     if arguments.samples is not None:
         arguments.duration = arguments.samples / max(arguments.rate, 1e-9)
@@ -149,13 +163,13 @@ def _record(arguments: Arguments) -> None:
         _from_device(arguments, raw)
     recording = decode.decode_attempt(raw, out.parent, arguments.channel)
     with decode.kept_in(raw, out):
-        lost = write(out, recording)
+        lost = write(out, recording, original=True)
     if not arguments.recover:
         decode.mark_saved(raw, out)
     for note in (*recording.notes, *lost):
         print(f"pendpipe: {out}: {note}", file=sys.stderr)
     rate = recording.metadata["sample_rate_hz"]
-    print(f"{out}: {len(recording)} samples at {float(rate):.6g} Hz (raw bytes: {raw})")
+    tell_written(out, f"{len(recording)} samples at {float(rate):.6g} Hz (raw bytes: {raw})")
 
 
 def _caliper(arguments: Arguments) -> None:

@@ -14,15 +14,24 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe import manifest
-from pendpipe.arguments import SHARED, Arguments, Flags, print_answer, shared, under
+from pendpipe.arguments import (
+    INPUT,
+    OUTPUT,
+    SHARED,
+    Arguments,
+    Flags,
+    print_answer,
+    shared,
+    under,
+)
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.files import read_json, write_json
+from pendpipe.files import is_stream, read_json, write_json
 from pendpipe.recording import Recording, read_plain
 from pendpipe.stages.refusal import run_stage
 
 _OWN: Final[Flags] = {
-    "file": {"metavar": "FILE", "type": Path, "help": "table of volts against angles"},
-    "--out": {"type": Path, "metavar": "JSON", "help": "write the result here"},
+    "file": {"metavar": "FILE", "type": Path, "help": "table of volts against angles"} | INPUT,
+    "--out": {"type": Path, "metavar": "JSON", "help": "write the result here"} | OUTPUT,
     "--json": SHARED["--json"],
     "--arm-m": {"type": float, "metavar": "M", "help": "arm of the displacements, metres"},
     "--arm-sd-m": {"type": float, "default": 0.0, "metavar": "M", "help": "its standard deviation"},
@@ -36,7 +45,7 @@ _OWN: Final[Flags] = {
     "--decimal": {"choices": ".,", "help": "decimal mark; guessed from the delimiter"},
 }
 _OF_A_RECORD: Final = shared("--record", "--refused") | {
-    "--sensor": {"type": Path, "metavar": "JSON", "help": "the campaign's calibration"},
+    "--sensor": {"type": Path, "metavar": "JSON", "help": "the campaign's calibration"} | INPUT,
     "--volts-per-radian": {"type": float, "metavar": "V/RAD", "help": "a known constant"},
 }
 ARGUMENTS: Final = _OWN | under("with --record", _OF_A_RECORD)
@@ -76,7 +85,8 @@ def _sensor(arguments: Arguments) -> None:
         decimal=arguments.decimal,
     )
     calibration = calibrate(**table)
-    print_answer(arguments, calibration.as_json(), str(calibration))
+    if not (arguments.out and is_stream(arguments.out)):
+        print_answer(arguments, calibration.as_json(), str(calibration))
     if arguments.out:
         write_json(arguments.out, calibration.as_json())
 

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import FILE, Arguments, announce, read_options
+from pendpipe.arguments import FILE, OUTPUT, Arguments, announce, read_options, tell_written
 
 ARGUMENTS: Final = FILE | {
     "out": {
@@ -12,6 +12,7 @@ ARGUMENTS: Final = FILE | {
         "type": Path,
         "help": "OUT.csv: the plain form (- writes it to standard output); OUT.wdh: WinDaq HiRes",
     }
+    | OUTPUT
 }
 
 
@@ -19,16 +20,10 @@ def run(arguments: Arguments) -> None:
     """Read, say what was guessed, and write."""
     from pendpipe.formats import read
     from pendpipe.formats.writing import check_name, write
-    from pendpipe.recording import plain_lines
 
-    piped = str(arguments.out) == "-"
-    if not piped:
-        check_name(arguments.out)
+    check_name(arguments.out)
     recording = read(arguments.file, read_options(arguments))
     announce(arguments, recording)
-    if piped:
-        sys.stdout.writelines(plain_lines(recording))
-        return
     for note in write(arguments.out, recording):
         print(f"{arguments.out}: {note}", file=sys.stderr)
-    print(f"{arguments.out}: {len(recording)} samples, {recording.quantity}")
+    tell_written(arguments.out, f"{len(recording)} samples, {recording.quantity}")

@@ -17,6 +17,7 @@ from pendpipe.analysis.fit.by_points import parse_fixed
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import (
     FILES,
+    OUTPUTS,
     Arguments,
     Flags,
     number_within,
@@ -30,7 +31,7 @@ from pendpipe.diagnosis.result import FILE_NAME, not_analysable
 from pendpipe.diagnosis.run import Outcome, diagnose_decay, diagnose_recording
 from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
-from pendpipe.files import distinct_names, make_folder, write_json, write_whole
+from pendpipe.files import check_output, distinct_names, make_folder, write_json, write_whole
 from pendpipe.manifest import check, job
 from pendpipe.process import keep_memory
 from pendpipe.recording import Recording
@@ -39,13 +40,15 @@ from pendpipe.stages.refusal import reason_of, within_results
 FOUND = 3
 """Exit status where ``--fail-on`` asks for it."""
 _EMPTY: Final = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 520 60">
+<desc>pendpipe</desc>
 <text x="260" y="34" text-anchor="middle" font-family="sans-serif" font-size="13" fill="#5F6670">\
 {}</text></svg>
 """
 
 
 _OWN: Final[Flags] = {
-    "--out": {"type": Path, "metavar": "DIR", "help": "write diagnosis.json and the figures there"},
+    "--out": {"type": Path, "metavar": "DIR", "help": "write diagnosis.json and the figures there"}
+    | OUTPUTS,
     "--level": {
         "type": number_within(0, 1),
         "default": 0.01,
@@ -96,6 +99,9 @@ ARGUMENTS: Final = (
 def run(arguments: Arguments) -> int:
     """Diagnose, write the result, and print the answer."""
     keep_memory()
+    if arguments.out is not None:
+        for path in (arguments.out / FILE_NAME, *_figures_in(arguments.out)):
+            check_output(path)
     if len(arguments.files) > 1:
         return _diagnose_several(arguments)
     arguments.file, given = arguments.files[0], arguments.calibration
@@ -233,8 +239,14 @@ def _write(arguments: Arguments, outcome: Outcome) -> dict[str, Any]:
 
 def _remove_figures(folder: Path) -> None:
     """Remove the figures of an earlier diagnosis."""
-    for name, form in product((*OF_EVERY_DIAGNOSIS, *OF_SOME_DIAGNOSES), (".svg", ".png")):
-        folder.joinpath(name).with_suffix(form).unlink(missing_ok=True)
+    for path in _figures_in(folder):
+        path.unlink(missing_ok=True)
+
+
+def _figures_in(folder: Path) -> list[Path]:
+    """The places of all figures that a diagnosis may have."""
+    names = product((*OF_EVERY_DIAGNOSIS, *OF_SOME_DIAGNOSES), (".svg", ".png"))
+    return [folder / f"{name}{form}" for name, form in names]
 
 
 def _write_placeholders(arguments: Arguments, reason: str) -> None:

@@ -7,7 +7,7 @@ each of figures 3 to 10 is written all the same, with the reason in its place.
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import Arguments, shared, tell
+from pendpipe.arguments import OUTPUTS, Arguments, shared, tell
 from pendpipe.files import write_json
 from pendpipe.manifest import job
 
@@ -17,7 +17,8 @@ ARGUMENTS: Final = shared("--campaign", "--comparison", required=True) | {
         "type": Path,
         "metavar": "FOLDER",
         "help": "where figures 3 to 10 go; a record's figures go to RESULTS/<record>/figures",
-    },
+    }
+    | OUTPUTS,
     "--processes": {
         "type": int,
         "default": 1,

@@ -21,6 +21,7 @@ from pendpipe.analysis.fit.result import FitResult, gravity_line, lines, row, ta
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import (
     FILES,
+    OUTPUT,
     Arguments,
     Flags,
     number_within,
@@ -31,15 +32,16 @@ from pendpipe.arguments import (
     tell,
 )
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.files import write_json
+from pendpipe.files import is_stream, write_json
 
 _OWN: Final[Flags] = {
-    "--out": {"metavar": "JSON", "help": "the result; - is standard output"},
+    "--out": {"metavar": "JSON", "help": "the result; - is standard output"} | OUTPUT,
     "--figure": {
         "type": Path,
         "metavar": "FILE",
         "help": "draw the decay with its fit, the residual, and Q against amplitude (.svg, .png)",
-    },
+    }
+    | OUTPUT,
     "--length": {
         "type": number_within(0),
         "metavar": "M",
@@ -90,13 +92,15 @@ def run(arguments: Arguments) -> int:
     if result.light == "red":
         why = result.light_reason if arguments.json else "no law is printed"
         tell(f"pendpipe: {arguments.file}: {why} (--accept prints it)")
-    if arguments.out and arguments.out != "-":
+    if arguments.out:
         _write(arguments, result)
     if figure:
         from pendpipe.figures.style import save
 
         save(result.plot(), figure.with_suffix(""), forms=[figure.suffix[1:]])
-    if arguments.json or arguments.out == "-":
+    if arguments.out and is_stream(arguments.out):
+        return _status(arguments, result)
+    if arguments.json:
         print_json(result.to_dict())
     else:
         _print(arguments, result)
@@ -144,7 +148,7 @@ def _fit(arguments: Arguments) -> FitResult:
 
 
 def _write(arguments: Arguments, result: FitResult) -> None:
-    write_json(Path(arguments.out), result.to_dict())
+    write_json(arguments.out, result.to_dict())
     for warning in result.warnings:
         tell(f"{arguments.file}: {warning}")
 

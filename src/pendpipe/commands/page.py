@@ -6,12 +6,12 @@ The page is a single HTML file that needs no network.
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import FILE, Arguments, read_motion, shared, tell
+from pendpipe.arguments import FILE, OUTPUT, Arguments, read_motion, shared, tell
 
 ARGUMENTS: Final = (
     FILE
     | {
-        "--out": {"metavar": "HTML", "help": "the page (FILE.html); - is standard output"},
+        "--out": {"metavar": "HTML", "help": "the page (FILE.html); - is standard output"} | OUTPUT,
         "--no-diagnosis": {"action": "store_true", "help": "the fit alone, in a second"},
     }
     | shared("--calibration")
@@ -23,11 +23,13 @@ def run(arguments: Arguments) -> None:
     from dataclasses import replace
 
     from pendpipe import api
-    from pendpipe.files import write_whole
+    from pendpipe.files import check_output, write_whole
     from pendpipe.report.page import render_recording
 
-    recording, provenance = read_motion(arguments)
     name = "standard input" if arguments.file == "-" else Path(arguments.file).name
+    out = arguments.out or Path(name).with_suffix(".html")
+    check_output(out)
+    recording, provenance = read_motion(arguments)
     result = replace(api.fit(recording, name=arguments.file), provenance=provenance)
     statement = None
     if not arguments.no_diagnosis:
@@ -35,9 +37,5 @@ def run(arguments: Arguments) -> None:
 
         statement = diagnose_recording(recording, place=arguments.file).diagnosis.statement
     page = render_recording(name, recording, result, statement)
-    if arguments.out == "-":
-        print(page)
-        return
-    out = Path(arguments.out) if arguments.out else Path(name).with_suffix(".html")
     write_whole(out, page)
     tell(f"{out}: written")

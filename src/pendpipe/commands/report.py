@@ -8,7 +8,7 @@ campaign's numbers go to standard output too, beside the paper's and the simulat
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import Arguments, shared, tell
+from pendpipe.arguments import INPUT, OUTPUT, Arguments, shared, tell
 
 ARGUMENTS: Final = shared("--campaign", "--comparison", required=True) | {
     "--summary": {
@@ -16,7 +16,8 @@ ARGUMENTS: Final = shared("--campaign", "--comparison", required=True) | {
         "type": Path,
         "metavar": "FILE",
         "help": "campaign.json, from pendpipe compare; it can be saved from the page",
-    },
+    }
+    | INPUT,
     "--figures": {
         "type": Path,
         "metavar": "FOLDER",
@@ -27,7 +28,7 @@ ARGUMENTS: Final = shared("--campaign", "--comparison", required=True) | {
         "metavar": "FOLDER",
         "help": "scores of a challenge, if there is one, from pendpipe challenge score",
     },
-    "--out": {"required": True, "type": Path, "metavar": "PAGE.html", "help": "the page"},
+    "--out": {"required": True, "type": Path, "metavar": "PAGE.html", "help": "the page"} | OUTPUT,
 }
 
 

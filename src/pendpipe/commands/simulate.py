@@ -8,11 +8,11 @@ with every key.
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import Arguments, Flags
+from pendpipe.arguments import INPUT, OUTPUT, Arguments, Flags, tell_written
 
 ARGUMENTS: Final[Flags] = {
-    "model": {"metavar": "MODEL.toml", "help": "what to simulate"},
-    "out": {"metavar": "OUT.csv", "type": Path, "help": "the recording, plain form"},
+    "model": {"metavar": "MODEL.toml", "help": "what to simulate"} | INPUT,
+    "out": {"metavar": "OUT.csv", "type": Path, "help": "the recording, plain form"} | OUTPUT,
     "--seed": {"type": int, "help": "seed of the noise, instead of the model's"},
 }
 
@@ -24,4 +24,4 @@ def run(arguments: Arguments) -> None:
 
     recording = api.simulate(arguments.model, seed=arguments.seed)
     write_plain(arguments.out, recording)
-    print(f"{arguments.out}: {len(recording)} samples in {recording.unit}")
+    tell_written(arguments.out, f"{len(recording)} samples in {recording.unit}")

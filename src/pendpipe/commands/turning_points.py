@@ -10,13 +10,21 @@ from typing import Final
 
 from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.analysis.turning_points import write_turning_points
-from pendpipe.arguments import FILE, Arguments, read_motion, shared, tell
+from pendpipe.arguments import (
+    FILE,
+    OUTPUT,
+    Arguments,
+    read_motion,
+    shared,
+    tell,
+    tell_written,
+)
 from pendpipe.quantities import after_number
 from pendpipe.stages.refusal import run_stage
 
 ARGUMENTS: Final = (
     FILE
-    | {"--out": {"type": Path, "required": True, "metavar": "CSV", "help": "the table"}}
+    | {"--out": {"type": Path, "required": True, "metavar": "CSV", "help": "the table"} | OUTPUT}
     | shared("--calibration", "--record", "--refused")
 )
 
@@ -39,7 +47,8 @@ def _measure(arguments: Arguments) -> None:
     write_turning_points(arguments.out, points)
     for note in points.notes:
         tell(f"{arguments.file}: {note}")
-    print(
-        f"{arguments.out}: {len(points)} turning points, {points.apparent_frequency_hz:.6g} Hz,"
-        f" {abs(points.angle_rad[0]):.4g}{after_number(points.unit)} at first"
+    tell_written(
+        arguments.out,
+        f"{len(points)} turning points, {points.apparent_frequency_hz:.6g} Hz,"
+        f" {abs(points.angle_rad[0]):.4g}{after_number(points.unit)} at first",
     )

@@ -106,7 +106,9 @@ class Outcome(Answer):
     search: Search
     beginning: Beginning
 
-    def save(self, folder: str | Path, *, figures: bool = True) -> dict[str, Any]:
+    def save(
+        self, folder: str | Path, *, figures: bool = True, force: bool = False
+    ) -> dict[str, Any]:
         """Write ``diagnosis.json`` and the figures.
 
         Parameters
@@ -115,6 +117,8 @@ class Outcome(Answer):
             Made if it is not there.
         figures
             Whether to draw them.
+        force
+            Replace files of these names that pendpipe did not make.
 
         Returns
         -------
@@ -124,18 +128,19 @@ class Outcome(Answer):
         Raises
         ------
         InputError
-            If the folder can't be written.
+            If the folder can't be written, or holds a file that pendpipe did not make.
         """
-        from pendpipe.files import write_json
+        from pendpipe.files import write_json, writing
 
         target, diagnosis = Path(folder), self.diagnosis
-        if figures:
-            from pendpipe.figures.diagnosis import draw_diagnosis
+        with writing(force=force):
+            if figures:
+                from pendpipe.figures.diagnosis import draw_diagnosis
 
-            drawn = draw_diagnosis(self, target)
-            diagnosis = replace(diagnosis, figures=tuple(path.name for path in drawn))
-        content = diagnosis.to_dict()
-        write_json(target / FILE_NAME, content)
+                drawn = draw_diagnosis(self, target)
+                diagnosis = replace(diagnosis, figures=tuple(path.name for path in drawn))
+            content = diagnosis.to_dict()
+            write_json(target / FILE_NAME, content)
         return content
 
     def plot(self) -> Figure:

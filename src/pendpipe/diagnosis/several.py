@@ -57,7 +57,7 @@ from pendpipe.effects.model import Model, jacobian
 from pendpipe.effects.stack import MAY_DIFFER, Differs, Stack
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.estimate import Z95, Estimate
-from pendpipe.files import write_json
+from pendpipe.files import write_json, writing
 from pendpipe.quantities import compact
 from pendpipe.recording import Recording
 
@@ -89,10 +89,14 @@ class JointOutcome(Answer):
         """Return the content of ``diagnosis.json``."""
         return {**super().to_dict(), "recordings": self.recordings}
 
-    def save(self, folder: str | Path) -> dict[str, Any]:
-        """Write ``diagnosis.json`` into a folder, which is made if it is not there."""
+    def save(self, folder: str | Path, *, force: bool = False) -> dict[str, Any]:
+        """Write ``diagnosis.json`` into a folder, which is made if it is not there.
+
+        One that pendpipe did not make is replaced only with `force`.
+        """
         content = self.to_dict()
-        write_json(Path(folder) / FILE_NAME, content)
+        with writing(force=force):
+            write_json(Path(folder) / FILE_NAME, content)
         return content
 
 

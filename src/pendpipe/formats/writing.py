@@ -11,7 +11,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import refuse_if
-from pendpipe.files import replaced
+from pendpipe.files import MADE_BY, replaced
 from pendpipe.formats.reading import markers_of
 from pendpipe.formats.windaq import MOST_SAMPLES, Channel, Event, gap_comment, pack
 from pendpipe.recording import SUSPECT, Recording, write_plain
@@ -107,8 +107,10 @@ def check_name(path: str | Path) -> None:
     )
 
 
-def write(path: str | Path, recording: Recording) -> tuple[str, ...]:
+def write(path: str | Path, recording: Recording, *, original: bool = False) -> tuple[str, ...]:
     """Write a recording in the form that the file's name asks for: ``.wdh``, or plain.
+
+    An `original` comes from an instrument: it is the user's own from then on.
 
     Returns
     -------
@@ -122,11 +124,12 @@ def write(path: str | Path, recording: Recording) -> tuple[str, ...]:
     """
     check_name(path)
     if Path(path).suffix.lower() != ".wdh":
-        write_plain(path, recording)
+        write_plain(path, recording, original=original)
         return ()
     content, notes = windaq_hires(path, recording)
     with replaced(path, "wb") as stream:
-        stream.write(content)
+        # Behind the last comment, where WinDaq reads nothing.
+        stream.write(content if original else content + f"\0made by {MADE_BY}\0".encode())
     return notes
 
 

@@ -2,6 +2,7 @@
 
 import sys
 from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.files import replaced, write_whole
+from pendpipe.files import MADE_BY, MARK, replaced, write_whole, writing
 from pendpipe.manifest import SET_ASIDE
 from pendpipe.recording import Recording, read_plain, write_plain
 
@@ -120,15 +121,30 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool) -> None:
         attempts = read_attempts(folder.glob("*.raw"))
     used = choose(attempts)
     recording = decode_attempt(used.path, out.parent, channel)
-    with kept_in(used.path, out):
-        write_plain(out, recording)
-    kept = f", {len(attempts) - 1} more kept beside it" if len(attempts) > 1 else ""
+    # What was made from one of the raw files can be made from it again.
+    kept = {str(attempt.header["recorded_at"]) for attempt in attempts}
+    with kept_in(used.path, out), writing(force=_recorded_at(out) in kept):
+        write_plain(out, recording, original=True)
+    others = f", {len(attempts) - 1} more kept beside it" if len(attempts) > 1 else ""
     notes = "".join(f"; {note}" for note in recording.notes)
     print(
         f"{record.record}: {len(recording)} samples from {used.path.name}, "
-        f"recorded {used.header['recorded_at']}{kept}{notes}"
+        f"recorded {used.header['recorded_at']}{others}{notes}"
         + ("" if used.is_complete else f"; {again}")
     )
+
+
+def _recorded_at(out: Path) -> str | None:
+    """When the recording in a file was made, as its head says; None where nothing does."""
+    if not out.is_file():
+        return None
+    with out.open(encoding="utf-8", errors="replace") as stream:
+        head = (line.lstrip("# ").partition(": ") for line in takewhile(_is_remark, stream))
+        return next((text.strip() for key, _, text in head if key == "recorded_at"), None)
+
+
+def _is_remark(line: str) -> bool:
+    return line.startswith("#")
 
 
 def _is_recording(out: Path) -> bool:
@@ -211,7 +227,9 @@ def run_caliper(campaign: Campaign, table: Path) -> None:
     dwells = recording.time_s / dwell_s
     steps, settled = np.floor(dwells), np.abs(dwells % 1.0 - 0.5) < 0.5 - SETTLING
     with replaced(table) as stream:
-        stream.write(f"# arm_m: {run.arm_m!r}\ndisplacement_m,volts,volts_sd\n")
+        stream.write(
+            f"# {MARK}: {MADE_BY}\n# arm_m: {run.arm_m!r}\ndisplacement_m,volts,volts_sd\n"
+        )
         for index, length in enumerate(reading.tolist()):
             volts = recording.values[settled & (steps == index)]
             spread = float(np.std(volts, ddof=1) / np.sqrt(len(volts)))

@@ -16,7 +16,7 @@ from pendpipe.analysis.compare import (
     tail_fits,
 )
 from pendpipe.analysis.turning_points import read_turning_points
-from pendpipe.arguments import Arguments, load, shared
+from pendpipe.arguments import INPUT, OUTPUT, Arguments, load, shared
 from pendpipe.campaign.design import design_of
 from pendpipe.campaign.fit import InertiaSds, inertia_sds, joint_values
 from pendpipe.configuration.apparatus import pendulum
@@ -41,9 +41,9 @@ from pendpipe.stages.separate import Separation, read_separation
 from pendpipe.version import __version__
 
 ARGUMENTS: Final = shared("--campaign", required=True) | {
-    "--separation": {"type": Path, "required": True, "help": "the stage before's JSON"},
-    "--out": {"type": Path, "required": True, "help": "the comparison, JSON"},
-    "--summary": {"type": Path, "required": True, "help": "campaign.json"},
+    "--separation": {"type": Path, "required": True, "help": "the stage before's JSON"} | INPUT,
+    "--out": {"type": Path, "required": True, "help": "the comparison, JSON"} | OUTPUT,
+    "--summary": {"type": Path, "required": True, "help": "campaign.json"} | OUTPUT,
 }
 
 

@@ -9,7 +9,7 @@ goes to standard output as one paragraph.
 from pathlib import Path
 from typing import Any, Final
 
-from pendpipe.arguments import SHARED, Arguments, load, print_answer, shared
+from pendpipe.arguments import OUTPUT, SHARED, Arguments, load, print_answer, shared
 from pendpipe.configuration.load import Campaign
 from pendpipe.files import write_json
 from pendpipe.manifest import job
@@ -28,7 +28,8 @@ ARGUMENTS: Final = (
             "type": Path,
             "metavar": "FILE",
             "help": f"the answer; DIR/{FILE_NAME} by default",
-        },
+        }
+        | OUTPUT,
         "--json": SHARED["--json"],
         "--fail-on": {
             "choices": ("missing-physics",),

@@ -10,7 +10,7 @@ from pendpipe.analysis.separate import (
     fit_benchmark,
     separate,
 )
-from pendpipe.arguments import Arguments, load, shared
+from pendpipe.arguments import OUTPUT, Arguments, load, shared
 from pendpipe.campaign.fit import InertiaSds, inertia_sds
 from pendpipe.configuration.load import Campaign
 from pendpipe.estimate import Estimate
@@ -25,7 +25,7 @@ from pendpipe.stages.results import (
 )
 
 ARGUMENTS: Final = shared("--campaign", required=True) | {
-    "--out": {"type": Path, "required": True, "help": "the separation, JSON"}
+    "--out": {"type": Path, "required": True, "help": "the separation, JSON"} | OUTPUT
 }
 
 

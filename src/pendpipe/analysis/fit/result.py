@@ -26,7 +26,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Estimate, number, quality_of_rate
-from pendpipe.files import read_json, write_json
+from pendpipe.files import read_json, write_json, writing
 from pendpipe.quantities import compact, in_columns, stretch, with_error
 
 if TYPE_CHECKING:
@@ -245,18 +245,20 @@ class FitResult:
             shares |= {f"share of {name} at {where}": of for name, of in each.losses.items()}
         return found | {"Q": self["Q"]} | ({} if limit is None else {"Q limit": limit}) | shares
 
-    def save(self, folder: str | Path) -> Path:
+    def save(self, folder: str | Path, *, force: bool = False) -> Path:
         """Write ``fit.json`` and, with the readings, ``turning_points.csv`` and ``fit.svg``.
 
-        Returns the folder, which is made where it does not exist.
+        Returns the folder, which is made where it does not exist. Files of these names that
+        pendpipe did not make are replaced only with `force`.
         """
         target = Path(folder)
-        write_json(target / "fit.json", self.to_dict())
-        if self.points is not None and self.decay is not None:
-            from pendpipe.figures.style import save
+        with writing(force=force):
+            write_json(target / "fit.json", self.to_dict())
+            if self.points is not None and self.decay is not None:
+                from pendpipe.figures.style import save
 
-            write_turning_points(target / "turning_points.csv", self.points)
-            save(self.plot(), target / "fit")
+                write_turning_points(target / "turning_points.csv", self.points)
+                save(self.plot(), target / "fit")
         return target
 
     def value(self, name: str) -> float:

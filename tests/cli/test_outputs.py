@@ -1,0 +1,254 @@
+"""No command writes over what it was given, nor over what pendpipe did not make."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pendpipe as pp
+from pendpipe.cli import main
+from pendpipe.errors import InputError
+from pendpipe.files import check_output, replaced, write_json, write_whole, writing
+from pendpipe.recording import Recording, write_plain
+
+TIME_S = np.arange(900) / 30.0
+SWING = 0.1 * np.exp(-0.01 * TIME_S) * np.cos(4.0 * TIME_S)
+MODEL = """
+[pendulum]
+frequency_hz = 0.5
+c = 1e-3
+release_angle_rad = 0.1
+[sampling]
+sample_rate_hz = 20.0
+duration_s = 10.0
+"""
+CALIPER = "angle_rad,volts\n" + "".join(f"{a / 10},{0.385 * a + 0.001}\n" for a in range(-4, 5))
+COMMANDS: dict[str, list[str]] = {
+    "convert": ["convert", "{recording}", "{out}"],
+    "turning-points": ["turning-points", "{recording}", "--out", "{out}"],
+    "fit": ["fit", "{recording}", "--out", "{out}"],
+    "page": ["page", "{recording}", "--no-diagnosis", "--out", "{out}"],
+    "refused": ["fit", "{recording}", "--out", "{other}", "--refused", "{out}"],
+    "simulate": ["simulate", "{model}", "{out}"],
+    "calibrate": ["calibrate", "{table}", "--out", "{out}"],
+}
+"""Commands with an output, each with its own input."""
+INPUT = {"simulate": "model", "calibrate": "table"}
+
+
+@pytest.fixture
+def given(tmp_path: Path) -> dict[str, Path]:
+    """Files of a user."""
+    files = {name: tmp_path / f"user's {name}.csv" for name in ("recording", "model", "table")}
+    lines = [f"{t!r},{x!r}\n" for t, x in zip(TIME_S.tolist(), SWING.tolist(), strict=True)]
+    files["recording"].write_text("time_s,angle_rad\n" + "".join(lines))
+    files["model"].write_text(MODEL)
+    files["table"].write_text(CALIPER)
+    return files
+
+
+def call(command: str, out: Path, given: dict[str, Path]) -> list[str]:
+    places = {**given, "out": out, "other": out.with_name("other.json")}
+    return [word.format(**places) for word in COMMANDS[command]]
+
+
+def itself(path: Path) -> Path:
+    return path
+
+
+def dotted(path: Path) -> Path:
+    return path.parent / "." / ".." / path.parent.name / path.name
+
+
+def hard_link(path: Path) -> Path:
+    link = path.with_name("hard.csv")
+    os.link(path, link)
+    return link
+
+
+def symbolic_link(path: Path) -> Path:
+    link = path.with_name("soft.csv")
+    link.symlink_to(path)
+    return link
+
+
+@pytest.mark.parametrize("name", [itself, dotted, hard_link, symbolic_link])
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("force", [(), ("--force",)])
+def test_an_output_that_is_an_input_is_refused(
+    given: dict[str, Path],
+    command: str,
+    name: Callable[[Path], Path],
+    force: Sequence[str],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = given[INPUT.get(command, "recording")]
+    before = path.read_bytes()
+    assert main([*call(command, name(path), given), *force]) == 2
+    assert "this output is one of the inputs" in capsys.readouterr().err
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_recording_that_pendpipe_has_written_is_an_input_as_well(
+    given: dict[str, Path], command: str
+) -> None:
+    if command in INPUT:
+        pytest.skip("its input is no recording")
+    given["recording"].unlink()
+    write_plain(given["recording"], Recording(TIME_S, SWING, "angle_rad"))
+    before = given["recording"].read_bytes()
+    assert main(call(command, given["recording"], given)) == 2
+    assert given["recording"].read_bytes() == before
+
+
+@pytest.mark.parametrize("content", [b"my notes\n", b'\x00{"made by": "me"}'])
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_file_of_others_is_replaced_only_with_force(
+    given: dict[str, Path],
+    command: str,
+    content: bytes,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    out = tmp_path / "mine.csv"
+    out.write_bytes(content)
+    words = call(command, out, given)
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert "pendpipe did not make this file" in error
+    assert "--force" in error
+    assert error.count("\n") == 1
+    assert out.read_bytes() == content
+    if command != "refused":  # what stands there is read first
+        assert main([*words, "--force"]) == 0
+        assert out.read_bytes() != content
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_what_a_command_has_written_it_may_write_again(
+    given: dict[str, Path], command: str, tmp_path: Path
+) -> None:
+    for _ in range(2):
+        assert main(call(command, tmp_path / "result.csv", given)) == 0
+
+
+@pytest.mark.parametrize("form", ["svg", "png"])
+def test_a_figure_replaces_a_figure_of_ours_and_no_other(
+    given: dict[str, Path], tmp_path: Path, form: str
+) -> None:
+    figure = tmp_path / f"decay.{form}"
+    words = ["fit", str(given["recording"]), "--figure", str(figure)]
+    assert [main(words), main(words)] == [0, 0]
+    figure.write_bytes(figure.read_bytes().replace(b"pendpipe", b"inkscape"))
+    assert main(words) == 2
+    assert main([*words, "--force"]) == 0
+
+
+@pytest.mark.parametrize("name", ["again.csv", "again.wdh"])
+def test_a_converted_recording_is_made_again_and_an_instruments_is_not(
+    given: dict[str, Path], tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["convert", str(given["recording"]), str(tmp_path / name)]
+    assert [main(words), main(words)] == [0, 0]
+    device = ["acquire", "--device", "simulated:di2108", "--clock-scale", "100", "--duration", "8"]
+    recorded = [*device, "--out", str(tmp_path / f"recorded-{name}")]
+    assert main(recorded) == 0
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    assert main(recorded) == 2
+    assert "did not make" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_raw_file_is_never_replaced(given: dict[str, Path], tmp_path: Path) -> None:
+    device = ["acquire", "--device", "simulated:di2108", "--clock-scale", "100", "--duration", "8"]
+    assert main([*device, "--out", str(tmp_path / "recorded.csv")]) == 0
+    raw = tmp_path / "recorded.raw"
+    before = raw.read_bytes()
+    shutil.copy(raw, tmp_path / "copy.csv")
+    assert main(["convert", str(given["recording"]), str(tmp_path / "copy.csv"), "--force"]) == 2
+    assert main([*device, "--out", str(tmp_path / "new.csv"), "--raw", str(raw), "--force"]) == 2
+    assert main(["acquire", "--recover", str(raw), "--out", str(raw), "--force"]) == 2
+    assert raw.read_bytes() == before
+
+
+def test_a_diagnosis_leaves_the_users_figures_alone(
+    given: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "diagnosis"
+    folder.mkdir()
+    mine = folder / "decay.svg"
+    mine.write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
+    assert main(["diagnose", str(given["recording"]), "--out", str(folder)]) == 2
+    assert "decay.svg: pendpipe did not make this file" in capsys.readouterr().err
+    assert [path.name for path in folder.iterdir()] == ["decay.svg"]
+
+
+def test_the_front_door_goes_the_same_way(given: dict[str, Path], tmp_path: Path) -> None:
+    fit = pp.fit(given["recording"])
+    fit.save(tmp_path / "fit")
+    fit.save(tmp_path / "fit")
+    for name in ("fit.json", "turning_points.csv", "fit.svg", "fit.png"):
+        (tmp_path / "fit" / name).write_text("mine")
+        with pytest.raises(InputError, match="did not make"):
+            fit.save(tmp_path / "fit")
+        fit.save(tmp_path / "fit", force=True)
+
+
+def test_streams_devices_and_empty_files_are_no_files_of_others(tmp_path: Path) -> None:
+    (tmp_path / "empty").touch()
+    for path in ("-", "/dev/stdout", os.devnull, "/dev/fd/1", tmp_path / "empty", tmp_path / "none"):
+        check_output(path)
+
+
+@pytest.mark.parametrize("out", ["-", "/dev/stdout"])
+@pytest.mark.parametrize("command", ["convert", "turning-points", "fit", "simulate", "calibrate"])
+def test_what_goes_to_standard_output_is_the_result_alone(
+    given: dict[str, Path],
+    command: str,
+    out: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = [out if word == "OUT" else word for word in call(command, Path("OUT"), given)]
+    assert main(words) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith(("# made_by: pendpipe ", '{\n "made_by": "pendpipe '))
+    assert len({*tmp_path.iterdir()} - {*given.values()}) == 0
+    written = tmp_path / "written"
+    assert main(call(command, written, given)) == 0
+    assert printed == written.read_text()
+
+
+def test_standard_input_is_an_input(
+    given: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with given["recording"].open() as stream:
+        before = os.dup(0)
+        os.dup2(stream.fileno(), 0)
+        try:
+            with writing(inputs=["-"]), pytest.raises(InputError, match="one of the inputs"):
+                check_output(given["recording"])
+        finally:
+            os.dup2(before, 0)
+            os.close(before)
+
+
+def test_all_that_is_written_says_so_and_nothing_else_is_taken_for_ours(tmp_path: Path) -> None:
+    write_json(tmp_path / "a.json", {"n": 1})
+    write_whole(tmp_path / "stub.csv", "# refused: too short\n")
+    for path in tmp_path.iterdir():
+        check_output(path)
+    for number, text in enumerate(("pendpipe", "notes on made_by: pendpipe 1\n", "# my own\n1,2\n")):
+        mine = tmp_path / f"{number}.txt"
+        mine.write_text(text)
+        with pytest.raises(InputError, match="did not make"), replaced(mine) as stream:
+            stream.write("gone")
+        assert mine.read_text() == text
