@@ -40,8 +40,11 @@ _MARKS: Final = re.compile(
     rb"|\A\x89PNG(?s:.){0,200}tEXtSoftware\0pendpipe"
     rb"|\A%PDF(?s:.)*/(?:Creator|Producer) \(pendpipe"
     rb"|\0made by pendpipe [^\0]*\0\Z"  # WinDaq: behind its last comment
+    rb"|\x07made_by\x18.pendpipe (?s:.)*PAR1\Z"
+    rb"|\Arecord,fluid,branch,pendulum,T0_s,"  # for spreadsheets, which know no remarks
 )
-_HEAD: Final = 1 << 13
+_ENDS: Final = 1 << 13
+"""So many bytes at either end are searched for marks."""
 _RAW: Final = re.compile(rb'\A\{"format": "pendpipe-raw"')
 _OUT: Final = ("-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
 _STREAM: Final = re.compile(r"/dev/stderr|(/dev|/proc/self)/fd/\d+")
@@ -100,8 +103,8 @@ def check_output(path: str | Path) -> None:
         "name another file",
     )
     with target.open("rb") as stream:
-        head = stream.read(_HEAD)
-        stream.seek(-min(64, target.stat().st_size), 2)
+        head = stream.read(_ENDS)
+        stream.seek(-min(_ENDS, target.stat().st_size), 2)
         tail = stream.read()
     refuse_if(
         _RAW.search(head),

@@ -202,7 +202,8 @@ def test_the_front_door_goes_the_same_way(given: dict[str, Path], tmp_path: Path
 
 def test_streams_devices_and_empty_files_are_no_files_of_others(tmp_path: Path) -> None:
     (tmp_path / "empty").touch()
-    for path in ("-", "/dev/stdout", os.devnull, "/dev/fd/1", tmp_path / "empty", tmp_path / "none"):
+    files = tmp_path / "empty", tmp_path / "none"
+    for path in ("-", "/dev/stdout", os.devnull, "/dev/fd/1", *files):
         check_output(path)
 
 
@@ -246,7 +247,8 @@ def test_all_that_is_written_says_so_and_nothing_else_is_taken_for_ours(tmp_path
     write_whole(tmp_path / "stub.csv", "# refused: too short\n")
     for path in tmp_path.iterdir():
         check_output(path)
-    for number, text in enumerate(("pendpipe", "notes on made_by: pendpipe 1\n", "# my own\n1,2\n")):
+    others = "pendpipe", "notes on made_by: pendpipe 1\n", "# my own\n1,2\n"
+    for number, text in enumerate(others):
         mine = tmp_path / f"{number}.txt"
         mine.write_text(text)
         with pytest.raises(InputError, match="did not make"), replaced(mine) as stream:

@@ -16,6 +16,8 @@ import pytest
 import yaml
 
 from pendpipe.cli import main
+from pendpipe.files import check_output
+from pendpipe.manifest import FOLDER, manifests
 
 ROOT = Path(__file__).parents[2]
 SMALL = ROOT / "tests/workflow/small"
@@ -121,6 +123,15 @@ def test_the_inertia_has_the_errors_of_its_frequency_and_of_its_torque(campaign:
         of_torque = (inertia["sd"] / inertia["value"]) ** 2 - (2.0 * relative) ** 2
         assert 0.0 < of_torque < 0.15**2
     assert measured
+
+
+def test_every_result_says_inside_who_made_it(campaign: Campaign) -> None:
+    """That is how it may be replaced; a user's own file may not."""
+    homes = [path.parent for path in campaign.results.rglob(FOLDER)]
+    made = {home / name for home in homes for one in manifests(home) for name in one.outputs}
+    assert {path.suffix for path in made} >= {".csv", ".json", ".svg", ".parquet", ".html"}
+    for path in made:
+        check_output(path)
 
 
 def test_a_refused_record_is_told_of_and_stops_nobody(campaign: Campaign) -> None:

@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pendpipe.analysis.fit.result import FitResult
-from pendpipe.arguments import Arguments, load, shared
+from pendpipe.arguments import OUTPUT, Arguments, load, shared
 from pendpipe.configuration.load import Campaign
 from pendpipe.errors import refuse_if
 from pendpipe.estimate import Estimate
-from pendpipe.files import read_json, write_whole
+from pendpipe.files import MADE_BY, MARK, read_json, write_whole
 from pendpipe.manifest import job
 from pendpipe.stages.results import RecordResult, read_results, record_files
-from pendpipe.version import __version__
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -39,6 +38,7 @@ ARGUMENTS: Final = shared("--campaign", required=True) | {
         "metavar": "FILE",
         "help": "the table: .parquet, .csv, or both",
     }
+    | OUTPUT
 }
 
 
@@ -63,7 +63,7 @@ def records_table(campaign: Campaign) -> pa.Table:
 
     rows = [_row(campaign, result) for result in read_results(campaign)]
     kinds = [(name, pa.string() if name in _WORDS else pa.float64()) for name in COLUMNS]
-    schema = pa.schema(kinds, metadata={"pendpipe": __version__})
+    schema = pa.schema(kinds, metadata={MARK: MADE_BY})
     return pa.Table.from_pylist(rows, schema=schema)
 
 
