@@ -41,7 +41,7 @@ _MARKS: Final = re.compile(
     rb"|\A%PDF(?s:.)*/(?:Creator|Producer) \(pendpipe"
     rb"|\0made by pendpipe [^\0]*\0\Z"  # WinDaq: behind its last comment
     rb"|\x07made_by\x18.pendpipe (?s:.)*PAR1\Z"
-    rb"|\Arecord,fluid,branch,pendulum,T0_s,"  # for spreadsheets, which know no remarks
+    rb'|\A"record","fluid","branch","pendulum","T0_s",'  # for spreadsheets, which know no remarks
 )
 _ENDS: Final = 1 << 13
 """So many bytes at either end are searched for marks."""
