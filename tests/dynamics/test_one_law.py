@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -138,3 +139,42 @@ def test_the_compiled_derivatives_are_those_of_the_integrated_equation(
     expected = derivatives(restoring, drag, amplitude)
     error = np.linalg.norm(found[:, :6] - expected, axis=0) / np.linalg.norm(expected, axis=0)
     assert np.max(error) < 1e-5, error
+
+
+RATE_BASE = np.array([0.02, 0.02, 1e-3, 0.4, OMEGA, 1.2, 0.0, 0.05])
+
+
+def gyroscope(time_s: Floats, **more: Any) -> Model:
+    interval = float(time_s[1] - time_s[0])
+    return Model(time_s, interval, order=20, restoring="sine", drag="speed", seen="rate", **more)
+
+
+def test_a_gyroscope_reads_the_rate_of_the_angle() -> None:
+    a, b, c, share, omega, start, _, offset = RATE_BASE
+    law = Eq8(omega, a, share * b, (1.0 - share) * b, c, "sine", "speed")
+    # A motion that begins later is behind by its rate.
+    _, columns = sample_with_jacobian(law, Release(0.0, start), TIME)
+    found = gyroscope(TIME).reading(RATE_BASE) - offset
+    assert np.max(np.abs(found + columns[:, 6])) < 1e-6 * omega * start
+
+
+@pytest.mark.parametrize("index", range(8))
+def test_derivatives_of_a_gyroscopes_readings(index: int) -> None:
+    model, step = gyroscope(TIME), (1e-4, 1e-4, 1e-5, 1e-2, 5e-4, 1e-4, 1e-4, 1e-2)[index]
+    low, high = RATE_BASE.copy(), RATE_BASE.copy()
+    low[index] -= step
+    high[index] += step
+    expected = (model.reading(high) - model.reading(low)) / (2.0 * step)
+    found = jacobian(model, RATE_BASE, model.evaluate(RATE_BASE))[:, index]
+    assert np.linalg.norm(found - expected) < 1e-4 * np.linalg.norm(expected)
+
+
+def test_means_of_a_gyroscopes_readings() -> None:
+    fine = np.arange(0.0, 9.0, 0.008)
+    means = gyroscope(fine).reading(RATE_BASE)[: len(fine) // 5 * 5].reshape(-1, 5).mean(axis=1)
+    middle = fine[: len(fine) // 5 * 5].reshape(-1, 5).mean(axis=1)
+    found = gyroscope(middle, fold=5).reading(RATE_BASE)
+    single = gyroscope(middle).reading(RATE_BASE)
+    # Turning points, where friction jumps, apart.
+    error = np.sort(np.abs(found - means))[: int(0.9 * len(means))]
+    assert np.max(error) < 0.02 * np.max(np.abs(single - means))

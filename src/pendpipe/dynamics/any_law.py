@@ -12,6 +12,8 @@ ln r obeys a scalar linear equation, which is integrated exactly, and gives that
 is read at given times by what is slow in it.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -60,6 +62,10 @@ class Clock:
         """+1 and -1 in turn: the side of the turning point that begins each half cycle."""
         return _phases(self.count, self.order)[3]
 
+    def derivative(self, values: FloatArray) -> FloatArray:
+        """Differentiate by the phase within each half cycle; shape as `values`."""
+        return np.asarray(values @ _differentiation(self.order).T)
+
     def integral(self, rate: FloatArray) -> FloatArray:
         """Integrate over the phase from psi = 0; shape (..., count, order + 1) as `rate`."""
         parts = rate @ _integration(self.order).T
@@ -91,6 +97,14 @@ def _nodes(order: int) -> FloatArray:
 def _integration(order: int) -> FloatArray:
     """The matrix that integrates from the first node to each, over a half turn."""
     return np.asarray(0.5 * math.pi * lobatto_integration(order))
+
+
+@lru_cache
+def _differentiation(order: int) -> FloatArray:
+    """The matrix that differentiates at the nodes, over a half turn."""
+    nodes = lobatto_nodes(order)
+    slopes = chebyshev.chebder(analysis(nodes))
+    return np.asarray(2.0 / math.pi * chebyshev.chebvander(nodes, order - 1) @ slopes)
 
 
 _TOLERANCE: Final = 1e-9
@@ -407,6 +421,9 @@ class Sampled:
     sine: FloatArray
     _first: IntArray
     _weights: FloatArray
+    ahead_rad: float = 0.0
+    """By how much the phase is ahead of the motion's."""
+    _slope: FloatArray | None = None
 
     @property
     def angle(self) -> FloatArray:
@@ -416,6 +433,8 @@ class Sampled:
     @property
     def velocity(self) -> FloatArray:
         """x', rad/s."""
+        if self._slope is not None:
+            return self._slope
         omega = self.motion.angular_frequency
         return -self.motion.upwards * omega * self.amplitude * self.sine
 
@@ -423,6 +442,21 @@ class Sampled:
     def direction(self) -> FloatArray:
         """Sign of the velocity."""
         return np.asarray(np.where(self.motion.upwards * self.sine > 0.0, -1.0, 1.0))
+
+    def as_rate(self, acceleration: FloatArray) -> Sampled:
+        """Return what a gyroscope sees: x' in the place of x, and x'' in that of x'.
+
+        -omega r sin(psi) is omega r cos(psi + pi/2). `acceleration` is x'' at the readings.
+        """
+        return replace(
+            self,
+            phase=self.phase + 0.5 * math.pi,
+            amplitude=self.motion.angular_frequency * self.amplitude,
+            cosine=-self.sine,
+            sine=self.cosine,
+            ahead_rad=0.5 * math.pi,
+            _slope=acceleration,
+        )
 
     def at_nodes(self, values: FloatArray) -> FloatArray:
         """Interpolate what is known at the motion's nodes, shape (..., count, order + 1)."""

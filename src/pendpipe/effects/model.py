@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Literal, Self
 
 import numpy as np
 
@@ -112,6 +112,8 @@ def kick_sizes(
     return by_log, -turned / omega
 
 
+Seen = Literal["angle", "rate"]
+"""What of the motion is read."""
 _MORE: Final = (1.0, 1.02, 1.12, 1.28)
 """Half cycles that are tried, over those that omega makes: a pendulum may be quicker."""
 
@@ -144,6 +146,8 @@ class Model:
         The amplitude where readings are no angles: what effects are bounded by is for 1 rad.
     restoring, drag
         The forms of Eq. 8, which an effect may change (`Effect.form`).
+    seen
+        What is read: the angle, or its rate (rad/s).
     """
 
     time_s: FloatArray
@@ -157,6 +161,7 @@ class Model:
     scale: float = 1.0
     restoring: Restoring = "linear"
     drag: Drag = "energy"
+    seen: Seen = "angle"
     _last: dict[str, Motion] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -352,7 +357,15 @@ class Model:
         ):
             raise NoMotionError("the readings' clock is out of reach")
         tangent = Tangent(lambda m: self.acceleration(m, value), motion)
-        return Evaluated(self.read(sampled, value), sampled, tangent, self.span(value, sampled))
+        span, seen = self.span(value, sampled), self.as_seen(sampled, value)
+        return Evaluated(self.read(seen, value), seen, tangent, span)
+
+    def as_seen(self, sampled: Sampled, value: FloatArray) -> Sampled:
+        """What is read of the sampled motion: the angle, or its rate."""
+        if self.seen == "angle":
+            return sampled
+        extra = sampled.at_nodes(self.acceleration(sampled.motion, value))
+        return sampled.as_rate(extra - float(value[OMEGA]) ** 2 * sampled.angle)
 
     def taken_at(self, value: FloatArray) -> FloatArray:
         """When the readings are really taken, shape (n,)."""
@@ -367,8 +380,12 @@ class Model:
         reading = np.asarray(value[OFFSET] + left * sampled.angle)
         if self.fold > 1:
             # A mean of neighbours is x + k x''; x'' = -omega^2 x + f, and -k omega^2 x is above.
-            bent = sampled.at_nodes(self.acceleration(sampled.motion, value))
-            reading = reading + (1.0 - left) / float(value[OMEGA]) ** 2 * bent
+            bent = self.acceleration(sampled.motion, value)
+            if self.seen == "rate":
+                law: Law = lambda m: self.acceleration(m, value)  # noqa: E731
+                pace = rates(law, sampled.motion).pace
+                bent = sampled.motion.clock.derivative(bent) / pace
+            reading = reading + (1.0 - left) / float(value[OMEGA]) ** 2 * sampled.at_nodes(bent)
         return self._added(
             reading, value, lambda effect, own: effect.reading(sampled, pendulum, own)
         )
@@ -482,7 +499,11 @@ def _by_omega(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
     new = rates(lambda m: model.acceleration(m, moved), other)
     old = at.tangent.rates
     loss, pace = (new.loss - old.loss) / step, (new.pace - old.pace) / step
-    return at.sampled.change(*at.tangent.of_rates(loss, pace))
+    change = at.sampled.change(*at.tangent.of_rates(loss, pace))
+    if model.seen == "rate":
+        # At the same amplitude and phase it is larger.
+        change += at.sampled.angle / float(value[OMEGA])
+    return change
 
 
 def _derivative(

@@ -169,6 +169,8 @@ class Stack(Model):
         return cls(
             time_s,
             members[0].interval_s,
+            restoring=members[0].restoring,
+            drag=members[0].drag,
             members=tuple(members),
             base=tuple(places),
             same_sensor=same_sensor,
