@@ -1,7 +1,7 @@
 # Everything lives in .venv/; nothing else is installed. The README has the same steps for
 # a machine without make.
 .DELETE_ON_ERROR:
-.PHONY: campaign test report bench evidence integrity proof check clean wheel
+.PHONY: campaign test docs report bench evidence integrity proof check clean wheel
 
 SHELL := bash
 .SHELLFLAGS := -o pipefail -c
@@ -17,6 +17,11 @@ campaign: .venv/installed
 
 test: .venv/installed
 	$(RUN) pytest -q -n $(CORES)
+
+# The pages in docs/ as HTML in docs/_build; their commands are executed, warnings are errors.
+docs: .venv/installed-docs
+	$(RUN) sphinx-build -q -W --keep-going -b html docs docs/_build/html
+	@echo "docs/_build/html/index.html"
 
 report: .venv/installed
 	$(RUN) snakemake --cores $(CORES)
@@ -64,6 +69,10 @@ check: .venv/installed
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev,bench]" --editable ./challenge
 	touch $@
 
+.venv/installed-docs: .venv/installed
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable ".[dev,docs]"
+	touch $@
+
 # Brings the engine's machine code along (setup.py), so that a first call need not compile.
 wheel: .venv/installed
 	rm -rf build
@@ -71,6 +80,6 @@ wheel: .venv/installed
 
 # Raw files of an instrument (results/RECORD/raw) can't be made again: they stay.
 clean:
-	rm -rf .snakemake .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf .snakemake .mypy_cache .ruff_cache .pytest_cache .hypothesis docs/_build
 	find results -mindepth 1 ! -type d ! -path 'results/*/raw/*' ! -path results/README.md -delete
 	find results -mindepth 1 -type d -empty -delete

@@ -1,0 +1,173 @@
+"""Directives whose text is made by running the program: a page can't promise what doesn't work.
+
+`run` executes the commands of its body one after another in the page's own scratch folder, which
+begins with a copy of `examples/`, and shows each with what it prints; `run-python` does the same
+with a block of Python, and `made` shows a picture that one of them has written. A status other
+than that of the option `:status:` (0) is an error of the build. `command-help` and
+`configuration` print the parser's and the schema's own words.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any, ClassVar
+
+from docutils import nodes
+from docutils.parsers.rst import directives
+from sphinx.util.docutils import SphinxDirective
+
+ROOT = Path(__file__).parents[2]
+LONGEST_S = 300
+"""No command of a page may take longer."""
+
+
+def _environment() -> dict[str, str]:
+    """The environment of the build, with this interpreter's commands first."""
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    return os.environ | {"PATH": path, "COLUMNS": "100", "MPLBACKEND": "Agg", "NO_COLOR": "1"}
+
+
+class _Executed(SphinxDirective):
+    """What both kinds of block share: the page's folder, and how a run is judged."""
+
+    has_content = True
+    option_spec: ClassVar[dict[str, Any]] = {
+        "status": directives.nonnegative_int,
+        "hidden": directives.flag,
+        "silent": directives.flag,
+        "lines": directives.nonnegative_int,
+    }
+
+    @property
+    def folder(self) -> Path:
+        """The scratch folder of this page, made at its first block."""
+        folders = self.env.temp_data.setdefault("scratch", {})
+        if "this" not in folders:
+            folders["this"] = Path(tempfile.mkdtemp(prefix="pendpipe-docs-"))
+            shutil.copytree(ROOT / "examples", folders["this"], dirs_exist_ok=True)
+        return Path(folders["this"])
+
+    def done(self, command: list[str] | str) -> str:
+        """Run a command; return what it printed, or fail the build."""
+        ran = subprocess.run(
+            command,
+            shell=isinstance(command, str),
+            cwd=self.folder,
+            env=_environment(),
+            capture_output=True,
+            text=True,
+            timeout=LONGEST_S,
+            check=False,
+        )
+        asked = self.options.get("status", 0)
+        if ran.returncode != asked:
+            shown = command if isinstance(command, str) else self.block_text
+            raise self.severe(
+                f"status {ran.returncode} where {asked} is promised: {shown}\n{ran.stderr}"
+            )
+        printed = ran.stdout + (ran.stderr if asked or "silent" not in self.options else "")
+        most = self.options.get("lines")
+        rows = printed.rstrip().splitlines()
+        if most is not None and len(rows) > most:
+            rows = [*rows[:most], "..."]
+        # Where a scratch folder lies is nobody's concern.
+        return "\n".join(rows).replace(f"{self.folder}/", "")
+
+    def block(self, text: str, language: str) -> list[nodes.Node]:
+        """A literal block of the page."""
+        if "hidden" in self.options:
+            return []
+        node = nodes.literal_block(text, text)
+        node["language"] = language
+        return [node]
+
+
+class Run(_Executed):
+    """Commands of a shell, a line each, with what they print."""
+
+    def run(self) -> list[nodes.Node]:
+        """Execute and show."""
+        shown = []
+        for line in filter(None, map(str.strip, self.content)):
+            printed = self.done(line)
+            shown += [f"$ {line}", *([printed] if printed else [])]
+        return self.block("\n".join(shown), "console")
+
+
+class RunPython(_Executed):
+    """A block of Python, with what it prints."""
+
+    def run(self) -> list[nodes.Node]:
+        """Execute and show."""
+        code = "\n".join(self.content)
+        printed = self.done([sys.executable, "-c", code])
+        shown = self.block(code, "python")
+        return [*shown, *(self.block(printed, "text") if printed else [])]
+
+
+class Picture(_Executed):
+    """A picture that a block above has written, by its name in the page's folder."""
+
+    has_content = False
+    required_arguments = 1
+    option_spec: ClassVar[dict[str, Any]] = {"alt": directives.unchanged_required}
+
+    def run(self) -> list[nodes.Node]:
+        """Copy it beside the page and show it."""
+        made = self.folder / self.arguments[0]
+        if not made.exists():
+            raise self.severe(f"no block above has written {self.arguments[0]}")
+        kept = Path(self.env.srcdir) / "_build" / "made" / f"{self.env.docname}-{made.name}"
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(made, kept)
+        node = nodes.image(uri=f"/_build/made/{kept.name}", alt=self.options.get("alt", ""))
+        return [node]
+
+
+class CommandHelp(_Executed):
+    """What `pendpipe COMMAND --help` prints, of one command or of all."""
+
+    has_content = False
+    optional_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Show the help, under a heading a command where all are asked for."""
+        if self.arguments:
+            return self.block(self.done(f"pendpipe {self.arguments[0]} --help"), "text")
+        from pendpipe.cli import COMMANDS, STAGES
+
+        sections: list[nodes.Node] = []
+        for name in [*COMMANDS, *STAGES]:
+            section = nodes.section(ids=[nodes.make_id(f"command-{name}")])
+            section += nodes.title("", "", nodes.literal("", name))
+            section += self.block(self.done(f"pendpipe {name} --help"), "text")
+            sections.append(section)
+        return sections
+
+
+class Configuration(SphinxDirective):
+    """What may stand in `config/config.yaml`, from the schema."""
+
+    def run(self) -> list[nodes.Node]:
+        """Parse the schema's manual as Markdown."""
+        from pendpipe.commands.config import manual
+
+        return self.parse_text_to_nodes(manual())
+
+
+def setup(app: Any) -> dict[str, bool]:
+    """Add the directives."""
+    for name, directive in {
+        "run": Run,
+        "run-python": RunPython,
+        "made": Picture,
+        "command-help": CommandHelp,
+        "configuration": Configuration,
+    }.items():
+        app.add_directive(name, directive)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
