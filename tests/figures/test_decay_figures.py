@@ -250,3 +250,12 @@ def test_a_cut_row_of_turning_points_is_not_drawn(example: Any, tmp_path: Any) -
         whole.points.time_s[: len(cut.points.time_s)], abs=0.0
     )
     assert 1 <= len(whole.points.time_s) - len(cut.points.time_s) <= 2
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_law_that_comes_to_rest_within_the_recording_is_drawn() -> None:
+    """Its last amplitudes are zero, which no logarithmic axis shows."""
+    found = quiet_decay(0.0, 0.01, 0.001)
+    assert found.along(found.elapsed_s)[0][-1] == 0.0
+    recording = Recording(np.linspace(0.0, 199.0, 4000), np.zeros(4000), "angle_rad")
+    draw_fit(found, recording)

@@ -19,6 +19,7 @@ from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES, diagnosis
 from pendpipe.figures.data import NothingToDrawError
 from pendpipe.figures.diagnosis import Shown, draw_diagnosis, shown
+from pendpipe.figures.style import save
 from pendpipe.recording import Recording
 
 FREQUENCY_HZ, LINEAR, AMPLITUDE, NOISE_RAD = 0.9, 0.012, 0.25, 1e-4
@@ -168,6 +169,17 @@ def test_what_has_nothing_to_show_is_not_drawn(outcome: Any, tmp_path: Path) -> 
         words = "".join(ET.parse(path).getroot().itertext())
         assert "Eq. 8" in words
         assert path.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_figure_of_the_decay_is_small_at_any_length(tmp_path: Path) -> None:
+    """Each of 9,000 readings as a path of its own would take 1.3 MB."""
+    time_s = np.arange(9000) / 15.0
+    swing = 0.1 * np.exp(-time_s / 200.0) * np.cos(OMEGA * time_s)
+    noise = NOISE_RAD * np.random.default_rng(6).standard_normal(len(time_s))
+    long = shown(diagnose_recording(Recording(time_s, swing + noise, "angle_rad")))
+    assert len(long.data) > 8000
+    svg, _ = save(diagnosis.draw_decay(long), tmp_path / "decay")
+    assert svg.stat().st_size < 400_000
 
 
 def curve(**more: Any) -> dict[str, Any]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import tracemalloc
 import zipfile
 from pathlib import Path
 
+import h5py
 import numpy as np
 import openpyxl
 import pytest
 from scipy.io import savemat
 
 from pendpipe.errors import InputError
-from pendpipe.formats import ReadOptions, containers, inspect, read, trees
+from pendpipe.formats import ReadOptions, inspect, read, table, trees
 
 from .decays import swing
 
@@ -87,12 +89,30 @@ def test_what_unpacks_to_more_than_any_recording_is_refused(
     book.active.append(["t", "angle"])
     book.save(tmp_path / "a.xlsx")
     assert len(read(path)) == len(TIME)
-    for module in (trees, containers):
-        monkeypatch.setattr(module, "most_unpacked", lambda _: 9_000)
+    monkeypatch.setattr(trees, "most_unpacked", lambda _: 9_000)
     with pytest.raises(InputError, match="its compressed data are more than 0 MB"):
         read(path)
+    monkeypatch.setattr(table, "most_unpacked", lambda _: 9_000)
     with pytest.raises(InputError, match="it unpacks to 0 MB"):
         read(tmp_path / "a.xlsx")
+
+
+@pytest.mark.parametrize("form", ["npz", "h5"])
+def test_arrays_are_counted_before_they_are_unpacked(tmp_path: Path, form: str) -> None:
+    """Three hundred megabytes of zeros pack into three hundred kilobytes."""
+    path, zeros = tmp_path / f"a.{form}", np.zeros(40_000_000)
+    if form == "npz":
+        np.savez_compressed(path, time_s=TIME, angle_rad=zeros)
+    else:
+        with h5py.File(path, "w") as file:
+            file.create_dataset("angle_rad", data=zeros, chunks=(10**6,), compression="gzip")
+    del zeros
+    tracemalloc.start()
+    with pytest.raises(InputError, match="it unpacks to 305 MB"):
+        read(path)
+    peak_bytes = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak_bytes < 50e6
 
 
 @pytest.mark.parametrize("header", [None, ["Zeit [s]", "Winkel [°]"], ["t", "theta (deg)"]])

@@ -429,6 +429,7 @@ def _quality_by_amplitude(decay: Decay, factor: float) -> Iterator[Mark]:
     limit = decay.fit.quality_factor_limit
     if limit is not None and 3.0 * limit.sd < limit.value < 2.0 * float(np.nanmax(quality)):
         yield level(limit.value, GREY, 1.4, linestyle=":", label="limit πf/b")
-    fall = float(np.max(amplitude) / np.min(amplitude))
-    if fall > 5.0:
-        yield logarithmic("x", fall)
+    largest, least = float(np.max(amplitude)), float(np.min(amplitude))
+    # Dry friction ends the fitted motion: zero stands on no logarithmic axis.
+    if 0.0 < 5.0 * least < largest:
+        yield logarithmic("x", largest / least)

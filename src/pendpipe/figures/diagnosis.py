@@ -133,6 +133,8 @@ def shown(outcome: Outcome) -> Shown:
 
 COLOURS: Final = (VERMILION, BLUE)
 """Of the baseline and of the extended model."""
+_MANY: Final = 1000
+"""Readings from which on they are drawn as pixels, and the amplitude at every k-th of them."""
 _CYCLES: Final = 4.0
 """Cycles at the end of the decay that are drawn with each reading."""
 
@@ -148,18 +150,21 @@ def draw_decay(content: Shown) -> Figure:
     residuals = [content.residual(fit) for _, fit in content.models]
     small, small_unit = axis_unit(np.stack(residuals), data.unit)
     dots: dict[str, Any] = {"marker": "o", "markersize": 2.0}
-    decay = [curve(time, factor * values, GREY, width=0.4, label="readings")]
+    pixels: dict[str, Any] = {"rasterized": len(data) > _MANY}
+    some = slice(None, None, math.ceil(len(data) / _MANY))
+    decay = [curve(time, factor * values, GREY, width=0.4, label="readings", **pixels)]
     end = [curve(time[last], factor * values[last], GREY, "", **dots)]
     rest = [level(0.0, width=0.8)]
     for (name, fit), colour, residual in zip(content.models, COLOURS, residuals, strict=False):
         middle = float(np.median(fit.at.reading - fit.at.sampled.angle))
-        high, low = (middle + side * fit.at.sampled.amplitude for side in (1.0, -1.0))
+        amplitude = fit.at.sampled.amplitude[some]
         decay += [
-            curve(time, factor * high, colour, width=1.2, label=name),
-            curve(time, factor * low, colour, width=1.2),
+            curve(time[some], factor * (middle + amplitude), colour, width=1.2, label=name),
+            curve(time[some], factor * (middle - amplitude), colour, width=1.2),
         ]
         end.append(curve(time[last], factor * fit.at.reading[last], colour, width=1.0))
-        rest.append(curve(time, small * residual, colour, "", marker=".", markersize=1.5))
+        dot: dict[str, Any] = {"marker": ".", "markersize": 1.5, **pixels}
+        rest.append(curve(time, small * residual, colour, "", **dot))
     label = f"{quantity_of(data.unit)} ({unit})"
     return figure_of(
         5.4,

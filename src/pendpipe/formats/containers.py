@@ -21,8 +21,8 @@ from pendpipe.formats.table import (
     ReadOptions,
     Table,
     damaged_if,
-    most_unpacked,
     next_reader_if,
+    refuse_unpacked,
 )
 from pendpipe.formats.text import read_table as read_text
 from pendpipe.formats.text import table_of_text
@@ -52,8 +52,7 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     next_reader_if(not data.startswith(b"PK"), "the file is no zip archive")
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         names = archive.namelist()
-        whole = sum(part.file_size for part in archive.infolist())
-        damaged_if(whole > most_unpacked(len(data)), f"it unpacks to {whole >> 20} MB")
+        refuse_unpacked(sum(part.file_size for part in archive.infolist()), len(data))
         if any(name.startswith("xl/") for name in names):
             _refuse_too_many_cells(archive)
             return _of_sheets(place, _sheets_of_excel(data), options)

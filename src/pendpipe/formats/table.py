@@ -339,6 +339,11 @@ def most_unpacked(size: int) -> int:
     return max(256 << 20, 100 * size)
 
 
+def refuse_unpacked(whole: int, packed: int) -> None:
+    """Refuse a file of `packed` bytes whose parts unpack to more than a recording's, unread."""
+    damaged_if(whole > most_unpacked(packed), f"it unpacks to {whole >> 20} MB")
+
+
 @dataclass(frozen=True)
 class Marker:
     """An event that was marked while the recording was made."""

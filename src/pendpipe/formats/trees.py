@@ -9,6 +9,7 @@ import io
 import json
 import re
 import struct
+import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -29,6 +30,7 @@ from pendpipe.formats.table import (
     damaged_if,
     most_unpacked,
     next_reader_if,
+    refuse_unpacked,
     swing_of,
 )
 from pendpipe.formats.text import column_of_clock_times, interval_of, table_of_text
@@ -194,11 +196,16 @@ def _of_hdf5(place: Path, data: bytes, form: str, options: ReadOptions) -> Table
     tree: dict[str, Any] = {}
     units: dict[str, str] = {}
 
+    whole = 0
+
     def gather(name: str, node: Any) -> None:
+        nonlocal whole
         if not isinstance(node, h5py.Dataset) or name.startswith("#") or node.size > _MOST:
             return
         if node.dtype.kind in "fiub" or node.dtype.names:
             path = name.replace("/", ".")
+            whole += node.nbytes
+            refuse_unpacked(whole, len(data))
             tree[path] = node[()]
             unit = node.attrs.get("units", node.attrs.get("unit", ""))
             tree.update({f"{path}.{key}": value for key, value in node.attrs.items()})
@@ -211,6 +218,9 @@ def _of_hdf5(place: Path, data: bytes, form: str, options: ReadOptions) -> Table
 
 
 def _of_numpy(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
+    if data.startswith(b"PK"):
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            refuse_unpacked(sum(part.file_size for part in archive.infolist()), len(data))
     loaded = np.load(io.BytesIO(data), allow_pickle=False)
     return table_of_tree(place, dict(loaded) if hasattr(loaded, "files") else loaded, form, options)
 
