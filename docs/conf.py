@@ -24,7 +24,6 @@ html_math_renderer = "mathml"
 
 html_theme = "furo"
 html_title = f"pendpipe {version}"
-html_static_path = ["_static"]
 exclude_patterns = ["_build", "_ext"]
 
 autodoc_member_order = "bysource"
