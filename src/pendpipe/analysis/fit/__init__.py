@@ -9,20 +9,27 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.fit.by_points import (
-    SEEN,
+    as_angles,
     check_fixed,
     fit_points,
     may_be_sine,
     restoring_of,
-    sine_coefficient,
+    told_apart,
 )
-from pendpipe.analysis.fit.by_waveform import fit_waveform
+from pendpipe.analysis.fit.by_waveform import (
+    ODDS,
+    Fitted,
+    fit_waveform,
+    fitted_waveform,
+    waveform_result,
+)
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring, read_fit
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.find import turning_points_of
-from pendpipe.analysis.turning_points.measure import prepare
-from pendpipe.errors import NotAnalysableError, refuse_if
-from pendpipe.quantities import after_number, pretty_unit
+from pendpipe.analysis.turning_points.measure import Samples, prepare
+from pendpipe.errors import NotAnalysableError
+from pendpipe.estimate import Estimate
+from pendpipe.quantities import after_number, pretty_unit, with_error
 from pendpipe.recording import Recording
 
 __all__ = ["FitResult", "fit_recording", "read_fit"]
@@ -31,6 +38,8 @@ _STEP: Final = 1.25
 """By which the least amplitude grows, where the smaller ones contradict every law tried."""
 _LEAST: Final = 0.6
 """Of the first amplitude: so much of the decay is kept at least."""
+_CERTAIN: Final = 100.0
+"""Chi^2 between sin x and x from which the other torque need not be fitted."""
 _FEWEST: Final = 15
 """Turning points of such a part."""
 
@@ -43,6 +52,7 @@ def fit_recording(
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
     points: TurningPoints | None = None,
+    length_m: float | None = None,
     place: str | Path = "recording",
 ) -> FitResult:
     """Fit a, b, c, frequency, amplitude, phase and offset of one free decay.
@@ -55,14 +65,16 @@ def fit_recording(
         ``"waveform"`` (Eq. 8 on all readings) or ``"turning-points"`` (Eq. 14). By default the
         waveform, and the turning points where the waveform's law contradicts the decay.
     restoring
-        The restoring torque, ``"linear"`` or ``"sine"``. By default sin x where the turning
-        points of a recording in radians favour it (`by_points.restoring_of`).
+        The restoring torque, ``"linear"`` or ``"sine"``. By default angles and their rates swing
+        by sin x, unless x alone fits better by a likelihood ratio of 1000; displacements by x.
     baseline
         ``"eq8"``, or ``"viscous"`` for Eq. 3.
     fixed
         Parameters that are held, by name (see `by_points.NAMES`).
     points
         Turning points found before; they are found here when they are not given.
+    length_m
+        Length of the pendulum whose displacement is read, L sin x; by default g/omega^2.
     place
         Named in messages.
 
@@ -80,13 +92,7 @@ def fit_recording(
         or the search did not come to its end.
     """
     check_fixed(fixed or {}, baseline)
-    refuse_if(
-        restoring == "sine" and recording.quantity == "displacement_m",
-        place,
-        "a displacement in metres has no sine",
-        "leave --restoring out, or give --unit",
-    )
-    result = _fit(recording, method, restoring, baseline, fixed, points, place)
+    result = _fit(recording, method, restoring, baseline, fixed, points, length_m, place)
     beats = [note for note in points.notes if note.startswith(BEAT)] if points else []
     if beats:
         # What its turning points lose is no mode's loss.
@@ -108,33 +114,29 @@ def _fit(
     baseline: Baseline,
     fixed: Mapping[str, float] | None,
     points: TurningPoints | None,
+    length_m: float | None,
     place: str | Path,
 ) -> FitResult:
     samples = prepare(recording, place)
     if points is None:
         points = turning_points_of(samples, place)
-    presumed = False
-    if restoring is None:
-        coefficient = sine_coefficient(points)
-        restoring = restoring_of(points, coefficient, stated=recording.unit_is_stated)
-        presumed = restoring == "sine" and not coefficient.agrees
-    elif restoring == "sine" and not may_be_sine(points):
+    position = restoring == "sine" and samples.unit == "m"
+    points, length_m = as_angles(points, length_m, position=position)
+    if restoring == "sine" and not may_be_sine(points):
         largest = float(np.max(points.amplitude_rad))
         raise NotAnalysableError(
             place,
-            f"sin x needs six turning points below pi rad (the largest is"
+            f"sin x needs three turning points below pi rad (the largest is"
             f" {largest:.3g}{after_number(points.unit)})",
             "use --restoring linear",
         )
     if method == "turning-points":
-        return fit_points(points, baseline=baseline, fixed=fixed, restoring=restoring)
-    result = fit_waveform(samples, points, baseline=baseline, fixed=fixed, restoring=restoring)
-    if presumed:
-        linear = fit_waveform(samples, points, baseline=baseline, fixed=fixed, restoring="linear")
-        # All readings may exclude the sin x that few or noisy half cycles do not.
-        more = result.samples * (result.chi2_per_dof - linear.chi2_per_dof)
-        if _stands(linear) and more > SEEN**2 * max(linear.chi2_per_dof, 1.0):
-            result, restoring = linear, "linear"
+        torque = restoring or restoring_of(points, stated=recording.unit_is_stated)
+        return fit_points(points, baseline=baseline, fixed=fixed, restoring=torque)
+    result = _waveform(
+        samples, points, baseline, fixed, restoring, length_m, stated=recording.unit_is_stated
+    )
+    restoring = result.restoring
     if method == "waveform" or _stands(result):
         return result
     by_points = fit_points(points, baseline=baseline, fixed=fixed, restoring=restoring)
@@ -142,13 +144,73 @@ def _fit(
         why = result.light_reason if result.settled else "it did not settle"
         return _amber(by_points, f"from the turning points, because for the waveform {why}")
     for part in _larger_amplitudes(points):
-        larger = fit_waveform(samples, part, baseline=baseline, fixed=fixed, restoring=restoring)
+        larger = fit_waveform(
+            samples, part, baseline=baseline, fixed=fixed, restoring=restoring, length_m=length_m
+        )
         if not _stands(larger):
             larger = fit_points(part, baseline=baseline, fixed=fixed, restoring=restoring)
         if _stands(larger):
             return _of_larger(larger, points, part)
     settled = [each for each in (result, by_points) if each.settled]
     return min(settled, key=_worst, default=by_points)
+
+
+def _waveform(
+    samples: Samples,
+    points: TurningPoints,
+    baseline: Baseline,
+    fixed: Mapping[str, float] | None,
+    restoring: Restoring | None,
+    length_m: float | None,
+    *,
+    stated: bool,
+) -> FitResult:
+    """Fit all readings, with the torque that is given, presumed, or that they ask for."""
+
+    def fitted(torque: Restoring) -> tuple[Fitted, ...]:
+        return fitted_waveform(
+            samples, points, baseline=baseline, fixed=fixed, restoring=torque, length_m=length_m
+        )
+
+    def result(forms: tuple[Fitted, ...]) -> FitResult:
+        return waveform_result(forms, samples, points, baseline, fixed or {})
+
+    if restoring is None and not may_be_sine(points):
+        restoring = "linear"
+    if restoring is None and not stated:
+        restoring = restoring_of(points, stated=False)
+    if restoring is not None:
+        return result(fitted(restoring))
+    sine = fitted("sine")
+    noise = sine[0].goodness.noise_rms
+    plain = sine[0].minimum.converged and sine[0].goodness.enlarged == 1.0
+    if plain and told_apart(points, len(samples), noise) > _CERTAIN:
+        return result(sine)
+    linear = fitted("linear")
+    odds = sine[0].better_by(linear[0])
+    if linear[0].minimum.converged and (odds < -ODDS or not sine[0].minimum.converged):
+        found, words = result(linear), f"10^{-odds / math.log(10.0):.0f}"
+        said = (
+            f"x fits better than sin x by a likelihood ratio of {words}: a spring or torsion wheel"
+        )
+        return replace(found, torque_odds=-odds, warnings=(*found.warnings, said))
+    found = replace(result(sine), torque_odds=odds)
+    if odds > ODDS or not linear[0].minimum.converged:
+        return found
+    other = result(linear)["frequency"]
+    own = found["frequency"]
+    if abs(other.value - own.value) <= own.sd:
+        return found
+    said = (
+        f"as a pendulum {_period(own)}; as a spring or torsion wheel {_period(other)}:"
+        " --restoring linear"
+    )
+    return replace(found, other_frequency=other, warnings=(*found.warnings, said))
+
+
+def _period(frequency: Estimate) -> str:
+    value = 1.0 / frequency.value
+    return with_error(value, frequency.sd * value**2, "s", short=True)
 
 
 def _worst(result: FitResult) -> float:

@@ -6,11 +6,12 @@ amplitude: they also tell which torque the half swings favour, and where fits of
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.fit.goodness import LEVEL, Goodness, tail
 from pendpipe.analysis.fit.least_squares import (
     Bounds,
     Quadratic,
@@ -20,8 +21,8 @@ from pendpipe.analysis.fit.least_squares import (
     minimise,
     moved,
 )
-from pendpipe.analysis.fit.period import TOP, Period, elliptic, fit_period, phases
-from pendpipe.analysis.fit.result import TORQUES, Baseline, FitResult, Restoring, misfit, result_of
+from pendpipe.analysis.fit.period import TOP, Period, elliptic, fit_period, phases, swing_phase
+from pendpipe.analysis.fit.result import TORQUES, Baseline, FitResult, Restoring, result_of
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
@@ -286,7 +287,9 @@ def fit_points(
     held, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
     envelope, period, share = envelope_and_period(points, held, parts, fixed, baseline, restoring)
     a, b, c = (float(rate) for rate in envelope.value[:3])
-    stretched = misfit(envelope.chi2_per_dof, len(points) - 4.0)
+    freedom = max(len(points) - 4.0, 1.0)
+    p_value = tail(envelope.chi2_per_dof, freedom, 1e9)
+    stretched = envelope.chi2_per_dof if p_value < LEVEL else 1.0
     hysteretic = (0.5 if share is None else share) * b
     late = (
         "the period changes along the record as Eq. 8's does not (chi^2 of the times is"
@@ -297,14 +300,14 @@ def fit_points(
         envelope.held,
         points,
         Eq8(period.angular_frequency, a, hysteretic, b - hysteretic, c, restoring),
-        stretched=stretched,
+        goodness=Goodness(
+            points.noise_rms_rad, envelope.chi2_per_dof, (p_value,), max(stretched, 1.0)
+        ),
         said=[late] if period.chi2_per_dof > _LATE else [],
         fixed=fixed,
         method="turning-points",
         baseline=baseline,
-        noise_rms_rad=points.noise_rms_rad,
         residual_rms_rad=float(np.sqrt(np.mean(envelope.residual**2))),
-        chi2_per_dof=envelope.chi2_per_dof,
         samples=points.samples,
         turning_points=len(points),
         settled=envelope.converged,
@@ -337,6 +340,8 @@ def _numbers(
     return value, matrix, ends
 
 
+_ROUNDS: Final = 4
+"""In which the frequency of small swings and their angles settle."""
 _LARGE: Final = 0.2
 """Of the largest amplitude: below, sin x lengthens the period by 4 % of what it does there."""
 _FEWEST: Final = 6
@@ -413,6 +418,87 @@ class Starts(NamedTuple):
     """Of sin x, set free: a torque (1 - eta) x + eta sin x, as far as the period goes."""
 
 
+GRAVITY: Final = 9.80665
+"""Standard, m/s^2."""
+
+
+def as_angles(
+    points: TurningPoints, length_m: float | None = None, *, position: bool = False
+) -> tuple[TurningPoints, float | None]:
+    """Turning points of the angle, from those of its rate or of a position L sin x.
+
+    Between two extremes of the rate, where the pendulum hangs down, the angle turns: its amplitude
+    there is that of both, 2 arcsin(u/2 omega). The level stays that of the readings.
+
+    Parameters
+    ----------
+    points
+        In rad, rad/s, or m.
+    length_m
+        L; by default g/omega^2.
+    position
+        Whether metres are a pendulum's position.
+
+    Returns
+    -------
+    points, length_m
+        In rad; as they are given where they are neither.
+    """
+    half = np.diff(points.half_cycle)
+    if position:
+        apparent = math.tau * points.apparent_frequency_hz
+        length = length_m or GRAVITY / apparent**2
+        for _ in range(0 if length_m else _ROUNDS):
+            angle = np.arcsin(np.clip(points.amplitude_rad / length, -1.0, 1.0))
+            swings = swing_phase(np.abs(angle), "sine") * half
+            length = GRAVITY / (float(np.sum(swings)) / float(np.ptp(points.time_s))) ** 2
+        angle = np.arcsin(np.clip(points.angle_rad / length, -1.0, 1.0))
+        slope = 1.0 / (length * np.maximum(np.cos(angle), 0.1))
+        found = replace(points, angle_rad=angle, angle_sd_rad=points.angle_sd_rad * slope)
+        return replace(found, level_sd_rad=points.level_sd_rad / length, unit="rad"), length
+    if points.unit != "rad/s":
+        return points, None
+    rate, paces = points.amplitude_rad, np.diff(points.time_s) / half
+    omega = math.pi / float(np.median(paces))
+    for _ in range(_ROUNDS):
+        angle = 2.0 * np.arcsin(np.clip(0.5 * rate / omega, -1.0, 1.0))
+        omega = float(np.median(swing_phase(np.abs(angle), "sine") / paces))
+    whole = half == 1
+    sd = points.angle_sd_rad / (omega * np.maximum(np.cos(0.5 * angle), 0.1))
+    turned = np.sqrt(np.maximum(angle[1:] * angle[:-1], 0.0)) * points.side[:-1]
+
+    def between(values: FloatArray) -> FloatArray:
+        return np.asarray(0.5 * (values[1:] + values[:-1])[whole])
+
+    return replace(
+        points,
+        half_cycle=points.half_cycle[:-1][whole],
+        time_s=between(points.time_s),
+        time_sd_s=between(points.time_sd_s),
+        angle_rad=turned[whole],
+        angle_sd_rad=between(sd),
+        level_rad=between(points.level_rad),
+        level_sd_rad=points.level_sd_rad / omega,
+        step_rad=points.step_rad / omega,
+        unit="rad",
+    ), None
+
+
+def told_apart(points: TurningPoints, readings: int, noise: float) -> float:
+    """Chi^2 by which x would miss a pendulum of sin x: what no frequency makes up for."""
+    part = clear(points)
+    if len(part) < 3:
+        return 0.0
+    amplitude = part.amplitude_rad
+    swings = (swing_phase(amplitude, "sine") - math.pi) * np.diff(part.half_cycle)
+    late = np.concatenate([[0.0], np.cumsum(swings)])
+    weight = amplitude[:, None]
+    line = np.stack([np.ones_like(late), part.half_cycle], axis=1)
+    left = amplitude * late - weight * line @ np.linalg.lstsq(weight * line, amplitude * late)[0]
+    in_half_cycle = readings / max(float(np.ptp(points.half_cycle)), 1.0)
+    return 0.5 * in_half_cycle * float(left @ left) / noise**2
+
+
 def start_of(points: TurningPoints, *, stated: bool = True) -> Starts:
     """Find where fits of the linear and of the sine law begin, and which the half cycles favour.
 
@@ -467,7 +553,7 @@ def restoring_of(
 def may_be_sine(points: TurningPoints) -> bool:
     """Whether these are angles below the top, enough of them clear of the noise."""
     inside = points.unit == "rad" and float(np.max(points.amplitude_rad)) < math.pi
-    return inside and len(clear(points)) >= _FEWEST
+    return inside and len(clear(points)) >= 3
 
 
 def _law_start(points: TurningPoints, restoring: Restoring) -> LawStart:

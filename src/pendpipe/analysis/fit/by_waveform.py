@@ -12,9 +12,9 @@ random, which it is not, least of all in the tail.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from pendpipe.analysis.fit.by_points import (
     loss_rates_of,
     share_of,
 )
+from pendpipe.analysis.fit.goodness import Goodness, combined, judge
 from pendpipe.analysis.fit.least_squares import (
     Bounds,
     Minimum,
@@ -33,12 +34,11 @@ from pendpipe.analysis.fit.least_squares import (
     intervals95,
     minimise,
 )
-from pendpipe.analysis.fit.period import TOP, Period, period_excess
-from pendpipe.analysis.fit.result import Baseline, FitResult, Restoring, misfit, result_of
-from pendpipe.analysis.noise import quantisation_rms, white_rms
+from pendpipe.analysis.fit.period import TOP, Period, period_excess, swing_phase
+from pendpipe.analysis.fit.result import Baseline, DragForm, FitResult, Restoring, result_of
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
-from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import (
     Eq8,
     Release,
@@ -48,7 +48,11 @@ from pendpipe.dynamics import (
 )
 from pendpipe.dynamics.eq8 import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.dynamics.kernel import kernel
+from pendpipe.estimate import Estimate
 from pendpipe.physics.decay import amplitude, time_at
+
+Drag = Literal["energy", "speed"]
+Seen = Literal["angle", "rate", "position"]
 
 ROOT_HALF = math.sqrt(0.5)
 DENSITY = 1.0 / math.sqrt(2.0 * math.pi)
@@ -116,15 +120,14 @@ def best_noise(residual: FloatArray, step: float, start: float) -> float:
     return math.exp(grid[best] + min(max(turn, -1.0), 1.0) * (grid[1] - grid[0]))
 
 
+DRIFT: Final = 8
+"""Behind the engine's eight: by how much the zero rises in a second."""
 BOUNDS: Final = Bounds(
-    np.array([0.0, 0.0, 0.0, 0.0, 1e-12, -np.inf, -np.inf, -np.inf]),
-    np.array([np.inf] * 3 + [1.0] + [np.inf] * 4),
+    np.array([0.0, 0.0, 0.0, 0.0, 1e-12, -np.inf, -np.inf, -np.inf, -np.inf]),
+    np.array([np.inf] * 3 + [1.0] + [np.inf] * 5),
 )
 _PIECE: Final = 1 << 18
 """Readings whose Jacobian is in memory at a time: 16 MB."""
-PRIOR_SHARE: Final = 0.5
-PRIOR_INVERSE: Final = 12.0
-"""Anything from 0 to 1 is as likely: mean 1/2, variance 1/12."""
 _SLIGHT: Final = 0.1
 """Of chi^2 in a half cycle: a smaller misfit is not seen in the noise."""
 _BY_SHARE: Final = 0.5 - 4.0 / 3.0 + math.pi**2 / 8.0
@@ -132,6 +135,8 @@ _BY_SHARE: Final = 0.5 - 4.0 / 3.0 + math.pi**2 / 8.0
 (`by_points.period_excess`)."""
 _ENDS: Final = 10.0
 """By which the square of a phase's change is greater at the record's end than its mean."""
+_BESIDE: Final = 2e-3
+"""Phase between the two motions that tell the velocity: 1e-13 of it is lost in the sixth power."""
 
 
 @dataclass(frozen=True)
@@ -144,14 +149,18 @@ class Waveform:
         The readings, shape (n,).
     noise_rms
         Standard deviation of one.
+    split
+        What is told of b's parts: ``"hysteretic"`` or ``"viscous"`` with its rate (1/s)
+        held fixed; empty when the share is marginalised.
     step
         The step of readings whose rounding is not random (see above); `noise_rms` is
         then that before the rounding. Zero: the readings scatter as `noise_rms` says.
-    restoring
-        The restoring torque.
-    split
-        What is told of b's parts: ``"hysteretic"`` or ``"viscous"`` with its rate (1/s)
-        held fixed; empty when the share is marginalised over its prior.
+    restoring, drag
+        The law's restoring torque, and the form of its drag.
+    seen
+        What is read: the angle, its rate, or a position L sin x.
+    length_m
+        L of a position.
     """
 
     time_s: FloatArray
@@ -160,18 +169,63 @@ class Waveform:
     split: Mapping[str, float]
     step: float = 0.0
     restoring: Restoring = "linear"
+    drag: Drag = "energy"
+    seen: Seen = "angle"
+    length_m: float = 1.0
 
     def model(self, value: FloatArray) -> tuple[Eq8, Release]:
         """What moves, and from where, for a set of parameters."""
-        a, b, c, share, omega, angle, time, offset = value.tolist()
+        a, b, c, share, omega, angle, time, offset = value[:DRIFT].tolist()
         told = share_of(self.split, b, "eq8")
         share = share if told is None else told
         law = Eq8(omega, a, share * b, (1.0 - share) * b, c, self.restoring)
-        return law, Release(time, angle, offset)
+        if self.drag == "speed":
+            law = replace(law, drag="speed")
+        return law, Release(time, angle, offset if self.seen == "angle" else 0.0)
+
+    def _zero(self, value: FloatArray, time_s: FloatArray) -> FloatArray | float:
+        """What the zero adds beyond the engine's offset."""
+        middle = 0.5 * float(self.time_s[0] + self.time_s[-1])
+        drift = value[DRIFT] * (time_s - middle) if value[DRIFT] != 0.0 else 0.0
+        return drift if self.seen == "angle" else drift + value[OFFSET]
 
     def residual(self, value: FloatArray) -> FloatArray:
         """Readings less model, shape (n,)."""
-        return self.values - sample(*self.model(value), self.time_s)
+        model, release = self.model(value)
+        if self.seen == "rate":
+            pieces = range(0, len(self.time_s), _PIECE)
+            times = [self.time_s[first : first + _PIECE] for first in pieces]
+            found = np.concatenate([self.read(value, each)[0] for each in times])
+            return np.asarray(self.values - found)
+        angle = sample(model, release, self.time_s)
+        read = self.length_m * np.sin(angle) if self.seen == "position" else angle
+        return np.asarray(self.values - read - self._zero(value, self.time_s))
+
+    def read(self, value: FloatArray, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Readings of the law, shape (n,), and their derivatives by the engine's parameters.
+
+        The motion depends on the time since its release alone, so that its rate is the derivative
+        by the release's time, with the other sign.
+        """
+        model, release = self.model(value)
+        if self.seen != "rate":
+            reading, jacobian = sample_with_jacobian(model, release, time_s)
+            if self.seen == "position":
+                slope = self.length_m * np.cos(reading)
+                reading, jacobian = self.length_m * np.sin(reading), jacobian * slope[:, None]
+                jacobian[:, -1] = 1.0
+            return reading + self._zero(value, time_s), jacobian
+        beside = _BESIDE / model.angular_frequency
+        earlier = replace(release, time_s=release.time_s - beside)
+        later = replace(release, time_s=release.time_s + beside)
+        after, by_after = sample_with_jacobian(model, earlier, time_s)
+        before, by_before = sample_with_jacobian(model, later, time_s)
+        jacobian = (by_after - by_before) / (2.0 * beside)
+        # Both means of the rate miss it by its second derivative, one by three times the other.
+        mean = -0.5 * (by_after[:, -2] + by_before[:, -2])
+        rate = 1.5 * (after - before) / (2.0 * beside) - 0.5 * mean
+        jacobian[:, -1] = 1.0
+        return rate + self._zero(value, time_s), jacobian
 
     def predict_remaining(
         self, value: FloatArray, trial: FloatArray, quadratic: Quadratic, promised: float
@@ -201,37 +255,51 @@ class Waveform:
 
     def evaluate(self, value: FloatArray) -> Quadratic:
         """chi^2, gradient and normal matrix, summed over pieces of the record."""
-        refused = Quadratic(np.inf, np.zeros(8), np.eye(8))
-        model, release = self.model(value)
+        refused = Quadratic(np.inf, np.zeros(len(value)), np.eye(len(value)))
+        try:
+            model, release = self.model(value)
+        except ValueError:
+            return refused
         turns = model.angular_frequency * (self.time_s[-1] - release.time_s) / np.pi
         # Of more half cycles than two a reading nothing is seen, and they would never end.
         lost = not turns < 2.0 * len(self.values) or not np.isfinite(model.stop_rad)
         if release.time_s > self.time_s[0] or lost:
             return refused
         chi2, gradient, normal = 0.0, np.zeros(8), np.zeros((8, 8))
+        by_drift, drifts = np.zeros(8), np.zeros(2)
+        middle = 0.5 * float(self.time_s[0] + self.time_s[-1])
         for first in range(0, len(self.values), _PIECE):
             piece = slice(first, first + _PIECE)
             try:
-                angle, jacobian = sample_with_jacobian(model, release, self.time_s[piece])
+                reading, jacobian = self.read(value, self.time_s[piece])
             except ValueError:
                 # Overdamped: far from anything that turns.
                 return refused
-            left, weight = self.values[piece] - angle, self.noise_rms**-2
+            left, weights = self.values[piece] - reading, None
             if self.step == 0.0:
-                chi2 += weight * float(left @ left)
-                gradient += weight * (jacobian.T @ left)
-                normal += weight * (jacobian.T @ jacobian)
+                chi2 += self.noise_rms**-2 * float(left @ left)
+                score = left
             else:
                 score, weights = np.empty_like(left), np.empty_like(left)
                 chi2 += float(rounded(left, 0.5 * self.step, self.noise_rms, score, weights))
-                gradient += jacobian.T @ score
-                normal += jacobian.T @ (jacobian * weights[:, None])
-        # From the engine's parameters to ours; and the prior.
-        change, off = self.change(value), float(value[SHARE]) - PRIOR_SHARE
-        gradient, normal = change.T @ gradient, change.T @ normal @ change
-        gradient[SHARE] -= PRIOR_INVERSE * off
-        normal[SHARE, SHARE] += PRIOR_INVERSE
-        return Quadratic(chi2 + PRIOR_INVERSE * off**2, gradient, normal)
+            weighted = jacobian if weights is None else jacobian * weights[:, None]
+            late = self.time_s[piece] - middle
+            gradient += jacobian.T @ score
+            normal += jacobian.T @ weighted
+            by_drift += weighted.T @ late
+            own = late if weights is None else late * weights
+            drifts += float(late @ score), float(late @ own)
+        if self.step == 0.0:
+            unit = self.noise_rms**-2
+            gradient, normal = unit * gradient, unit * normal
+            by_drift, drifts = unit * by_drift, unit * drifts
+        # From the engine's parameters to ours.
+        change = self.change(value)
+        full, slope = np.zeros((9, 9)), np.zeros(9)
+        full[:DRIFT, :DRIFT], slope[:DRIFT] = change.T @ normal @ change, change.T @ gradient
+        full[DRIFT, :DRIFT] = full[:DRIFT, DRIFT] = change.T @ by_drift
+        slope[DRIFT], full[DRIFT, DRIFT] = drifts
+        return Quadratic(chi2, slope, full)
 
     def change(self, value: FloatArray) -> FloatArray:
         """Derivative of the engine's parameters by ours, shape (8, 8)."""
@@ -252,6 +320,8 @@ _SLIPPED: Final = (
     "the period changes with the amplitude or the time as Eq. 8's does not:"
     " {:.2g} rad of phase along the record"
 )
+_HIGH: Final = 2.0
+"""Amplitude in rad beyond which no turning point before the first is looked for with sin x."""
 _STOP: Final = 6.0
 """In widths delta = pi c/(2 omega) of the Coulomb stop: amplitudes below are left out."""
 
@@ -271,12 +341,14 @@ def start_values(
     fixed: Mapping[str, float],
     baseline: Baseline,
     restoring: Restoring = "linear",
+    *,
+    samples: Samples | None = None,
 ) -> Start:
     """Turn a fit of the turning points into the waveform's eight parameters.
 
     The release is a turning point before the first reading (a virtual one, if need be),
-    unless the amplitude is held: then it is the first turning point itself. So it is with sin x:
-    there may be none before it below pi.
+    unless the amplitude is held: then it is the first turning point itself. So it is with sin x
+    where the one before would be so large that there may be none below pi.
     """
     points = points if restoring == "linear" else clear(points)
     omega = 2.0 * math.pi * fixed["frequency"] if "frequency" in fixed else None
@@ -294,12 +366,15 @@ def start_values(
         (a, b, c, y0),
         middle_share,
         period,
-        at_first="amplitude" in fixed or restoring == "sine",
+        restoring,
+        at_first="amplitude" in fixed,
     )
     if restoring == "sine":
         angle = math.copysign(min(abs(angle), TOP), angle)
-    offset = float(np.mean(points.level_rad)) - level
-    value = np.array([a, b, c, middle_share, period.angular_frequency, angle, time, offset])
+    # The level is that of the readings, its error that of angles.
+    angles = samples is None or samples.unit == points.unit
+    offset = fixed.get("offset", float(np.mean(points.level_rad)) - (level if angles else 0.0))
+    value = np.array([a, b, c, middle_share, period.angular_frequency, angle, time, offset, 0.0])
     return Start(value, before, (_SLIPPED.format(np.ptp(late)),) if slipped else ())
 
 
@@ -308,6 +383,7 @@ def _release(
     values: tuple[float, float, float, float],
     share: float,
     period: Period,
+    restoring: Restoring,
     *,
     at_first: bool,
 ) -> tuple[float, float, int]:
@@ -325,8 +401,11 @@ def _release(
         earlier = float(amplitude(-(step + 1.0) * half_period, y0, a, b, c))
         if not earlier < 1.5 * last:
             earlier = last * math.exp(min((a * last + b + c / last) * half_period, 0.4))
+        if restoring == "sine" and earlier > _HIGH:
+            return side * y0, first_s, 0
+        lasts = float(swing_phase(np.array([earlier, last]), restoring)[0]) / omega
         middle = np.array([0.5 * (last + earlier)])
-        back += half_period * (1.0 + float(period_excess(middle, omega, a, b, c, share)[0]))
+        back += lasts * (1.0 + float(period_excess(middle, omega, a, b, c, share)[0]))
     return side * (-1.0) ** before * earlier, first_s - back, before
 
 
@@ -336,7 +415,7 @@ def usable_span(samples: Samples, points: TurningPoints, start: Start) -> slice:
     Where Coulomb friction has stopped the pendulum is a discontinuous function of the
     parameters; so the last half cycles before the stop are left out.
     """
-    a, b, c, _, omega, _, time, _ = start.value.tolist()
+    a, b, c, _, omega, _, time, *_ = start.value.tolist()
     half_period = math.pi / omega
     first = time + 0.05 * half_period if start.before == 0 else samples.time_s[0]
     last = float(points.time_s[-1]) + 0.5 * half_period
@@ -354,13 +433,47 @@ _DITHERED: Final = 0.4
 _TOLERANCE: Final = 1e-2
 """Of chi^2: a last step of a tenth of a standard deviation, which leaves far less."""
 _ROUNDS: Final = 2
+_SETTLED: Final = 0.02
+"""By which the mean share may change when the others have followed it."""
+_MOST: Final = 12
+_OTHER: Final = 0.9
+"""Of the noise that was weighed with: below, the minimum was not looked for closely enough."""
+_DRIFTS: Final = 1e-4
+"""Probability of the level's answers below which a straight drift of the zero is fitted."""
+_CLEAR_DRIFT: Final = 5.0
+"""Standard deviations from which it stays."""
+ODDS: Final = math.log(1000.0)
+"""Logarithm of the likelihood ratio from which one of two laws is believed."""
 
 
-class _Fitted(NamedTuple):
+class Fitted(NamedTuple):
+    """A law at its minimum."""
+
     problem: Waveform
     minimum: Minimum
     held: tuple[int, ...]
     start: Start
+    goodness: Goodness
+    share_variance: float
+    """Of the hysteretic share of b, anything from 0 to 1 being as likely beforehand."""
+
+    @property
+    def value(self) -> FloatArray:
+        """The nine parameters."""
+        return self.minimum.value
+
+    @property
+    def chi2(self) -> float:
+        """Of the readings, in units of the noise that was weighed with."""
+        return self.minimum.quadratic.chi2
+
+    def better_by(self, other: Fitted) -> float:
+        """Logarithm of the likelihood over another law's, the noise being the better fit's."""
+        if self.problem.step or other.problem.step:
+            return 0.5 * (other.chi2 - self.chi2)
+        square, others = (each.chi2 * each.problem.noise_rms**2 for each in (self, other))
+        noise = (self if square < others else other).goodness.noise_rms
+        return 0.5 * (others - square) / noise**2
 
 
 def fit_waveform(
@@ -370,7 +483,25 @@ def fit_waveform(
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
     restoring: Restoring = "linear",
+    length_m: float | None = None,
 ) -> FitResult:
+    """Fit Eq. 8 to the readings, starting from the turning points; see `fitted_waveform`."""
+    fixed = fixed or {}
+    fitted = fitted_waveform(
+        samples, points, baseline=baseline, fixed=fixed, restoring=restoring, length_m=length_m
+    )
+    return waveform_result(fitted, samples, points, baseline, fixed)
+
+
+def fitted_waveform(
+    samples: Samples,
+    points: TurningPoints,
+    *,
+    baseline: Baseline = "eq8",
+    fixed: Mapping[str, float] | None = None,
+    restoring: Restoring = "linear",
+    length_m: float | None = None,
+) -> tuple[Fitted, ...]:
     """Fit Eq. 8 to the readings, starting from the turning points.
 
     Parameters
@@ -378,122 +509,253 @@ def fit_waveform(
     samples
         The readings (`pendpipe.analysis.turning_points.measure.prepare`).
     points
-        Their turning points.
+        The turning points of the angle.
     baseline
         ``"eq8"``, or ``"viscous"`` for Eq. 3.
     fixed
         Parameters that are held, by name.
-
     restoring
         ``"linear"`` (Eq. 8), or ``"sine"``: the torque of sin x.
+    length_m
+        The length of a pendulum whose position is read.
 
     Returns
     -------
-    FitResult
-        Without ``cuts`` and ``provenance``, which the caller knows.
+    tuple of Fitted
+        With the drag's energy form and with v|v|, the likelier first; one where there is no drag.
 
     Notes
     -----
     The motion is started at a turning point before the first reading, so that every reading
-    counts; with sin x, at the first turning point, since there may be none before it below pi.
-    b is one parameter; how it divides into hysteretic and viscous is marginalised: any share from
-    0 to 1 is as likely beforehand.
+    counts; with sin x and a large amplitude at the first turning point, since there may be none
+    before it below pi. b is one parameter; how it divides into hysteretic and viscous is
+    marginalised: any share from 0 to 1 is as likely beforehand.
     """
     fixed = fixed or {}
     held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
     held = _held(held_rates, fixed, parts, baseline)
-    start = start_values(points, held_rates, fixed, baseline, restoring)
+    start = start_values(points, held_rates, fixed, baseline, restoring, samples=samples)
     span = usable_span(samples, points, start)
+    seen: Seen = "position" if length_m else "rate" if samples.unit == "rad/s" else "angle"
     problem = Waveform(
         samples.time_s[span],
         samples.values[span],
         points.noise_rms_rad,
         parts,
         restoring=restoring,
+        seen=seen,
+        length_m=length_m or 1.0,
     )
-    minimum = minimise(
+    free_share = SHARE not in held
+    found = _settled(problem, start, start.value, (*held, DRIFT), samples, points, free_share)
+    found = _drifting(found, samples, points, free_share)
+    if A in held or found.value[A] <= 0.0 or not found.minimum.converged:
+        return (found,)
+    other = replace(found.problem, drag="speed")
+    speed = _settled(other, start, found.value, found.held, samples, points, free_share)
+    if not speed.minimum.converged:
+        return (found,)
+    return (speed, found) if speed.better_by(found) > 0.0 else (found, speed)
+
+
+def _minimised(problem: Waveform, value: FloatArray, held: tuple[int, ...]) -> Minimum:
+    return minimise(
         problem.evaluate,
-        start.value,
+        value,
         BOUNDS,
-        held=held,
+        held=(*held, SHARE),
         tolerance=_TOLERANCE,
         predict_remaining=problem.predict_remaining,
         curved=problem.curved,
     )
-    fitted = _refined(_Fitted(problem, minimum, held, start), samples)
-    return _result(fitted, samples, points, baseline, fixed)
 
 
-def _result(
-    fitted: _Fitted,
+def _settled(
+    problem: Waveform,
+    start: Start,
+    value: FloatArray,
+    held: tuple[int, ...],
+    samples: Samples,
+    points: TurningPoints,
+    free_share: bool,
+) -> Fitted:
+    """Minimise until noise, rounding and share are those of the minimum."""
+    minimum = _minimised(problem, value, held)
+    goodness = _judged(problem, minimum, held, samples, points)
+    for _ in range(_MOST):
+        if not math.isfinite(minimum.quadratic.chi2) or problem.step:
+            break
+        moved = False
+        if goodness.noise_rms < _OTHER * problem.noise_rms:
+            problem, moved = replace(problem, noise_rms=goodness.noise_rms), True
+            minimum = minimum._replace(quadratic=problem.evaluate(minimum.value))
+        if free_share:
+            scale = (problem.noise_rms / goodness.noise_rms) ** 2
+            mean, _, others = _share(minimum, held, scale)
+            change = mean - float(minimum.value[SHARE])
+            if abs(change) > _SETTLED:
+                moved = True
+                step = change * others
+                at = BOUNDS.clip(problem.curved(minimum.value, step))
+                minimum = minimum._replace(value=at)
+        if not moved:
+            break
+        minimum = _minimised(problem, minimum.value, held)
+        goodness = _judged(problem, minimum, held, samples, points)
+    problem, minimum, goodness = _rounded(problem, minimum, held, samples, points, goodness)
+    scale = 1.0 if problem.step else (problem.noise_rms / goodness.noise_rms) ** 2
+    variance = _share(minimum, held, scale)[1] if free_share else 0.0
+    return Fitted(problem, minimum, held, start, goodness, variance)
+
+
+def _judged(
+    problem: Waveform,
+    minimum: Minimum,
+    held: tuple[int, ...],
+    samples: Samples,
+    points: TurningPoints,
+) -> Goodness:
+    """Noise and test of fit of what a minimum leaves."""
+    value = minimum.value
+    at_bound = [j for j in (A, B, C) if j not in held and value[j] <= 0.0]
+    lines = 2 - (OFFSET in held) - (DRIFT in held)
+    free = 9 - len({*held, *at_bound, SHARE, OFFSET, DRIFT})
+    largest = float(np.max(np.abs(problem.values)))
+    return judge(
+        problem.time_s,
+        problem.residual(value),
+        points.time_s,
+        points.half_cycle.astype(np.float64),
+        fitted=free,
+        lines=lines,
+        amplitude=points.amplitude_rad,
+        step=samples.step,
+        floor=1e-15 * largest,
+    )
+
+
+def _share(
+    minimum: Minimum, held: tuple[int, ...], scale: float
+) -> tuple[float, float, FloatArray]:
+    """Mean and variance of b's hysteretic share, each from 0 to 1 as likely beforehand.
+
+    Returns
+    -------
+    mean, variance
+        Of the likelihood between 0 and 1, the other parameters following.
+    others
+        By how much each parameter follows the share, shape (9,).
+    """
+    value, (_, gradient, normal) = minimum.value, minimum.quadratic
+    stuck = [j for j in (A, B, C) if value[j] <= 0.0]
+    free = [j for j in range(len(value)) if j not in {*held, *stuck, SHARE}]
+    others = np.zeros(len(value))
+    part = normal[np.ix_(free, free)]
+    size = 1.0 / np.sqrt(np.maximum(part.diagonal(), 1e-300))
+    inverse = np.linalg.pinv(part * size[:, None] * size, rcond=1e-13, hermitian=True)
+    others[free] = -size * (inverse @ (size * normal[free, SHARE]))
+    others[SHARE] = 1.0
+    precision = scale * float(normal[SHARE, SHARE] + normal[SHARE, free] @ others[free])
+    pull = scale * float(others @ gradient)
+    shares = np.linspace(0.0, 1.0, 401)
+    away = shares - value[SHARE]
+    logs = pull * away - 0.5 * max(precision, 0.0) * away**2
+    likely = np.exp(logs - logs.max())
+    likely[[0, -1]] *= 0.5
+    likely /= likely.sum()
+    mean = float(likely @ shares)
+    variance = float(likely @ (shares - mean) ** 2)
+    return mean, max(variance, 1e-12), others
+
+
+def _drifting(fitted: Fitted, samples: Samples, points: TurningPoints, free_share: bool) -> Fitted:
+    """Let the zero drift by a line where its level asks for it."""
+    if OFFSET in fitted.held or combined(fitted.goodness.p_values[:2]) > _DRIFTS:
+        return fitted
+    held = tuple(j for j in fitted.held if j != DRIFT)
+    found = _settled(fitted.problem, fitted.start, fitted.value, held, samples, points, free_share)
+    sd = math.sqrt(covariance(found.minimum.quadratic.normal, (*held, SHARE))[DRIFT, DRIFT])
+    clear = found.minimum.converged and abs(found.value[DRIFT]) > _CLEAR_DRIFT * sd
+    return found if clear else fitted
+
+
+def _rounded(
+    problem: Waveform,
+    minimum: Minimum,
+    held: tuple[int, ...],
+    samples: Samples,
+    points: TurningPoints,
+    goodness: Goodness,
+) -> tuple[Waveform, Minimum, Goodness]:
+    """Take the rounding for what it is, where noise does not make it random.
+
+    Only where Eq. 8 describes the readings to within the step: else every misfit would be
+    blamed on the rounding.
+    """
+    step, value = samples.step, minimum.value
+    if step is None or not math.isfinite(minimum.quadratic.chi2):
+        return problem, minimum, goodness
+    residual = problem.residual(value)
+    rms = math.sqrt(float(residual @ residual) / len(residual))
+    if not rms < math.hypot(_DITHERED, math.sqrt(1.0 / 12.0)) * step:
+        return problem, minimum, goodness
+    rough = problem, minimum, goodness
+    for _ in range(_ROUNDS):
+        noise = best_noise(problem.residual(value), step, 0.1 * step)
+        problem = replace(problem, noise_rms=noise, step=step)
+        minimum = _minimised(problem, value, held)
+        if not math.isfinite(minimum.quadratic.chi2):
+            return rough
+        value = minimum.value
+    return problem, minimum, _judged(problem, minimum, held, samples, points)
+
+
+def waveform_result(
+    forms: Sequence[Fitted],
     samples: Samples,
     points: TurningPoints,
     baseline: Baseline,
     fixed: Mapping[str, float],
 ) -> FitResult:
-    """Judge what the fit has left; return the result."""
-    residual = fitted.problem.residual(fitted.minimum.value)
-    dof = len(residual) - 8 + len(fitted.held)
-    noise, slow = judge_noise(samples, points, residual, fitted.problem)
-    rms = math.sqrt(float(residual @ residual) / len(residual))
-    chi2_per_dof = rms**2 * len(residual) / dof / noise**2
-    # What rounding leaves is slow by nature; its likelihood knows that already.
-    random = fitted.problem.step == 0.0
-    stretched = max(misfit(chi2_per_dof, dof), slow if random else 1.0)
-    # The search weighed the readings by its own first guess of the noise.
-    scale = ((fitted.problem.noise_rms / noise) ** 2 if random else 1.0) / stretched
-    value, matrix, ends = _numbers(fitted, scale, float(samples.time_s[0]))
-    times = fitted.problem.time_s
+    """Put the numbers of the likelier form of the drag together, with errors that cover both."""
+    fitted = forms[0]
+    problem, goodness, value = fitted.problem, fitted.goodness, fitted.value
+    value, matrix, ends = _numbers(fitted, float(samples.time_s[0]))
+    form: DragForm = problem.drag
+    if len(forms) > 1 and fitted.better_by(forms[1]) < ODDS:
+        form = "undecided"
+        others, _, other_ends = _numbers(forms[1], float(samples.time_s[0]))
+        apart = others - value
+        apart[5] = math.remainder(apart[5], math.tau)
+        matrix = matrix + np.outer(apart, apart)
+        pairs = zip(ends, other_ends, strict=True)
+        ends = [(min(one[0], two[0]), max(one[1], two[1])) for one, two in pairs]
+    residual = problem.residual(fitted.value)
+    times = problem.time_s
     inside = (points.time_s >= times[0]) & (points.time_s <= times[-1])
+    drift = None
+    if DRIFT not in fitted.held:
+        sd = math.sqrt(covariance(_weighed(fitted)[0], fitted.held)[DRIFT, DRIFT])
+        drift = Estimate(float(fitted.value[DRIFT]), sd, f"{samples.unit}/s")
     return result_of(
         value,
         matrix,
         ends,
         fitted.held,
         points.chosen(inside),
-        fitted.problem.model(fitted.minimum.value)[0],
-        stretched=stretched,
+        problem.model(fitted.value)[0],
+        goodness=goodness,
         said=fitted.start.warnings,
         fixed=fixed,
         method="waveform",
         baseline=baseline,
-        noise_rms_rad=noise,
-        residual_rms_rad=rms,
-        chi2_per_dof=chi2_per_dof,
+        residual_rms_rad=math.sqrt(float(residual @ residual) / len(residual)),
         samples=len(residual),
         turning_points=len(points),
         settled=fitted.minimum.converged,
+        drag_form=form,
+        zero_drift=drift,
     )
-
-
-def _refined(fitted: _Fitted, samples: Samples) -> _Fitted:
-    """Take the rounding for what it is, where noise does not make it random.
-
-    Only where Eq. 8 describes the readings to within the step: else every misfit would be
-    blamed on the rounding.
-    """
-    step, problem, value = samples.step, fitted.problem, fitted.minimum.value
-    if step is None:
-        return fitted
-    residual = problem.residual(value)
-    rms = math.sqrt(float(residual @ residual) / len(residual))
-    if not rms < math.hypot(_DITHERED, math.sqrt(1.0 / 12.0)) * step:
-        return fitted
-    for _ in range(_ROUNDS):
-        noise = best_noise(problem.residual(value), step, 0.1 * step)
-        problem = replace(problem, noise_rms=noise, step=step)
-        minimum = minimise(
-            problem.evaluate,
-            value,
-            BOUNDS,
-            held=fitted.held,
-            tolerance=_TOLERANCE,
-            curved=problem.curved,
-        )
-        if not math.isfinite(minimum.quadratic.chi2):
-            return fitted
-        value = minimum.value
-    return fitted._replace(problem=problem, minimum=minimum)
 
 
 def _held(
@@ -512,14 +774,28 @@ def _held(
     return tuple(held)
 
 
+def _weighed(fitted: Fitted) -> tuple[FloatArray, FloatArray]:
+    """Normal matrix and gradient by the noise that was found, the share's prior in it."""
+    _, gradient, normal = fitted.minimum.quadratic
+    goodness, problem = fitted.goodness, fitted.problem
+    # What rounding leaves is slow by nature; its likelihood knows that already.
+    scale = 1.0 if problem.step else (problem.noise_rms / goodness.noise_rms) ** 2
+    scale /= goodness.enlarged
+    normal, gradient = normal * scale, gradient * scale
+    if fitted.share_variance > 0.0:
+        own = covariance(normal, fitted.held)[SHARE, SHARE]
+        told = 1.0 / own if own > 0.0 and normal[SHARE, SHARE] > 0.0 else 0.0
+        normal[SHARE, SHARE] += max(1.0 / fitted.share_variance - told, 0.0)
+        gradient[SHARE] = 0.0
+    return normal, gradient
+
+
 def _numbers(
-    fitted: _Fitted, scale: float, start_s: float
+    fitted: Fitted, start_s: float
 ) -> tuple[FloatArray, FloatArray, list[tuple[float, float]]]:
     """The seven parameters, their covariance, and the intervals of a, b, c."""
-    value, held = fitted.minimum.value, fitted.held
-    quadratic = fitted.minimum.quadratic
-    normal, gradient = quadratic.normal * scale, quadratic.gradient * scale
-    normal[SHARE, SHARE] += (1.0 - scale) * PRIOR_INVERSE
+    value, held = fitted.value, fitted.held
+    normal, gradient = _weighed(fitted)
     (amplitude, phase), jacobian = _first_turning_point(fitted, start_s)
     own = covariance(normal, held)
     frequency = 0.5 * value[OMEGA] / math.pi
@@ -528,7 +804,7 @@ def _numbers(
     return numbers, jacobian @ own @ jacobian.T, ends
 
 
-def _first_turning_point(fitted: _Fitted, start_s: float) -> tuple[tuple[float, float], FloatArray]:
+def _first_turning_point(fitted: Fitted, start_s: float) -> tuple[tuple[float, float], FloatArray]:
     """Amplitude at the first turning point kept, phase at the first reading; derivatives.
 
     Returns
@@ -536,9 +812,9 @@ def _first_turning_point(fitted: _Fitted, start_s: float) -> tuple[tuple[float, 
     amplitude_and_phase
         In rad.
     jacobian
-        Of the seven parameters of the result by ours, shape (7, 8).
+        Of the seven parameters of the result by ours, shape (7, 9).
     """
-    value = fitted.minimum.value
+    value = fitted.value
     model, release = fitted.problem.model(value)
     count = fitted.start.before + 1
     turning, by_time, by_angle = turning_points_with_jacobian(model, release, count)
@@ -548,78 +824,12 @@ def _first_turning_point(fitted: _Fitted, start_s: float) -> tuple[tuple[float, 
     side *= -1.0 if fitted.start.before % 2 else 1.0
     omega = float(value[OMEGA])
     amplitude = side * (float(turning.angle_rad[-1]) - release.offset_rad)
-    jacobian = np.zeros((7, 8))
+    jacobian = np.zeros((7, 9))
     jacobian[0, 0] = jacobian[1, 1] = jacobian[2, 2] = jacobian[6, OFFSET] = 1.0
     jacobian[3, OMEGA] = 0.5 / math.pi
-    jacobian[4] = side * high
+    jacobian[4, :DRIFT] = side * high
     jacobian[4, OFFSET] -= side
-    jacobian[5] = -omega * late
+    jacobian[5, :DRIFT] = -omega * late
     jacobian[5, OMEGA] += start_s - time
     phase = omega * (start_s - time) + (0.0 if side > 0 else math.pi)
     return (amplitude, math.remainder(phase, 2.0 * math.pi)), jacobian
-
-
-_CHANCE: Final = 5.0
-_COARSE: Final = 12.0
-"""Readings in a half cycle below which differences would see the motion's own misfit."""
-
-
-def judge_noise(
-    samples: Samples, points: TurningPoints, residual: FloatArray, problem: Waveform
-) -> tuple[float, float]:
-    """Estimate the noise from what the fit leaves.
-
-    The white part comes from fourth differences, which a slow misfit cannot touch, and is
-    never taken below step/sqrt(12). What a, b, c suffer from is the noise at the motion's
-    own frequency: drifts and misfits show there as scatter of the half cycles' residual
-    amplitudes.
-
-    Returns
-    -------
-    rms
-        Of one reading.
-    slow
-        Variance of the half cycles' amplitudes over what white noise makes of it; 1 where chance
-        explains the difference.
-    """
-    floor = quantisation_rms(samples.step)
-    per_half_cycle = len(residual) / max(len(points), 1)
-    if samples.counts or per_half_cycle < _COARSE:
-        rms = points.noise_rms_rad
-    else:
-        rms = white_rms(residual)
-    largest = max(float(problem.values.max()), -float(problem.values.min()))
-    rms = max(rms, floor, 1e-15 * largest)
-    return rms, _slow_noise(points, residual, problem.time_s, rms)
-
-
-def _slow_noise(points: TurningPoints, residual: FloatArray, time: FloatArray, rms: float) -> float:
-    """Scatter of the residual's amplitude in each half cycle against white noise's.
-
-    Each is the residual's product with a parabola that vanishes at the middles between
-    turning points (a half wave, near enough), over the root of the parabola's square.
-    """
-    middles = 0.5 * (points.time_s[1:] + points.time_s[:-1])
-    edges = np.searchsorted(time, middles)
-    readings = np.diff(edges)
-    if len(middles) < 10 or readings.min() < 3:
-        return 1.0
-    ratio = _mean_square(middles, edges, time, residual) / rms**2
-    return ratio if ratio > 1.0 + _CHANCE * math.sqrt(2.0 / len(readings)) else 1.0
-
-
-@kernel(any_order=True)
-def _mean_square(
-    middles: FloatArray, edges: IntArray, time_s: FloatArray, residual: FloatArray
-) -> float:
-    """Return the mean square of the half cycles' residual amplitudes; see `_slow_noise`."""
-    total = 0.0
-    for k in range(middles.size - 1):
-        inverse, product, square = 1.0 / (middles[k + 1] - middles[k]), 0.0, 0.0
-        for i in range(edges[k], edges[k + 1]):
-            share = (time_s[i] - middles[k]) * inverse
-            parabola = share * (1.0 - share)
-            product += residual[i] * parabola
-            square += parabola * parabola
-        total += product * product / square
-    return total / (middles.size - 1)

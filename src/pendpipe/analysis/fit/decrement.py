@@ -11,6 +11,7 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.fit.goodness import LEVEL, combined, normal_tail
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.quantities import compact, with_error
@@ -20,8 +21,9 @@ TOLERANCE: Final = 0.05
 """Part of the decrement by which a law may miss it whatever the errors are."""
 _CONFIRMED: Final = 0.10
 """A decrement known worse than this confirms nothing."""
-_CERTAIN: Final = 2.0
-"""Standard deviations from which a difference contradicts."""
+_CERTAIN: Final = 3.9
+"""Standard deviations from which a difference contradicts: three such questions are asked among
+the dozen that share one level (`goodness.LEVEL`)."""
 _FEWEST: Final = 5
 """Turning points of a window: a parabola, the level's error, and one to judge the scatter."""
 _FALL: Final = 0.4
@@ -54,9 +56,17 @@ class Decrement(NamedTuple):
 
     @property
     def contradicts(self) -> bool:
-        """Whether they differ by more than 5 % and by more than two standard deviations."""
+        """Whether they differ by more than 5 % and by more than chance explains."""
         off = abs(self.fitted - self.seen)
         return not (off <= TOLERANCE * abs(self.seen) or off <= _CERTAIN * self.seen_sd)
+
+    @property
+    def p_value(self) -> float:
+        """How often chance alone makes them differ so; 1 within 5 %."""
+        off = abs(self.fitted - self.seen)
+        if off <= TOLERANCE * abs(self.seen):
+            return 1.0
+        return normal_tail(off / self.seen_sd) if self.seen_sd > 0.0 else 0.0
 
     @property
     def confirms(self) -> bool:
@@ -189,15 +199,17 @@ def _slow_loss(law: Eq8, amplitude: float) -> float:
     return law.quadratic * amplitude + b + law.coulomb / amplitude
 
 
-def light_of(checks: Sequence[Decrement], *, misfit: float, unit: str) -> tuple[Light, str]:
+def light_of(
+    checks: Sequence[Decrement], p_values: Sequence[float], *, unit: str
+) -> tuple[Light, str]:
     """Say how far a fit may be believed.
 
     Parameters
     ----------
     checks
         Of the decrement.
-    misfit
-        By what the variances were enlarged; 1 where the noise explains what is left.
+    p_values
+        Of all questions of the test of fit.
     unit
         Of the amplitude.
 
@@ -216,7 +228,7 @@ def light_of(checks: Sequence[Decrement], *, misfit: float, unit: str) -> tuple[
         return "red", f"the fitted law contradicts the decay: {worst.sentence(unit)}"
     if len(checks) < 3 or not all(check.confirms for check in checks):
         return "amber", "the turning points do not show the decrement well enough to check the law"
-    if misfit > 1.0:
+    if combined(p_values) < LEVEL:
         return "amber", (
             "the law loses what the decay loses, but the readings differ from it by more than"
             " noise: the standard deviations are enlarged"

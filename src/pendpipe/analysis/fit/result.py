@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 
 from pendpipe.analysis.fit.decrement import Decrement, Light, check_decrement, light_of
+from pendpipe.analysis.fit.goodness import Goodness, combined
 from pendpipe.analysis.fit.least_squares import CHI2_95
 from pendpipe.analysis.fit.quality import (
     LOSSES,
@@ -38,8 +39,10 @@ if TYPE_CHECKING:
 Method = Literal["waveform", "turning-points"]
 Baseline = Literal["eq8", "viscous"]
 Restoring = Literal["linear", "sine"]
+DragForm = Literal["energy", "speed", "undecided"]
 TORQUES: Final[tuple[Restoring, ...]] = ("linear", "sine")
 PARTS: Final = ("quality_factor_hysteretic", "quality_factor_viscous")
+OPTIONAL: Final = ("zero_drift", "other_frequency")
 PARAMETERS: Final = ("a", "b", "c", "frequency", "amplitude", "phase", "offset")
 
 
@@ -100,6 +103,21 @@ class FitResult:
         Whether the search came to its end; a fit that did not is no result.
     decrement_check
         The law's loss beside that of the turning points, the large amplitude first.
+    fit_p_value
+        Of the one test of fit, over all its questions (`goodness`, `decrement`).
+    drag_form
+        Which form of the drag the readings prefer; undecided where neither is a thousand times as
+        likely as the other: then the errors cover both.
+    drag
+        The form that `law` has: the likelier.
+    zero_drift
+        By how much the zero rises in a second, where the readings ask for it.
+    other_frequency
+        Eq. 8's frequency with the other torque, where the readings can't
+        decide between the two and the frequencies differ by more than their error.
+    torque_odds
+        Logarithm of the likelihood of the fitted torque over the other's; None where it was not
+        asked for.
     light, light_reason
         How far the numbers may be believed (`decrement.light_of`), and why.
     points, decay
@@ -126,6 +144,12 @@ class FitResult:
     restoring: Restoring = "linear"
     settled: bool = True
     decrement_check: tuple[Decrement, ...] = ()
+    fit_p_value: float | None = None
+    drag_form: DragForm = "energy"
+    drag: Literal["energy", "speed"] = "energy"
+    zero_drift: Estimate | None = None
+    other_frequency: Estimate | None = None
+    torque_odds: float | None = None
     light: Light = "amber"
     light_reason: str = "the decrement was not checked"
     points: TurningPoints | None = field(default=None, repr=False, compare=False)
@@ -201,7 +225,7 @@ class FitResult:
         b, held = self.value("b"), self.quality_factor_hysteretic
         share = 0.5 * b if held is None else math.pi * self.value("frequency") / held.value
         hysteretic = min(max(share, 0.0), b)
-        return Eq8(
+        law = Eq8(
             2.0 * math.pi * self.value("frequency"),
             self.value("a"),
             hysteretic,
@@ -209,6 +233,8 @@ class FitResult:
             self.value("c"),
             restoring=self.restoring,
         )
+        speed = self.drag == "speed"
+        return replace(law, drag="speed") if speed else law
 
     def plot(self) -> Figure:
         """Draw the decay with its fit, what the fit leaves, and Q against amplitude."""
@@ -280,6 +306,11 @@ class FitResult:
             "method": self.method,
             "baseline": self.baseline,
             "restoring": self.restoring,
+            "drag_form": self.drag_form,
+            "drag": self.drag,
+            "fit_p_value": self.fit_p_value,
+            "torque_log_odds": self.torque_odds,
+            **{name: getattr(self, name) and getattr(self, name).as_json() for name in OPTIONAL},
             "light": self.light,
             "light_reason": self.light_reason,
             "decrement_check": [check._asdict() for check in self.decrement_check],
@@ -308,7 +339,8 @@ class FitResult:
         limit = content["quality_factor_limit"]
         covariance = content["covariance"]
         held: dict[str, Any] = {
-            name: content[name] and Estimate.from_json(content[name]) for name in PARTS
+            name: content[name] and Estimate.from_json(content[name])
+            for name in (*PARTS, *OPTIONAL)
         }
         return cls(
             method=content["method"],
@@ -328,6 +360,10 @@ class FitResult:
             provenance=content["provenance"],
             warnings=tuple(content["warnings"]),
             restoring=content["restoring"],
+            drag_form=content["drag_form"],
+            drag=content["drag"],
+            fit_p_value=content["fit_p_value"],
+            torque_odds=content["torque_log_odds"],
             light=content["light"],
             light_reason=content["light_reason"],
             decrement_check=tuple(Decrement(**check) for check in content["decrement_check"]),
@@ -335,10 +371,10 @@ class FitResult:
         )
 
 
-_LOUD: Final = 5.0
-"""Standard deviations of chi^2 by which a misfit is told from chance."""
-_UNDETERMINED: Final = 0.01
-"""Part of the loss at the start by which a y0 may be uncertain before the record is a tail."""
+_MIXED: Final = 0.95
+"""Correlation of a and b from which a record tells their sum, and not each."""
+_SEEN: Final = 3.0
+"""Standard deviations from which a rate is seen."""
 
 
 def result_of(
@@ -349,7 +385,7 @@ def result_of(
     points: TurningPoints,
     law: Eq8,
     *,
-    stretched: float,
+    goodness: Goodness,
     said: Iterable[str],
     fixed: Mapping[str, float],
     **rest: Any,
@@ -366,8 +402,8 @@ def result_of(
         Which of a, b, c (0, 1, 2) are not fitted.
     points, law
         The turning points that were fitted, and the law.
-    stretched
-        By what the variances were multiplied (`misfit`).
+    goodness
+        The noise, and how well the law describes the readings.
     said
         Warnings of the fit itself; the notes of the turning points stand before them.
     fixed
@@ -385,7 +421,8 @@ def result_of(
     b = parameters["b"]
     limit = quality_of_rate(parameters["frequency"].value, b) if b.value > 0.0 else None
     checks = check_decrement(points, law)
-    light, reason = light_of(checks, misfit=stretched, unit=points.unit)
+    p_values = (*goodness.p_values, *(check.p_value for check in checks))
+    light, reason = light_of(checks, p_values, unit=points.unit)
     rest |= {name: Estimate(fixed[name], 0.0, "") for name in PARTS if name in fixed}
     result = FitResult(
         parameters=parameters,
@@ -393,26 +430,24 @@ def result_of(
         covariance_order=PARAMETERS,
         covariance=covariance,
         restoring=law.restoring,
+        drag=getattr(law, "drag", "energy"),
+        noise_rms_rad=goodness.noise_rms,
+        chi2_per_dof=goodness.chi2_per_dof,
+        fit_p_value=combined(p_values),
         decrement_check=checks,
         light=light,
         light_reason=reason,
         **rest,
     )
-    return replace(result, warnings=(*points.notes, *_warnings(result, stretched), *said))
-
-
-def misfit(chi2_per_dof: float, dof: float) -> float:
-    """By what the variances are multiplied: chi^2 per dof where chance can't explain it."""
-    if chi2_per_dof > 1.0 + _LOUD * math.sqrt(2.0 / max(dof, 1.0)):
-        return chi2_per_dof
-    return 1.0
+    return replace(result, warnings=(*points.notes, *_warnings(result, goodness.enlarged), *said))
 
 
 def _warnings(result: FitResult, stretched: float) -> list[str]:
     """What the reader of these numbers should know, a clause each."""
-    a, b, c = (result.parameters[name] for name in ("a", "b", "c"))
-    y0 = result.parameters["amplitude"].value
-    rate = a.value * y0 + b.value + c.value / y0
+    a, b, _ = (result.parameters[name] for name in ("a", "b", "c"))
+    matrix = result.covariance_of("a", "b")
+    mixed = matrix[0, 1] < -_MIXED * a.sd * b.sd if a.sd > 0.0 and b.sd > 0.0 else False
+    unclear = a.value < _SEEN * a.sd or b.value < _SEEN * b.sd
     slow = result.chi2_per_dof <= 0.9 * stretched
     seen = "the half cycles scatter, in the square," if slow else "chi^2 of the readings is"
     warnings = (
@@ -430,7 +465,7 @@ def _warnings(result: FitResult, stretched: float) -> list[str]:
             " enlarged by its root; see pendpipe diagnose",
         ),
         (
-            result.baseline == "eq8" and a.sd * y0 > _UNDETERMINED * rate,
+            result.baseline == "eq8" and mixed and unclear,
             "a can't be told from b here: the record holds too little of large amplitudes (a tail);"
             " a, b, c of a tail depend on where it begins",
         ),

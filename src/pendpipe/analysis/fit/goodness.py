@@ -1,0 +1,242 @@
+"""The one test of fit, and the noise of a reading, from what a fit leaves.
+
+What a fit of the right law leaves is white. So the residual is demodulated: in blocks of a few
+cycles a level and the first harmonics of the motion are fitted to it. What they leave is the noise;
+what they take is asked whether noise explains it, as scatter from block to block and as a slow
+change along the record. All questions share one level.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.noise import quantisation_rms, undithered_rms
+from pendpipe.arrays import AnyArray, FloatArray
+
+LEVEL: Final = 1e-3
+"""How often a recording of the fitted law may be refuted by chance, over all questions."""
+_BINS: Final = 32
+"""Means in a cycle that stand for more readings than that."""
+_READINGS: Final = 32
+"""In a block, at least: its level and three harmonics are seven numbers."""
+_BLOCKS: Final = 128
+"""Of a record, at most."""
+_SLOW: Final = 8
+"""Polynomials that follow a slow change along the record."""
+
+
+class Question(NamedTuple):
+    """A sum of squares, in units of the noise's variance, and its degrees of freedom."""
+
+    name: str
+    chi2: float
+    freedom: float
+
+
+class Goodness(NamedTuple):
+    """How well a law describes the readings."""
+
+    noise_rms: float
+    """Of one reading, never below step/sqrt(12)."""
+    chi2_per_dof: float
+    """Of the residual against that noise."""
+    p_values: tuple[float, ...]
+    """Of each question."""
+    enlarged: float
+    """By what variances are multiplied: 1 where noise explains the residual."""
+
+    @property
+    def p_value(self) -> float:
+        """Of the worst answer, all questions considered."""
+        return combined(self.p_values)
+
+
+def combined(p_values: Sequence[float]) -> float:
+    """The probability that the least of some p-values is as small by chance."""
+    least = min(p_values, default=1.0)
+    return -math.expm1(len(p_values) * math.log1p(-least)) if least < 1.0 else 1.0
+
+
+def tail(ratio: float, freedom: float, of_noise: float) -> float:
+    """Probability that Fisher's F exceeds a ratio, by Paulson's normal deviate.
+
+    Examples
+    --------
+    >>> round(tail(3.84, 1.0, 1e9), 2)
+    0.05
+    """
+    if not ratio > 0.0:
+        return 1.0
+    root = ratio ** (1.0 / 3.0)
+    below, above = 2.0 / (9.0 * of_noise), 2.0 / (9.0 * freedom)
+    deviate = ((1.0 - below) * root - (1.0 - above)) / math.sqrt(below * root**2 + above)
+    return 0.5 * math.erfc(deviate * math.sqrt(0.5))
+
+
+def normal_tail(deviate: float) -> float:
+    """Probability that a normal number exceeds another in size."""
+    return math.erfc(abs(deviate) * math.sqrt(0.5))
+
+
+def judge(
+    time_s: FloatArray,
+    residual: FloatArray,
+    turn_s: FloatArray,
+    half_cycle: FloatArray,
+    *,
+    fitted: int,
+    lines: int,
+    amplitude: FloatArray,
+    step: float | None,
+    floor: float,
+) -> Goodness:
+    """Estimate the noise, and ask whether it explains the residual.
+
+    Parameters
+    ----------
+    time_s, residual
+        Readings less model, shape (n,).
+    turn_s, half_cycle
+        Times and numbers of turning points: the phase of the motion, shape (k,).
+    fitted, lines
+        How many parameters were fitted to the motion, and how many to its level.
+    amplitude
+        Of the turning points; with the step it says what rounding leaves of the motion.
+    step
+        Of the readings, where known.
+    floor
+        Noise that can't be less.
+    """
+    n, freedom = len(residual), max(len(residual) - fitted - lines, 1)
+    square = float(residual @ residual)
+    phase, sums, weights = _binned(time_s, residual, turn_s, half_cycle)
+    cycles = (phase[-1] - phase[0]) / (2.0 * math.pi)
+    harmonics = int(min(max((n / max(cycles, 1.0) - 2.0) / 3.0, 1.0), 3.0))
+    size = 1 + 2 * harmonics
+    count = int(min(max(n // _READINGS, 1), max(cycles, 1.0), _BLOCKS))
+    found = _demodulated(phase, sums, weights, count, harmonics)
+    count = len(found.square)
+    of_noise = n - size * count
+    if of_noise < 8:
+        noise = max(math.sqrt(square / freedom), quantisation_rms(step), floor)
+        return Goodness(noise, square / freedom / noise**2, (), 1.0)
+    noise = math.sqrt(max(square - float(np.sum(found.square)), 0.0) / of_noise)
+    noise = max(noise, quantisation_rms(step), floor)
+    rounding = undithered_rms(np.interp(found.phase, half_cycle * math.pi, amplitude), step, noise)
+    asked = list(_questions(found, noise, rounding, fitted, lines))
+    p_values = tuple(tail(each.chi2 / each.freedom, each.freedom, of_noise) for each in asked)
+    ratio = square / freedom / noise**2
+    if combined(p_values) >= LEVEL:
+        return Goodness(noise, ratio, p_values, 1.0)
+    # What a, b, c suffer from is what is left at the motion's own frequency.
+    own = max(each.chi2 / each.freedom for each in asked if each.name == "motion")
+    return Goodness(noise, ratio, p_values, max(ratio, own, 1.0))
+
+
+def _binned(
+    time_s: FloatArray, residual: FloatArray, turn_s: FloatArray, half_cycle: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Phase, sum and number of readings: of each reading, or of many in a part of a cycle."""
+    turns = half_cycle * math.pi
+    pace = np.diff(turns[[0, -1]])[0] / (turn_s[-1] - turn_s[0])
+    per_cycle = len(time_s) * 2.0 * math.pi / (pace * (time_s[-1] - time_s[0]))
+
+    def phase_at(when: FloatArray) -> FloatArray:
+        beyond = np.where(when < turn_s[0], when - turn_s[0], np.maximum(when - turn_s[-1], 0.0))
+        return np.asarray(np.interp(when, turn_s, turns) + pace * beyond)
+
+    if per_cycle < 2 * _BINS:
+        return phase_at(time_s), residual, np.ones(len(residual))
+    first, last = phase_at(time_s[[0, -1]]).tolist()
+    edges = np.linspace(first, last, math.ceil((last - first) / (2.0 * math.pi) * _BINS) + 1)
+    when = np.interp(edges, turns, turn_s)
+    before, behind = edges < turns[0], edges > turns[-1]
+    when[before] = turn_s[0] + (edges[before] - turns[0]) / pace
+    when[behind] = turn_s[-1] + (edges[behind] - turns[-1]) / pace
+    place = np.searchsorted(time_s, when)
+    place[0], place[-1] = 0, len(time_s)
+    running = np.concatenate([[0.0], np.cumsum(residual)])
+    weights = np.diff(place).astype(np.float64)
+    some = weights > 0.0
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    return middle[some], np.diff(running[place])[some], weights[some]
+
+
+class _Blocks(NamedTuple):
+    """Whitened coefficients of some blocks, shape (k, terms), for unit noise."""
+
+    phase: FloatArray
+    """In the middle of each, shape (k,)."""
+    value: FloatArray
+    inverse: FloatArray
+    """Covariance of the coefficients for unit noise, shape (k, terms, terms)."""
+    square: FloatArray
+    """What they take off the sum of squares, shape (k,)."""
+
+
+def _demodulated(
+    phase: FloatArray, sums: FloatArray, weights: FloatArray, count: int, harmonics: int
+) -> _Blocks:
+    """Fit a level and harmonics to each block."""
+    edges = np.linspace(phase[0], phase[-1], count + 1)
+    place = np.searchsorted(phase, edges[:-1])
+    wave = np.exp(1j * phase)
+    powers: list[AnyArray] = [np.ones_like(wave)]
+    for _ in range(2 * harmonics):
+        powers.append(powers[-1] * wave)
+    # Products of cosines and sines are those of sums and differences of their phases.
+    folded = np.stack([np.add.reduceat(weights * power, place) for power in powers])
+    taken = np.stack([np.add.reduceat(sums * power, place) for power in powers[: harmonics + 1]])
+    columns = [(0, 0)] + [(h, part) for h in range(1, harmonics + 1) for part in (0, 1)]
+    size = len(columns)
+    gram, right = np.empty((count, size, size)), np.empty((count, size))
+    for p, (h, sine) in enumerate(columns):
+        right[:, p] = taken[h].imag if sine else taken[h].real
+        for q, (k, other) in enumerate(columns):
+            add, less = folded[h + k], folded[abs(h - k)]
+            if sine and other:
+                gram[:, p, q] = 0.5 * (less.real - add.real)
+            elif not sine and not other:
+                gram[:, p, q] = 0.5 * (less.real + add.real)
+            else:
+                turn = (h - k if sine else k - h) >= 0
+                gram[:, p, q] = 0.5 * (add.imag + (less.imag if turn else -less.imag))
+    # Blocks with a gap tell not all of them.
+    least = np.linalg.eigvalsh(gram)[:, 0]
+    whole = least > 0.02 * gram[:, 0, 0]
+    gram, right = gram[whole], right[whole]
+    inverse = np.asarray(np.linalg.inv(gram), dtype=np.float64)
+    value = np.einsum("kpq,kq->kp", inverse, right)
+    middle = 0.5 * (edges[1:] + edges[:-1])[whole]
+    return _Blocks(middle, value, inverse, np.einsum("kp,kp->k", value, right))
+
+
+def _questions(
+    found: _Blocks, noise: float, rounding: FloatArray, fitted: int, lines: int
+) -> list[Question]:
+    """What noise has to explain, of each harmonic: scatter of the blocks, and slow change."""
+    size, count = found.value.shape[1], len(found.value)
+    asked = []
+    for harmonic in range((size + 1) // 2):
+        part = slice(2 * harmonic - 1, 2 * harmonic + 1) if harmonic else slice(0, 1)
+        absorbed = (lines, fitted)[harmonic] if harmonic < 2 else 0
+        variance = found.inverse[:, part, part] * noise**2
+        wide = variance.shape[1]
+        variance = variance + np.eye(wide) * rounding[:, None, None] ** 2
+        # Each is a normal number of its own.
+        root = np.linalg.cholesky(variance)
+        white = np.linalg.solve(root, found.value[:, part, None])[..., 0]
+        freedom = wide * count - absorbed
+        name = ("level", "motion")[harmonic] if harmonic < 2 else f"harmonic {harmonic}"
+        if freedom > 0:
+            asked.append(Question(name, float(np.sum(white**2)), freedom))
+        slow = min(_SLOW, count // 3)
+        if wide * slow - absorbed < 1:
+            continue
+        powers = np.linspace(-1.0, 1.0, count)[:, None] ** np.arange(slow)
+        basis = np.linalg.qr(powers)[0]
+        taken = float(np.sum((basis.T @ white) ** 2))
+        asked.append(Question(f"{name}, slow", taken, wide * slow - absorbed))
+    return asked
