@@ -20,7 +20,6 @@ from pendpipe.analysis.fit.period import elliptic
 from pendpipe.analysis.turning_points import TurningPoints, find_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, turning_points
-from pendpipe.errors import InputError
 from pendpipe.files import read_json
 from pendpipe.recording import Recording
 
@@ -194,15 +193,32 @@ def test_a_wheel_that_turns_far_stays_linear() -> None:
     assert result.value("c") == pytest.approx(0.01, abs=4.0 * result.parameters["c"].sd)
 
 
-def test_a_small_swing_is_fitted_as_before() -> None:
+def test_x_that_the_readings_prefer_is_fitted_and_said() -> None:
     law = Eq8(OMEGA, 0.1, 0.005, 0.005, 1e-4)
     recording = recorded(sample(law, Release(-0.2, 0.07), TIME), TIME, 1e-4)
-    points = find_turning_points(recording)
-    auto, linear = (
-        fit_recording(recording, points=points, restoring=restoring)
-        for restoring in (None, "linear")
-    )  # type: ignore[misc]
-    assert auto.to_dict() == linear.to_dict()
+    auto, linear = (fit_recording(recording, restoring=each) for each in (None, "linear"))  # type: ignore[arg-type]
+    assert auto.parameters == linear.parameters
+    assert (auto.torque_odds or 0.0) > math.log(1000.0)
+    assert any("x fits better than sin x by a likelihood ratio of 10^" in w for w in auto.warnings)
+
+
+def test_an_angle_swings_by_sin_x_where_its_readings_cannot_tell() -> None:
+    """And the answer gives the period of a wheel beside that of a pendulum."""
+    time = np.arange(0.0, 60.0, 0.02)
+    law = Eq8(OMEGA, viscous=0.01, restoring="sine")
+    periods = []
+    for seed in (1, 2):
+        values = sample(law, Release(-0.2, 0.05), time)
+        noise = 5e-4 * np.random.default_rng(seed).standard_normal(len(time))
+        result = fit_recording(Recording(time, values + noise, "angle_rad"))
+        assert result.restoring == "sine"
+        assert abs(result.torque_odds or math.inf) < math.log(1000.0)
+        assert result.other_frequency is not None
+        assert any("--restoring linear" in warning for warning in result.warnings)
+        off = result["frequency"].value - 0.5 * OMEGA / math.pi
+        assert abs(off) < 4.0 * result["frequency"].sd
+        periods.append(result["frequency"].value)
+    assert np.ptp(periods) < 5.0 * result["frequency"].sd
 
 
 def test_the_turning_points_alone_know_sin_x() -> None:
@@ -225,10 +241,40 @@ def test_what_is_held_is_held_with_sin_x() -> None:
         assert result.value("offset") == 0.01
 
 
-def test_metres_have_no_sine() -> None:
-    values = sample(Eq8(OMEGA, viscous=0.01), Release(-0.2, 0.5), TIME)
-    with pytest.raises(InputError, match="metres has no sine"):
-        fit_recording(Recording(TIME, values, "displacement_m"), restoring="sine")
+@pytest.mark.parametrize("length_m", [0.6, None])
+def test_a_position_swings_as_l_sin_x(length_m: float | None) -> None:
+    omega, time = math.sqrt(9.80665 / 0.6), np.arange(0.0, 40.0, 0.01)
+    angle = sample(Eq8(omega, viscous=0.01, restoring="sine"), Release(-0.2, 0.5), time)
+    noise = 1e-4 * np.random.default_rng(3).standard_normal(len(time))
+    recording = Recording(time, 0.6 * np.sin(angle) + 0.02 + noise, "displacement_m")
+    result = fit_recording(recording, restoring="sine", length_m=length_m)
+    assert (result.light, result["amplitude"].unit) == ("green", "rad")
+    assert abs(result["frequency"].value - 0.5 * omega / math.pi) < 4.0 * result["frequency"].sd
+    assert abs(result["b"].value - 0.01) < 4.0 * result["b"].sd
+    assert abs(result["offset"].value - 0.02) < 4.0 * result["offset"].sd
+
+
+@pytest.mark.parametrize("amplitude", [0.15, 0.35, 1.5])
+def test_a_rate_is_that_of_a_pendulum(amplitude: float) -> None:
+    """A gyroscope's reading: T0, a and c are those of the angle."""
+    law = Eq8(OMEGA, 0.02, 0.004, 0.006, 1e-3, restoring="sine")
+    time, step = np.arange(0.0, 60.0, 0.01), 1e-6
+    release = Release(-0.2, amplitude)
+    rate = sample(law, release, time + step) - sample(law, release, time - step)
+    noise = 1e-3 * np.random.default_rng(3).standard_normal(len(time))
+    values = rate / (2.0 * step) + 0.01 + noise
+    recording = Recording(time, values, "reading", metadata={"unit": "rad/s"})
+    result = fit_recording(recording)
+    assert (result.restoring, result.light, result["amplitude"].unit) == ("sine", "green", "rad")
+    for name, value in {
+        "frequency": 0.5 * OMEGA / math.pi,
+        "b": 0.01,
+        "a": 0.02,
+        "c": 1e-3,
+    }.items():
+        low, high = result[name].bounds95
+        assert low - result[name].sd <= value <= high + result[name].sd
+    assert result.noise_rms_rad == pytest.approx(1e-3, rel=0.05)
 
 
 def test_where_only_the_smallest_swings_contradict_the_larger_are_fitted() -> None:

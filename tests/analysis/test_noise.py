@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from pendpipe.analysis.fit.by_waveform import _mean_square
 from pendpipe.analysis.noise import noise_rms, quantisation_rms, white_rms
 
 SWING = np.cos(np.arange(20000) * 0.06)
@@ -33,14 +32,6 @@ def test_glitches_are_no_noise() -> None:
 def test_noise_is_never_below_the_rounding() -> None:
     assert noise_rms(np.zeros(1000), 0.1) == quantisation_rms(0.1) == 0.1 / math.sqrt(12.0)
     assert quantisation_rms(None) == 0.0
-
-
-def test_half_cycles_of_white_noise_scatter_as_it() -> None:
-    time = np.arange(60_000) * 0.01
-    noise = 0.3 * np.random.default_rng(4).standard_normal(len(time))
-    middles = np.arange(1.0, 599.0)
-    square = _mean_square(middles, np.searchsorted(time, middles), time, noise)
-    assert square == pytest.approx(0.3**2, rel=4.0 * math.sqrt(2.0 / 597))
 
 
 def test_the_quietest_tenth_hears_no_drum_that_beats_for_most_of_the_time() -> None:

@@ -374,7 +374,7 @@ def start_values(
     # The level is that of the readings, its error that of angles.
     angles = samples is None or samples.unit == points.unit
     offset = fixed.get("offset", float(np.mean(points.level_rad)) - (level if angles else 0.0))
-    value = np.array([a, b, c, middle_share, period.angular_frequency, angle, time, offset, 0.0])
+    value = np.array([a, b, c, middle_share, period.angular_frequency, angle, time, offset])
     return Start(value, before, (_SLIPPED.format(np.ptp(late)),) if slipped else ())
 
 
@@ -433,8 +433,10 @@ _DITHERED: Final = 0.4
 _TOLERANCE: Final = 1e-2
 """Of chi^2: a last step of a tenth of a standard deviation, which leaves far less."""
 _ROUNDS: Final = 2
-_SETTLED: Final = 0.02
-"""By which the mean share may change when the others have followed it."""
+_SETTLED: Final = 0.1
+"""Standard deviations by which the mean share may change when the others have followed it."""
+_REACH: Final = 6.0
+"""Standard deviations within which the share's likelihood is looked at."""
 _MOST: Final = 12
 _OTHER: Final = 0.9
 """Of the noise that was weighed with: below, the minimum was not looked for closely enough."""
@@ -547,12 +549,14 @@ def fitted_waveform(
         length_m=length_m or 1.0,
     )
     free_share = SHARE not in held
-    found = _settled(problem, start, start.value, (*held, DRIFT), samples, points, free_share)
+    first = np.append(start.value, 0.0)
+    found = _settled(problem, start, first, (*held, DRIFT), samples, points, free_share)
     found = _drifting(found, samples, points, free_share)
-    if A in held or found.value[A] <= 0.0 or not found.minimum.converged:
+    without = found.value[A] <= 0.0
+    if A in held or not found.minimum.converged or (without and found.goodness.enlarged == 1.0):
         return (found,)
-    other = replace(found.problem, drag="speed")
-    speed = _settled(other, start, found.value, found.held, samples, points, free_share)
+    other, value = replace(found.problem, drag="speed"), first if without else found.value
+    speed = _settled(other, start, value, found.held, samples, points, free_share)
     if not speed.minimum.converged:
         return (found,)
     return (speed, found) if speed.better_by(found) > 0.0 else (found, speed)
@@ -591,9 +595,9 @@ def _settled(
             minimum = minimum._replace(quadratic=problem.evaluate(minimum.value))
         if free_share:
             scale = (problem.noise_rms / goodness.noise_rms) ** 2
-            mean, _, others = _share(minimum, held, scale)
+            mean, variance, others = _share(minimum, held, scale)
             change = mean - float(minimum.value[SHARE])
-            if abs(change) > _SETTLED:
+            if abs(change) > _SETTLED * math.sqrt(variance):
                 moved = True
                 step = change * others
                 at = BOUNDS.clip(problem.curved(minimum.value, step))
@@ -657,9 +661,12 @@ def _share(
     others[SHARE] = 1.0
     precision = scale * float(normal[SHARE, SHARE] + normal[SHARE, free] @ others[free])
     pull = scale * float(others @ gradient)
-    shares = np.linspace(0.0, 1.0, 401)
+    precision = max(precision, 1e-6)
+    best = min(max(float(value[SHARE]) + pull / precision, 0.0), 1.0)
+    reach = _REACH / math.sqrt(precision)
+    shares = np.linspace(max(best - reach, 0.0), min(best + reach, 1.0), 401)
     away = shares - value[SHARE]
-    logs = pull * away - 0.5 * max(precision, 0.0) * away**2
+    logs = pull * away - 0.5 * precision * away**2
     likely = np.exp(logs - logs.max())
     likely[[0, -1]] *= 0.5
     likely /= likely.sum()

@@ -131,7 +131,7 @@ def judge(
     if combined(p_values) >= LEVEL:
         return Goodness(noise, ratio, p_values, 1.0)
     # What a, b, c suffer from is what is left at the motion's own frequency.
-    own = max(each.chi2 / each.freedom for each in asked if each.name == "motion")
+    own = max((each.chi2 / each.freedom for each in asked if each.name == "motion"), default=1.0)
     return Goodness(noise, ratio, p_values, max(ratio, own, 1.0))
 
 

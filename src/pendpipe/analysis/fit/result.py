@@ -373,8 +373,8 @@ class FitResult:
 
 _MIXED: Final = 0.95
 """Correlation of a and b from which a record tells their sum, and not each."""
-_SEEN: Final = 3.0
-"""Standard deviations from which a rate is seen."""
+_UNCLEAR: Final = 0.1
+"""Of the loss at the start by which the drag is then uncertain."""
 
 
 def result_of(
@@ -444,10 +444,11 @@ def result_of(
 
 def _warnings(result: FitResult, stretched: float) -> list[str]:
     """What the reader of these numbers should know, a clause each."""
-    a, b, _ = (result.parameters[name] for name in ("a", "b", "c"))
+    a, b, c = (result.parameters[name] for name in ("a", "b", "c"))
+    y0 = result.parameters["amplitude"].value
+    rate = a.value * y0 + b.value + c.value / y0
     matrix = result.covariance_of("a", "b")
     mixed = matrix[0, 1] < -_MIXED * a.sd * b.sd if a.sd > 0.0 and b.sd > 0.0 else False
-    unclear = a.value < _SEEN * a.sd or b.value < _SEEN * b.sd
     slow = result.chi2_per_dof <= 0.9 * stretched
     seen = "the half cycles scatter, in the square," if slow else "chi^2 of the readings is"
     warnings = (
@@ -465,7 +466,7 @@ def _warnings(result: FitResult, stretched: float) -> list[str]:
             " enlarged by its root; see pendpipe diagnose",
         ),
         (
-            result.baseline == "eq8" and mixed and unclear,
+            result.baseline == "eq8" and mixed and a.sd * y0 > _UNCLEAR * rate,
             "a can't be told from b here: the record holds too little of large amplitudes (a tail);"
             " a, b, c of a tail depend on where it begins",
         ),
