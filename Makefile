@@ -4,7 +4,6 @@
 .PHONY: campaign test docs report bench evidence integrity proof check clean wheel
 
 SHELL := bash
-.SHELLFLAGS := -o pipefail -c
 PYTHON ?= python3
 CORES ?= 2
 SET ?= proof
@@ -13,7 +12,7 @@ BIN := .venv/bin
 RUN := PATH="$(CURDIR)/$(BIN):$$PATH" OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 
 campaign: .venv/installed
-	$(RUN) snakemake --cores $(CORES) --quiet rules 2>&1 | awk -f workflow/stages.awk
+	$(RUN) snakemake --cores $(CORES)
 
 test: .venv/installed
 	$(RUN) pytest -q -n $(CORES)

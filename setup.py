@@ -1,5 +1,9 @@
-"""Compile the engine while the package is built, so that nobody's first fit waits for it."""
+"""Compile the engine while the package is built, so that nobody's first fit waits for it.
 
+The workflow, its profiles and the examples are packed beside it, from their only copy.
+"""
+
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -8,8 +12,8 @@ from setuptools import setup
 from setuptools.command.build_py import build_py
 
 
-class BuildWithMachineCode(build_py):
-    """Put machine code beside the sources, for processors that it can be made for."""
+class Build(build_py):
+    """Put machine code beside the sources, and the workflow into the package."""
 
     def run(self) -> None:
         """Compile, in a process of its own; then build as ever."""
@@ -21,6 +25,10 @@ class BuildWithMachineCode(build_py):
         if subprocess.run(command, check=False).returncode:
             print("no machine code was made: the first fit will compile", file=sys.stderr)
         super().run()
+        if not self.editable_mode:
+            for name in ("workflow", "profiles", "examples"):
+                packed = Path(self.build_lib, "pendpipe", "project", name)
+                shutil.copytree(Path(__file__).parent / name, packed, dirs_exist_ok=True)
 
 
-setup(cmdclass={"build_py": BuildWithMachineCode})
+setup(cmdclass={"build_py": Build})

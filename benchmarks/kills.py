@@ -44,6 +44,7 @@ GUARDS: Final = (
     "pendpipe.stages.refusal",
     "pendpipe.stages.acquire",
     "workflow/rules/*.smk",
+    "workflow/Snakefile",
     "profiles/*/*",
     "./Snakefile",
     "benchmarks/kills.py",

@@ -28,7 +28,13 @@ from pendpipe.commands.doctor import examine
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / ".evidence/torn_files"
 RESULTS = FOLDER / "results"
-GUARDS = ("pendpipe.manifest", "pendpipe.stages.refusal", "workflow/rules/*.smk", "./Snakefile")
+GUARDS = (
+    "pendpipe.manifest",
+    "pendpipe.stages.refusal",
+    "workflow/rules/*.smk",
+    "workflow/Snakefile",
+    "./Snakefile",
+)
 """What finds and mends damage: other code makes other numbers, and guards nothing."""
 FILES = (
     "calibration/caliper.csv",

@@ -31,6 +31,8 @@ COMMANDS: Final = {
     "fit": "a, b, c and the rest of one recording",
     "diagnose": "what physics was left out: located, named, modelled",
     "page": "one HTML page about one recording",
+    "init": "begin a campaign of your own recordings in a folder",
+    "campaign": "run a campaign: every recording of a table, by Snakemake",
     "figures": "the figures 3 to 10 of a campaign",
     "report": "one self-contained page about a campaign",
     "doctor": "what is wrong with a campaign's results, and what is safe to do",

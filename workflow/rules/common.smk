@@ -32,10 +32,12 @@ CAMPAIGN = checked(
 # What a rule takes from the configuration is digested in its own parameters.
 CONFIGURATION = checked(jobs.store, CAMPAIGN, ".snakemake/pendpipe")
 RESULTS = CAMPAIGN.configuration.results
-RECORDS = [record.record for record in CAMPAIGN.records]
+# With `only` the campaign's own stages are not run: they need all records.
+RECORDS = [record.record for record in CAMPAIGN.selected]
+WHOLE = not CAMPAIGN.configuration.only
 # Several records of one pendulum are diagnosed together as well.
 PENDULUMS = {}
-for record in CAMPAIGN.records:
+for record in CAMPAIGN.selected:
     if record.pendulum:
         PENDULUMS.setdefault(record.pendulum, []).append(record.record)
 FORMS = ["svg", "png"]
@@ -130,10 +132,46 @@ def option(name, value):
     return "" if value is None else f"--{name} {shlex.quote(str(value))}"
 
 
+# Where a challenge has left its scores; rules/challenge.smk says so.
+PROOF = None
+
+
 def proof_option(wildcards):
     """For the report: a scored challenge, if there is one; it depends on none."""
-    scores = Path(OPEN, "scores")
-    return option("proof", scores if (scores / "scores.json").exists() else None)
+    scored = PROOF is not None and Path(PROOF, "scores.json").exists()
+    return option("proof", PROOF if scored else None)
+
+
+def wanted():
+    """What `rule all` makes: everything, or of some records alone their own results."""
+    if not WHOLE:
+        return of_every_record()
+    return [
+        f"{RESULTS}/campaign.json",
+        f"{RESULTS}/report.html",
+        f"{RESULTS}/records.parquet",
+        *figure_files(),
+        # Whatever else is missing: Snakemake makes a lost file again only where a job that is
+        # to run declares it.
+        f"{RESULTS}/separation.json",
+        f"{RESULTS}/records.csv",
+        *campaign_diagnosis(),
+        *pendulum_diagnoses(),
+        *of_every_record(),
+    ]
+
+
+def missing_sources():
+    """A line for each of the first records whose file is missing, and the number of the others."""
+    lines = CAMPAIGN.missing_files()
+    others = len(lines) - 10
+    return lines[:10] + ([f"{others} more files are missing"] if others > 0 else [])
+
+
+def refusals():
+    """How many of the records were refused, in a line; empty for none."""
+    refused = sum(Path(RESULTS, record, "refused.json").exists() for record in RECORDS)
+    return f"{refused} of {len(RECORDS)} records were refused" if refused else ""
 
 
 def of_pendulum(name):

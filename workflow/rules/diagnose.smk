@@ -16,6 +16,11 @@ rule diagnose:
         baseline=CAMPAIGN.configuration.diagnose.baseline,
         level=CAMPAIGN.configuration.diagnose.level,
         figures=CAMPAIGN.configuration.diagnose.figures,
+        restoring=lambda wildcards: (
+            "--restoring linear"
+            if CAMPAIGN.record(wildcards.record).restoring == "linear"
+            else ""
+        ),
         seed=CAMPAIGN.configuration.seed,
         repaired=repaired("{record}", "diagnose"),
         code=code_version("pendpipe.commands.diagnose"),
@@ -25,4 +30,4 @@ rule diagnose:
         "pendpipe diagnose {input.recording:q} --record {wildcards.record:q}"
         " --calibration {input.calibration:q} --turning-points {input.turning_points:q}"
         " --baseline {params.baseline:q} --level {params.level:q} --seed {params.seed}"
-        " --figures {params.figures:q} --out {params.folder:q} {params.refusal} > {log:q} 2>&1"
+        " --figures {params.figures:q} {params.restoring} --out {params.folder:q} {params.refusal} > {log:q} 2>&1"

@@ -12,6 +12,9 @@ rule fit:
     params:
         refusal=refusal,
         method=CAMPAIGN.configuration.fit.method,
+        restoring=lambda wildcards: option(
+            "restoring", CAMPAIGN.record(wildcards.record).restoring or None
+        ),
         seed=CAMPAIGN.configuration.seed,
         repaired=repaired("{record}", "fit"),
         code=code_version("pendpipe.commands.fit"),
@@ -20,4 +23,4 @@ rule fit:
     shell:
         "pendpipe fit {input.recording:q} --record {wildcards.record:q}"
         " --calibration {input.calibration:q} --turning-points {input.turning_points:q}"
-        " --method {params.method:q} --seed {params.seed} --out {output:q} {params.refusal} 2> {log:q}"
+        " --method {params.method:q} {params.restoring} --seed {params.seed} --out {output:q} {params.refusal} 2> {log:q}"

@@ -11,10 +11,11 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.dataclasses import dataclass as checked
 
 from pendpipe.configuration.models import Configuration, Geometry, Section
@@ -28,10 +29,14 @@ COLUMNS: Final = (
     "branch",
     "geometry",
     "channel",
+    "unit",
+    "decimal",
+    "sample_rate",
     "start_s",
     "stop_s",
     "volts_per_radian",
     "temperature_c",
+    "restoring",
     "order",
     "pendulum",
 )
@@ -62,12 +67,16 @@ class Record:
         Names from the configuration; `branch` groups records (``low``, ``high``, ``air``).
     channel
         Channel or column of the source, as its reader names it.
+    unit, decimal, sample_rate
+        Of a file, where its reader's guess is wrong: unit of the readings, decimal sign, Hz.
     start_s, stop_s
         The part to use; blank: found from the recording.
     volts_per_radian
         The sensor's constant; blank: from the file, or from the campaign's calibration.
     temperature_c
         Of the fluid.
+    restoring
+        The torque of the fit, ``linear`` or ``sine``; blank: what the recording asks for.
     order
         When it was taken: a number that rises over the day (an hour, a count); blank: its row.
     pendulum
@@ -80,10 +89,14 @@ class Record:
     branch: str = ""
     geometry: str = ""
     channel: str = ""
+    unit: str = ""
+    decimal: Literal["", ".", ","] = ""
+    sample_rate: Annotated[float, Field(gt=0)] | None = None
     start_s: float | None = None
     stop_s: float | None = None
     volts_per_radian: float | None = None
     temperature_c: float | None = None
+    restoring: Literal["", "linear", "sine"] = ""
     order: float | None = None
     pendulum: str = ""
 
@@ -196,12 +209,34 @@ class Campaign:
         """The results: a folder a record lies in it."""
         return Path(self.configuration.results)
 
+    @property
+    def selected(self) -> tuple[Record, ...]:
+        """The records to run: all, or those that the configuration names in ``only``."""
+        return tuple(map(self.record, self.configuration.only)) or self.records
+
+    def missing_files(self) -> list[str]:
+        """A line for each record to run whose file is not there."""
+        lines = []
+        for record in self.selected:
+            path = record.file
+            if path is not None and not path.is_file():
+                beside = path.parent.iterdir() if path.parent.is_dir() else ()
+                close = difflib.get_close_matches(path.name, [each.name for each in beside], n=1)
+                hint = f"did you mean '{close[0]}'?" if close else "it will be refused"
+                where = f"{self.configuration.records}, record {record.record}"
+                lines.append(f"{where}: there is no file {path}; {hint}")
+        return lines
+
     def record(self, name: str) -> Record:
         """Find a record by its name."""
-        entries = {entry.record: entry for entry in self.records}
-        if name in entries:
-            return entries[name]
-        raise InputError(self.configuration.records, f"no record '{name}'", nearest(name, entries))
+        if name in self._by_name:
+            return self._by_name[name]
+        remedy = nearest(name, self._by_name)
+        raise InputError(self.configuration.records, f"no record '{name}'", remedy)
+
+    @cached_property
+    def _by_name(self) -> dict[str, Record]:
+        return {entry.record: entry for entry in self.records}
 
     def geometry(self, record: Record) -> Geometry | None:
         """Where the weights are for a record; ``None`` where none is given."""
@@ -260,8 +295,8 @@ def load_campaign(content: Mapping[str, Any], place: str | Path) -> Campaign:
     for entry in records:
         _check_record(campaign, entry)
     _check_geometries(configuration, place)
-    if configuration.typical_record is not None:
-        campaign.record(configuration.typical_record)
+    for name in filter(None, [configuration.typical_record, *configuration.only]):
+        campaign.record(name)
     return campaign
 
 

@@ -257,6 +257,9 @@ class Configuration(Section):
     seed: Annotated[int, Field(ge=0)] = Field(
         0, description="seed of everything that is drawn at random"
     )
+    only: list[str] = Field(
+        [], description="records whose own stages are run, and nothing else; none: all"
+    )
     strict: bool = Field(
         False, description="whether a record that can't be used stops the campaign"
     )

@@ -175,7 +175,15 @@ def _file(record: Record) -> Recording:
     from pendpipe.formats import ReadOptions, read
 
     path = Path(record.source)
-    options = ReadOptions(channel=record.channel or None, volts_per_radian=record.volts_per_radian)
+    options = ReadOptions(
+        channel=record.channel or None,
+        unit=record.unit or None,
+        decimal=record.decimal or None,
+        sample_rate=record.sample_rate,
+        start_s=record.start_s,
+        stop_s=record.stop_s,
+        volts_per_radian=record.volts_per_radian,
+    )
     recording = read(path, options)
     # The folder is the user's own business: the results name the file only.
     return replace(recording, metadata={**recording.metadata, "source": path.name})

@@ -1,0 +1,150 @@
+"""The workflow runs in any folder: begun by `init`, run by `campaign`, or used as a module."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pendpipe.cli import main
+from pendpipe.project import SNAKEFILE
+
+ROOT = Path(__file__).parents[2]
+
+
+def call(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", *command],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT / "src")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def jobs(done: subprocess.CompletedProcess[str]) -> dict[str, int]:
+    assert done.returncode == 0, done.stdout + done.stderr
+    table = re.findall(r"^(\w+) +(\d+)$", done.stdout + done.stderr, flags=re.MULTILINE)
+    return {name: int(count) for name, count in table}
+
+
+@pytest.fixture
+def begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a campaign of the two examples, without their diagnoses."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "mine"]) == 0
+    configuration = tmp_path / "mine/config/config.yaml"
+    text = configuration.read_text(encoding="utf-8")
+    assert "enabled: true" in text
+    configuration.write_text(text.replace("enabled: true", "enabled: false"), encoding="utf-8")
+    return tmp_path / "mine"
+
+
+def test_a_campaign_that_was_begun_runs_to_its_report(begun: Path) -> None:
+    records = begun / "config/records.tsv"
+    with records.open("a", encoding="utf-8") as table:
+        table.write("lost\trecordings/rod-pendulun.csv\n")
+    done = call(begun, "pendpipe", "campaign", "--cores", "2")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (begun / "results/report.html").is_file()
+    fit = json.loads((begun / "results/rod/fit.json").read_text(encoding="utf-8"))
+    assert fit["light"] == "green"
+    lines = done.stderr.splitlines()
+    assert any("did you mean 'rod-pendulum.csv'?" in line for line in lines), "of the lost file"
+    assert "fit: 3 done" in lines
+    assert "1 of 3 records were refused" in lines[-1]
+    assert not jobs(call(begun, "pendpipe", "campaign", "-n"))
+    alone = call(begun, "pendpipe", "campaign", "-n", "--record", "rod", "--", "--forcerun", "fit")
+    assert jobs(alone) == {"fit": 1, "all": 1, "total": 2}
+
+
+def test_a_line_a_stage_hides_no_fault(begun: Path) -> None:
+    """Where a job fails, its rule and its log are printed."""
+    (begun / "recordings/rod-pendulum.csv").write_text("no recording\n", encoding="utf-8")
+    with (begun / "config/config.yaml").open("a", encoding="utf-8") as configuration:
+        configuration.write("strict: true\n")
+    done = call(begun, "pendpipe", "campaign", "--record", "rod")
+    assert done.returncode == 1
+    assert "Error in rule acquire" in done.stderr
+    assert "pendpipe: recordings/rod-pendulum.csv" in done.stderr
+
+
+def test_the_workflow_is_a_module_of_others(begun: Path) -> None:
+    begun.joinpath("Snakefile").write_text(
+        f"""
+configfile: "config/config.yaml"
+module pendpipe:
+    snakefile: "{SNAKEFILE.as_posix()}"
+    config: config
+use rule * from pendpipe as pendpipe_*
+rule all:
+    default_target: True
+    input: rules.pendpipe_all.input
+""",
+        encoding="utf-8",
+    )
+    counted = jobs(call(begun, "snakemake", "-n", "--quiet", "rules"))
+    assert counted["pendpipe_fit"] == 2
+    assert counted["pendpipe_report"] == 1
+
+
+def test_init_replaces_nothing(
+    begun: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = {path: path.read_bytes() for path in begun.rglob("*") if path.is_file()}
+    (begun / "config/records.tsv").unlink()
+    assert main(["init", str(begun)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "config.yaml" in line
+    assert "records.tsv" not in line
+    del before[begun / "config/records.tsv"]
+    assert {path: path.read_bytes() for path in begun.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "pendpipe init writes one"),
+        (["--config", "none.yaml"], "there is no such configuration"),
+        (["--record", "rd"], "did you mean 'rod'?"),
+        (["--profile", "nowhere"], "known are default"),
+    ],
+)
+def test_what_is_wrong_is_said_before_snakemake_starts(
+    begun: Path,
+    words: list[str],
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    if words:
+        monkeypatch.chdir(begun)
+    assert main(["campaign", *words]) == 2
+    (line,) = capsys.readouterr().err.splitlines()[-1:]
+    assert said in line
+
+
+def test_a_row_says_how_its_file_is_read(begun: Path) -> None:
+    """A comma, a unit and a part that the reader is told of; the fit's torque too."""
+    lines = (begun / "recordings/rod-pendulum.csv").read_text(encoding="utf-8").splitlines()
+    rows = [line.split(",") for line in lines if line[:1].isdigit()]
+    text = "t;reading\n" + "".join(f"{t};{y}\n".replace(".", ",") for t, y, *_ in rows)
+    (begun / "recordings/comma.csv").write_text(text, encoding="utf-8")
+    (begun / "config/records.tsv").write_text(
+        "record\tsource\tunit\tdecimal\tstop_s\trestoring\n"
+        "comma\trecordings/comma.csv\tmm\t,\t20\tlinear\n",
+        encoding="utf-8",
+    )
+    done = call(begun, "pendpipe", "campaign", "--record", "comma")
+    assert done.returncode == 0, done.stdout + done.stderr
+    fit = json.loads((begun / "results/comma/fit.json").read_text(encoding="utf-8"))
+    assert fit["parameters"]["amplitude"]["unit"] == "m"
+    assert fit["restoring"] == "linear"
+    recording = (begun / "results/comma/recording.csv").read_text(encoding="utf-8")
+    assert 19.0 < float(recording.splitlines()[-1].split(",")[0]) <= 20.0
