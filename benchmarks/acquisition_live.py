@@ -48,6 +48,13 @@ diagnose: {{enabled: false}}
 @contextmanager
 def served_device(folder: Path, link: str) -> Iterator[str]:
     """A simulated DI-2108 in a process of its own; yields its port."""
+    with served_process(folder, link) as (_, port):
+        yield port
+
+
+@contextmanager
+def served_process(folder: Path, link: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """As `served_device`; yields its process as well."""
     description = folder / "signal.toml"
     description.write_text(SIGNAL, encoding="utf-8")
     command = [sys.executable, "-m", "pendpipe.cli", "acquire", "--serve", "di2108"]
@@ -55,7 +62,7 @@ def served_device(folder: Path, link: str) -> Iterator[str]:
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None
-        yield process.stdout.readline().strip()
+        yield process, process.stdout.readline().strip()
     finally:
         process.terminate()
         process.communicate(timeout=30)

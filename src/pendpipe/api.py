@@ -107,7 +107,8 @@ def acquire(
     Parameters
     ----------
     port
-        A device file, a COM port or a URL of pyserial; ``"simulated:di2108"`` needs none.
+        A device file, a COM port, ``socket://HOST:PORT`` or ``rfc2217://HOST:PORT``;
+        ``"simulated:di2108"`` needs none.
     duration_s, rate_hz, channel
         Length, scans a second, and the channel as printed on the box.
     model

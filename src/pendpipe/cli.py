@@ -158,8 +158,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 done; 1 a fault of the program's own (with its traceback); 2 the input or the
-        usage is wrong (one line on standard error); 3 only where ``--fail-on`` asks.
+        0 done; 1 a fault of the program's own (with its traceback), or of the line to an
+        instrument; 2 the input or the usage is wrong (one line on standard error); 3 only
+        where ``--fail-on`` asks.
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -170,7 +171,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _run(arguments)
     except InputError as fault:
         print(f"pendpipe: {fault}", file=sys.stderr)
-        return 2
+        return fault.status
     except BrokenPipeError:
         # The reader of our output (`head`, say) has gone; that is nobody's fault.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -28,6 +28,9 @@ class InputError(Exception):
     'a.csv, line 7: time_s falls from 0.3 to 0.2; sort the rows by time'
     """
 
+    status = 2
+    """With which a command ends."""
+
     def __init__(self, place: str | Path, problem: str, remedy: str) -> None:
         self.place = str(place)
         self.problem = problem

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from pendpipe.acquisition.decode import choose, new_path, read_attempts
-from pendpipe.acquisition.raw import RawWriter, lock
+from pendpipe.acquisition.decode import accept, choose, new_path, read_attempts, refuse_lost
+from pendpipe.acquisition.line import LineLostError
+from pendpipe.acquisition.raw import RawWriter, append_event, lock, read_raw
 from pendpipe.errors import InputError
 
 
@@ -46,6 +47,37 @@ def test_without_a_complete_attempt_the_longest_is_used(tmp_path: Path) -> None:
     longest = kept(tmp_path, 2, 90, "the line was lost")
     kept(tmp_path, 3, 50, None)
     assert choose(read_attempts(tmp_path.iterdir())).path == longest
+
+
+@pytest.mark.parametrize(
+    ("events", "lost"),
+    [
+        ([("stopped", "scans")], ""),
+        ([("stopped", "interrupted by the user")], ""),
+        ([("stopped", "the line was lost")], "the line was lost"),
+        ([("stopped", "the device fell silent")], "the device fell silent"),
+        ([], ""),  # killed
+        ([("broken", "the line was lost")], "the line was lost"),  # and killed while it waited
+        ([("broken", "the line was lost"), ("restarted", "")], ""),
+        ([("stopped", "the line was lost"), ("accepted", "")], ""),
+    ],
+)
+def test_what_a_lost_line_has_ended_is_no_recording_unless_it_is_accepted(
+    events: list[tuple[str, str]], lost: str, tmp_path: Path
+) -> None:
+    path = kept(tmp_path, 1, 20, None)
+    for event, reason in events:
+        append_event(path, event=event, reason=reason)
+    assert read_raw(path).lost_line == lost
+
+
+def test_a_lost_line_is_reported_with_what_is_kept_of_what_was_asked(tmp_path: Path) -> None:
+    (attempt,) = read_attempts([kept(tmp_path, 1, 51, "the line was lost")])
+    with pytest.raises(LineLostError, match=r"COM3: the line was lost; 0\.5 s of 1 s are kept in"):
+        refuse_lost(attempt, "record anew")
+    assert LineLostError.status == 1
+    accept(attempt)
+    refuse_lost(read_raw(attempt.path), "record anew")
 
 
 def test_attempts_without_a_scan_do_not_count(tmp_path: Path) -> None:

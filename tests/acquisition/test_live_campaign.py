@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
+import time
 from datetime import datetime
 from pathlib import Path
 
 import pytest
-from benchmarks.acquisition_live import LiveCampaign, changed_library, served_device
+from benchmarks.acquisition_live import (
+    ROOT,
+    LiveCampaign,
+    changed_library,
+    served_device,
+    served_process,
+)
 
 from pendpipe.cli import main
 from pendpipe.recording import read_plain
@@ -94,6 +102,59 @@ def test_a_dead_line_fails_its_job_alone_and_the_next_run_tries_again(
         done = campaign.run()
     assert done.returncode == 0, done.stderr
     assert len(read_plain(campaign.recording)) == 60
+
+
+def lost_in_the_midst(campaign: LiveCampaign, device: subprocess.Popen[str]) -> str:
+    """Run the campaign, end the device at a third of the recording; return the job's log."""
+    running = subprocess.Popen(
+        campaign.command(), cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    while running.poll() is None and campaign.recorded_s() < 0.3 * DURATION_S:
+        time.sleep(0.02)
+    device.kill()
+    assert running.wait() == 1
+    return (campaign.results / "live/logs/acquire.log").read_text()
+
+
+def test_a_line_that_is_lost_fails_its_job_and_the_next_run_records_anew(
+    link: str, tmp_path: Path
+) -> None:
+    with served_process(tmp_path, link) as (device, port):
+        campaign = LiveCampaign(tmp_path, port, DURATION_S)
+        log = lost_in_the_midst(campaign, device)
+    assert f"s of {DURATION_S:g} s are kept in" in log.splitlines()[-1]
+    assert "Traceback" not in log
+    assert (campaign.results / "file/recording.csv").exists()
+    assert not campaign.recording.exists()
+    first = campaign.raw_files
+    assert len(first) == 1
+    with served_device(tmp_path, link) as port:
+        campaign.connect(port, DURATION_S)
+        done = campaign.run()
+    assert done.returncode == 0, done.stderr
+    assert first.items() < campaign.raw_files.items()
+    assert len(read_plain(campaign.recording)) == 60 * DURATION_S
+
+
+def test_what_a_lost_line_has_left_is_the_record_once_it_is_accepted(tmp_path: Path) -> None:
+    with served_process(tmp_path, "socket") as (device, port):
+        campaign = LiveCampaign(tmp_path, port, DURATION_S, "calibration.json")
+        lost_in_the_midst(campaign, device)
+    call = ["acquire", "--campaign", str(tmp_path / "config.yaml"), "--record", "live"]
+    assert main([*call, "--accept-short"]) == 0
+    recording = campaign.recording.read_bytes()
+    # It stays the record, whatever is made again.
+    done = campaign.run("--forceall")
+    assert done.returncode == 0, done.stderr
+    assert campaign.recording.read_bytes() == recording
+    assert len(campaign.raw_files) == 1
+    kept_s = read_plain(campaign.recording).time_s[-1]
+    assert 0.2 * DURATION_S < kept_s < 0.9 * DURATION_S
+    # The report prints the calibration's warnings.
+    calibration = json.loads((campaign.results / "live/calibration.json").read_text())
+    warning = calibration["warnings"][-1]
+    assert warning.startswith("the recording is incomplete: ended early: the line was lost")
+    assert f"{kept_s:.6g} s of {DURATION_S:g} s kept" in warning
 
 
 def test_only_an_explicit_request_records_anew(

@@ -16,7 +16,7 @@ from pendpipe.acquisition.devices.simulated import SimulatedDevice
 from pendpipe.acquisition.drivers import identify
 from pendpipe.acquisition.drivers.letters import DI154RS, DI245
 from pendpipe.acquisition.drivers.text import DI2108
-from pendpipe.acquisition.line import Line
+from pendpipe.acquisition.line import Line, check_port
 from pendpipe.acquisition.raw import read_raw
 from pendpipe.acquisition.recorder import acquire_simulated, record
 from pendpipe.arrays import FloatArray
@@ -244,10 +244,47 @@ def test_faults_of_the_port_are_one_line_each(tmp_path: Path) -> None:
     plain.touch()
     assert "there is no such port" in refused(str(tmp_path / "ttyUSB9"))
     assert "this is no serial port" in refused(str(plain))
-    assert "can't be opened" in refused("nonsense://x")
+    assert "this is no port of an instrument" in refused("nonsense://x")
     assert "nothing listens there" in refused("socket://127.0.0.1:1")
     with SimulatedDevice("di2108", swing) as device, Line(device.port, 4800):
         assert "the port is busy" in refused(device.port)
+
+
+@pytest.mark.parametrize(
+    "port",
+    [
+        "spy:///dev/null?file={file}",
+        "SPY://loop://?file={file}",
+        "spy://socket://127.0.0.1:1?file={file}",
+        "alt:///dev/null?class=PosixPollSerial",
+        "hwgrep://0683",
+        "loop://",
+        "socket://127.0.0.1:1?logging=debug",
+        "socket://user@127.0.0.1",
+        "file://{file}",
+        "simulated:di2108",
+        "{file}",
+    ],
+)
+def test_nothing_but_a_port_is_opened_and_no_file_is_touched(port: str, tmp_path: Path) -> None:
+    """Pyserial's spy:// writes a log over any file that it is given."""
+    file = tmp_path / "precious.csv"
+    file.write_text("my readings")
+    with pytest.raises(InputError, match="this is no") as caught:
+        record(port.format(file=file), "di2108", rate_hz=60.0, duration_s=1.0)
+    assert "\n" not in str(caught.value)
+    assert file.read_text() == "my readings"
+
+
+@pytest.mark.parametrize("port", ["COM3", r"\\.\COM12", "rfc2217://host:4001", "socket://[::1]:9"])
+def test_the_names_of_ports_pass(port: str) -> None:
+    check_port(port)
+
+
+def test_a_link_to_a_device_passes(tmp_path: Path) -> None:
+    link = tmp_path / "instrument"
+    link.symlink_to(os.devnull)
+    check_port(str(link))
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,7 @@ import numpy as np
 
 from pendpipe.acquisition.drivers import find_driver
 from pendpipe.acquisition.drivers.base import Decoder, Driver, Loss, WordDecoder
+from pendpipe.acquisition.line import LineLostError
 from pendpipe.acquisition.raw import (
     Hole,
     NothingRecordedError,
@@ -313,6 +314,9 @@ def _lost(losses: Sequence[Loss]) -> int:
     return sum(loss.lost_scans for loss in losses)
 
 
+_SHORT: Final = ("the recording was cut short", "ended early")
+
+
 def _notes(
     raw: RawRecording, segments: Sequence[Segment], time_base: TimeBase, time_s: FloatArray
 ) -> tuple[str, ...]:
@@ -350,10 +354,10 @@ def _notes(
             f"the device scans at {time_base.measured_hz:.6g} Hz, "
             f"not at {time_base.nominal_hz:.6g} Hz as it should: times follow the recorder's clock",
         ),
-        (not stopped, f"the recording was cut short: the {extent} that had arrived are kept"),
+        (not stopped, f"{_SHORT[0]}: the {extent} that had arrived are kept"),
         (
             stopped and not raw.is_complete,
-            f"ended early: {stopped.get('reason')} ({extent} kept)",
+            f"{_SHORT[1]}: {stopped.get('reason')} ({extent} kept)",
         ),
         (
             raw.damaged_bytes,
@@ -742,9 +746,34 @@ def decode_attempt(path: Path, folder: Path, channel: int | None = None) -> Reco
     """
     recording = decode_recording(path, channel)
     named = path.relative_to(folder) if path.is_relative_to(folder) else Path(path.name)
-    told = {"raw_file": named.as_posix(), "notes": "; ".join(recording.notes)}
+    short = next((note for note in recording.notes if note.startswith(_SHORT)), "")
+    told = {"raw_file": named.as_posix(), "notes": "; ".join(recording.notes), "incomplete": short}
     kept = {key: text for key, text in told.items() if text}
     return replace(recording, metadata={**recording.metadata, **kept})
+
+
+def accept(attempt: RawRecording) -> None:
+    """Note in a raw file that what the line had brought before it was lost is the recording."""
+    append_event(attempt.path, event="accepted")
+
+
+def refuse_lost(attempt: RawRecording, remedy: str) -> None:
+    """Refuse an attempt that a lost line has ended.
+
+    Raises
+    ------
+    LineLostError
+        With the seconds kept of those asked for. The raw file stays.
+    """
+    if not attempt.lost_line:
+        return
+    kept_s, asked_s = decode_recording(attempt).time_s[-1], attempt.header.get("duration_s")
+    asked = f" of {asked_s:g} s" if isinstance(asked_s, int | float) else ""
+    raise LineLostError(
+        str(attempt.header["port"]),
+        f"{attempt.lost_line}; {kept_s:.6g} s{asked} are kept in {attempt.path}",
+        remedy,
+    )
 
 
 def mark_saved(path: Path, out: Path) -> None:

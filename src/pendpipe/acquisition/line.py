@@ -1,6 +1,8 @@
 """A serial line: pyserial's ports, with user errors in one line each.
 
-`serial.serial_for_url` opens device files, COM ports and ``socket://HOST:PORT`` alike.
+`serial.serial_for_url` opens device files, COM ports and ``socket://HOST:PORT`` alike. It knows
+more forms, one of which writes a file of any name, so that only what is named in `check_port` is
+opened.
 All limits here are seconds of the host's clock: how long a byte takes from one process to
 another does not depend on the scale of a simulated clock.
 """
@@ -17,7 +19,7 @@ from typing import Final
 
 import serial
 
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 
 try:
     from termios import error as termios_error
@@ -28,6 +30,42 @@ except ImportError:  # not on Windows
 class LineLostError(InputError):
     """The line broke while it was in use: a cable pulled, a device switched off."""
 
+    status = 1
+
+
+_URL: Final = re.compile(r"(socket|rfc2217)://[^/?#@\s]+:\d+/?")
+_COM: Final = re.compile(r"(\\\\\.\\)?COM\d+", re.IGNORECASE)
+
+
+def check_port(port: str) -> None:
+    """Refuse what is no name of a port: nothing but a device is ever opened.
+
+    Raises
+    ------
+    InputError
+        Unless it is a COM port, ``socket://HOST:PORT``, ``rfc2217://HOST:PORT``, or a device
+        file (a link to one as well).
+    """
+    if _URL.fullmatch(port) or _COM.fullmatch(port):
+        return
+    try:
+        mode = Path(port).stat().st_mode
+    except (OSError, ValueError):
+        mode = 0
+    for wrong, problem in (
+        ("://" in port or port.startswith("simulated:"), "this is no port of an instrument"),
+        (not mode, "there is no such port"),
+        (not stat.S_ISCHR(mode), "this is no serial port"),
+    ):
+        refuse_if(wrong, port, problem, _FORMS if "port of" in problem else _LIST)
+
+
+_LIST: Final = "pendpipe acquire --list shows the ports"
+_FORMS: Final = (
+    "give /dev/ttyUSB0, COM3, socket://HOST:PORT or rfc2217://HOST:PORT"
+    " (a simulated one has --device)"
+)
+
 
 class Line(AbstractContextManager["Line"]):
     """An open serial line.
@@ -35,7 +73,7 @@ class Line(AbstractContextManager["Line"]):
     Parameters
     ----------
     port
-        A device file, a COM port, or a URL of pyserial (``socket://127.0.0.1:4001``).
+        A device file, a COM port, ``socket://HOST:PORT`` or ``rfc2217://HOST:PORT``.
     baudrate
         Bits a second; 8 data bits, no parity, one stop bit, no flow control. USB devices
         and sockets take any.
@@ -48,6 +86,7 @@ class Line(AbstractContextManager["Line"]):
 
     def __init__(self, port: str, baudrate: int) -> None:
         self.port = port
+        check_port(port)
         try:
             self._serial = serial.serial_for_url(port, do_not_open=True)
             self._serial.baudrate = baudrate
@@ -130,7 +169,6 @@ class Line(AbstractContextManager["Line"]):
 
 _ARE_BUSY: Final = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)
 _FORBID: Final = (errno.EACCES, errno.EPERM)
-_LIST: Final = "pendpipe acquire --list shows the ports"
 _WINDOWS: Final = re.compile(r"Error\(\d+, .*, None, (\d+)\)")
 _BUSY: Final = {
     "linux": "close the program that uses it (lsof {port} names it; ModemManager tries new ports"

@@ -48,6 +48,8 @@ _SYNC_S: Final = 1.0
 COMPLETE: Final = ("scans", "time", "noise")
 """Reasons for which a recording ends when it has what was asked for (the last of older files)."""
 
+INTERRUPTED: Final = "interrupted by the user"
+
 
 class NothingRecordedError(InputError):
     """The raw file is sound so far, but holds no scan."""
@@ -225,6 +227,21 @@ class RawRecording:
     def is_complete(self) -> bool:
         """Whether it ended with all that was asked for."""
         return self.event("stopped").get("reason") in COMPLETE
+
+    @property
+    def lost_line(self) -> str:
+        """Why the line was lost, where that ended it and nobody has accepted what there is.
+
+        A recording that the user ended, or whose process was killed, is what the user has.
+        """
+        if self.event("accepted"):
+            return ""
+        stopped = self.event("stopped")
+        if stopped:
+            reason = str(stopped.get("reason"))
+            return "" if reason in (*COMPLETE, INTERRUPTED) else reason
+        last = [e for e in self.events if e.get("event") in ("broken", "restarted")][-1:]
+        return "".join(str(e.get("reason")) for e in last if e["event"] == "broken")
 
     def event(self, kind: str) -> Mapping[str, Any]:
         """Return the last event of a kind; empty when there was none."""

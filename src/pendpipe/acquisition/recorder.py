@@ -22,7 +22,14 @@ from pendpipe.acquisition.devices.simulated import Signal, SimulatedDevice
 from pendpipe.acquisition.drivers import find_driver, identify
 from pendpipe.acquisition.drivers.base import Driver, Identity, Scans, Setup
 from pendpipe.acquisition.line import Line, LineLostError
-from pendpipe.acquisition.raw import COMPLETE, RawWriter, is_being_recorded, lock, read_raw
+from pendpipe.acquisition.raw import (
+    COMPLETE,
+    INTERRUPTED,
+    RawWriter,
+    is_being_recorded,
+    lock,
+    read_raw,
+)
 from pendpipe.arrays import AnyArray, FloatArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.recording import Recording
@@ -216,7 +223,7 @@ class Session:
         except LineLostError as fault:
             reason = reason or fault.problem
         except KeyboardInterrupt:
-            reason = "interrupted by the user"
+            reason = INTERRUPTED
             self._stop()
         except OSError:
             # The disk, not the line: the device need not fill its buffer meanwhile.
@@ -326,7 +333,7 @@ def record(
     Parameters
     ----------
     port
-        A device file, a COM port, or a URL of pyserial.
+        A device file, a COM port, ``socket://HOST:PORT`` or ``rfc2217://HOST:PORT``.
     driver
         The model, a key of `drivers.DRIVERS`; the device is asked when not given.
     clock

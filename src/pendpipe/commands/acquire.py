@@ -70,6 +70,10 @@ _OWN: Final[Flags] = {
         "action": "store_true",
         "help": "record even if there is a recording: of a campaign's record, or not yet written",
     },
+    "--accept-short": {
+        "action": "store_true",
+        "help": "take what was kept when the line was lost for the recording",
+    },
     "--volts-per-radian": {"type": float, "help": "sensor constant, for the metadata"},
     "--seed": {"type": int, "default": 0, "help": "of the simulated noise (0)"},
     "--clock-scale": {
@@ -149,6 +153,8 @@ def _record(arguments: Arguments) -> None:
     kept = [Path(arguments.raw)] if arguments.raw else decode.paths_beside(out)
     no_earlier_one = arguments.recover or arguments.anew
     earlier = [] if no_earlier_one else decode.read_attempts(kept)
+    if not arguments.accept_short:
+        earlier = [attempt for attempt in earlier if not attempt.lost_line]
     if arguments.recover:
         raw = Path(arguments.recover)
     elif earlier and not earlier[-1].event("saved"):
@@ -161,6 +167,10 @@ def _record(arguments: Arguments) -> None:
     else:
         raw = Path(arguments.raw) if arguments.raw else decode.new_path_beside(out)
         _from_device(arguments, raw)
+        if not arguments.accept_short:
+            (attempt,) = decode.read_attempts([raw])
+            remedy = "call again to record anew, or with --accept-short to take what is kept"
+            decode.refuse_lost(attempt, remedy)
     recording = decode.decode_attempt(raw, out.parent, arguments.channel)
     with decode.kept_in(raw, out):
         lost = write(out, recording, original=True)
@@ -211,7 +221,12 @@ def _stage(arguments: Arguments) -> None:
         "acquire",
         record.record,
         lambda: acquire_record(
-            campaign, record.record, out, anew=arguments.anew, place=arguments.campaign
+            campaign,
+            record.record,
+            out,
+            anew=arguments.anew,
+            accept_short=arguments.accept_short,
+            place=arguments.campaign,
         ),
         outputs=[out],
         refused=refused,

@@ -117,6 +117,8 @@ def _of_record(arguments: Arguments) -> None:
             "the readings are volts and no sensor constant is known",
             "give volts_per_radian in the table of records, or a calibration",
         )
+    if short := recording.metadata.get("incomplete"):
+        warnings = [*warnings, f"the recording is incomplete: {short}"]
     content = {"volts_per_radian": constant, "warnings": warnings, "from": origin}
     write_json(arguments.out, {"schema_version": 1, **content})
 

@@ -26,7 +26,13 @@ OF_THE_RUN = (
 
 
 def acquire_record(
-    campaign: Campaign, name: str, out: Path, *, anew: bool = False, place: Path | str = "CONFIG"
+    campaign: Campaign,
+    name: str,
+    out: Path,
+    *,
+    anew: bool = False,
+    accept_short: bool = False,
+    place: Path | str = "CONFIG",
 ) -> None:
     """Write the plain recording of one record.
 
@@ -38,6 +44,8 @@ def acquire_record(
         The recording; an instrument's raw files are kept in the folder ``raw`` beside it.
     anew
         Record from an instrument even if a recording is kept.
+    accept_short
+        Take what a lost line has left for the record, as what a killed process has left.
     place
         The campaign's configuration, for the message on how to record anew.
 
@@ -45,6 +53,8 @@ def acquire_record(
     ------
     InputError
         If the source can't be read or opened: the file or port, what is wrong, a remedy.
+    LineLostError
+        If the line was lost. What had come is kept, and the next call records anew.
     """
     record = campaign.record(name)
     if record.source.startswith("dataq:"):
@@ -53,6 +63,7 @@ def acquire_record(
             out,
             f"pendpipe acquire --campaign {place} --record {name} --anew records it anew",
             anew=anew,
+            accept_short=accept_short,
         )
     else:
         made = _simulated(campaign, record) if record.source == "simulated" else _file(record)
@@ -76,8 +87,10 @@ def _simulated(campaign: Campaign, record: Record) -> Recording:
     return replace(recording, metadata=metadata)
 
 
-def _instrument(record: Record, out: Path, again: str, *, anew: bool) -> None:
+def _instrument(record: Record, out: Path, again: str, *, anew: bool, accept_short: bool) -> None:
     """Write the recording of a ``dataq:`` record from its raw file; record only if there is none.
+
+    An attempt that a lost line has ended is none, unless it is accepted.
 
     Raises
     ------
@@ -85,11 +98,13 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool) -> None:
         If nothing is kept and nothing can be recorded, or what is kept can't be decoded.
     """
     from pendpipe.acquisition.decode import (
+        accept,
         choose,
         decode_attempt,
         kept_in,
         new_path,
         read_attempts,
+        refuse_lost,
     )
     from pendpipe.acquisition.recorder import record as record_from
 
@@ -102,24 +117,35 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool) -> None:
     channel = int(record.channel) if record.channel else None
     folder = out.parent / "raw"
     attempts = read_attempts(folder.glob("*.raw"))
+    if attempts and accept_short and not anew and choose(attempts).lost_line:
+        accept(choose(attempts))
+        attempts = read_attempts(folder.glob("*.raw"))
+    whole = [attempt for attempt in attempts if not attempt.lost_line]
     if not attempts and not anew and _is_recording(out):
         print(f"{record.record}: {out.name} is kept as it is, without a raw file; {again}")
         return
-    if anew or not attempts:
+    if anew or not whole:
         if record.stop_s is None:
             raise InputError(
                 f"record {record.record}", "its length is unknown", "give stop_s in seconds"
             )
         port = record.source.removeprefix("dataq:")
+        raw_path = new_path(f"{folder}/")
         record_from(
             port,
             channels=[channel or 1],
             rate_hz=RATE_HZ,
             duration_s=record.stop_s,
-            raw_path=new_path(f"{folder}/"),
+            raw_path=raw_path,
         )
+        (newest,) = read_attempts([raw_path])
+        if accept_short and newest.lost_line:
+            accept(newest)
+        else:
+            refuse_lost(newest, "the next run records anew; --accept-short takes what is kept")
         attempts = read_attempts(folder.glob("*.raw"))
-    used = choose(attempts)
+        whole = [attempt for attempt in attempts if not attempt.lost_line]
+    used = choose(whole)
     recording = decode_attempt(used.path, out.parent, channel)
     # What was made from one of the raw files can be made from it again.
     kept = {str(attempt.header["recorded_at"]) for attempt in attempts}
