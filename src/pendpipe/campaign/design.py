@@ -434,16 +434,22 @@ def solve(design: Design, terms: Terms) -> FloatArray:
     loss torque too.
     """
     inputs = terms.inputs
-    exponent = inputs.inertia_exponent
     root = physics.free_decay_root(
         terms.inertia,
         terms.steady + terms.screw + inputs.air_drag * terms.air,
         terms.history + terms.screw_history,
         terms.torque,
-        physics.hysteretic_loss_torque(
-            np.exp(inputs.log_coefficient), terms.torque, design.reference_inertia, exponent
-        ),
-        inputs.rate_exponent - 2.0 * exponent,
+        *loss_torque(design, terms),
     )
     read = np.stack(np.broadcast_arrays(np.abs(root) / (2.0 * np.pi), -root.real), axis=-1)
     return np.asarray(read * (1.0 + inputs.fast_clock[..., None]))
+
+
+def loss_torque(design: Design, terms: Terms) -> tuple[FloatArray, FloatArray]:
+    """Loss torque of every record at 1 rad/s, and its exponent in the angular frequency."""
+    inputs, exponent = terms.inputs, terms.inputs.inertia_exponent
+    k = np.exp(inputs.log_coefficient)
+    return (
+        physics.hysteretic_loss_torque(k, terms.torque, design.reference_inertia, exponent),
+        inputs.rate_exponent - 2.0 * exponent,
+    )

@@ -512,3 +512,34 @@ def moment_of_inertia(
         run.branch == name if what == "branch" else name in run.weights_m for run in design.runs
     ]
     return replace(terms, inertia=terms.inertia + size * np.array(there, dtype=np.float64))
+
+
+def _drag_of_one(terms: Terms, size: FloatArray, design: Design, shape: str) -> Any:
+    there = np.array([run.record == shape for run in design.runs], dtype=np.float64)
+    return uniform.put(terms, size * there, design, None)
+
+
+def _rate(inputs: Inputs, size: FloatArray) -> Inputs:
+    return replace(inputs, rate_exponent=inputs.rate_exponent + size)
+
+
+DRAG_OF_ONE_RECORD: Final = CampaignEffect(
+    "drag-of-one-record",
+    "drag of one record",
+    r"D \to (1 + \epsilon_i) D",
+    Parameter("excess", "", -10.0, 1e3),
+    0.1,
+    "terms",
+    _drag_of_one,
+)
+"""With one for each record in the fluid the fit says what every record measures by itself."""
+RATE_EXPONENT: Final = CampaignEffect(
+    "rate-exponent",
+    "a loss torque that depends on the rate",
+    r"\kappa'' \to \kappa'' \omega^n",
+    Parameter("exponent", "", -3.0, 3.0),
+    0.1,
+    "inputs",
+    _rate,
+)
+"""Internal friction has none (Kimball and Lovell): Q_hys then goes as f^2 at one inertia."""

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.campaign.design import Design, solve, terms_of
+from pendpipe.campaign.design import Design, Terms, solve, terms_of
 from pendpipe.campaign.effects import CATALOGUE, CampaignEffect
 from pendpipe.estimate import Estimate, chi_square_p_value
 from pendpipe.physics import POTENTIAL_FLOW_ADDED_MASS
@@ -67,8 +67,8 @@ def measured(values: FloatArray, covariance: FloatArray) -> Measured:
     return Measured(values, np.linalg.inv(np.linalg.cholesky(covariance)))
 
 
-def predict(design: Design, added: Sequence[Candidate], unknowns: FloatArray) -> FloatArray:
-    """Frequency and b, shape (..., records, 2), for unknowns of shape (..., n).
+def terms_with(design: Design, added: Sequence[Candidate], unknowns: FloatArray) -> Terms:
+    """The equation of motion with effects in it, for unknowns of shape (..., n).
 
     The unknowns are the nuisances in standard deviations of their priors, then the effects' sizes
     in those expected of them.
@@ -86,7 +86,12 @@ def predict(design: Design, added: Sequence[Candidate], unknowns: FloatArray) ->
     for one, size in zip(added, sizes, strict=True):
         if one.effect.on == "terms":
             terms = one.effect.put(terms, size, design, one.shape)
-    return solve(design, terms)
+    return terms
+
+
+def predict(design: Design, added: Sequence[Candidate], unknowns: FloatArray) -> FloatArray:
+    """Frequency and b, shape (..., records, 2), for the unknowns of `terms_with`."""
+    return solve(design, terms_with(design, added, unknowns))
 
 
 @dataclass(frozen=True)
@@ -365,25 +370,13 @@ def inertia_errors(design: Design) -> tuple[FloatArray, FloatArray]:
 
 
 class InertiaSds(NamedTuple):
-    """Relative standard deviations of one record's moment of inertia.
+    """Relative standard deviations of one record's moment of inertia, as `inertia_errors`."""
 
-    Parameters
-    ----------
-    own, common
-        From distances and masses: what its own clamps add, and what all records share.
-    from_frequency
-        As ``K/omega^2`` of an exact frequency.
-    """
-
-    own: float
-    common: float
+    from_distances: float
     from_frequency: float
 
 
 def inertia_sds(design: Design) -> dict[str, InertiaSds]:
     """Return the errors of `inertia_errors` by record."""
-    distances, frequency = inertia_errors(design)
-    clamp = np.array([each.name.startswith("distance of") for each in design.nuisances])
-    columns = (distances[clamp], distances[~clamp], frequency)
-    sds = np.array([np.sqrt(np.sum(each**2, axis=0)) for each in columns]).T.tolist()
-    return {run.record: InertiaSds(*each) for run, each in zip(design.runs, sds, strict=True)}
+    sds = np.array([np.sqrt(np.sum(each**2, axis=0)) for each in inertia_errors(design)]).T
+    return {run.record: InertiaSds(*e) for run, e in zip(design.runs, sds.tolist(), strict=True)}

@@ -225,13 +225,15 @@ PERIODS_S: Final = (15.0, 6.0, 4.0, 3.0, 2.5, 2.0, 1.5, 1.0)
 @styled
 def draw_fig04(comparison: Mapping[str, Any]) -> Figure:
     """Draw the limiting Q of the air benchmark with the line k f^2, and their ratio."""
-    points = series(
-        [e for e in used(comparison) if e.get("fluid") == "air"], "quality_factor_limit"
-    )
+    in_air = [e for e in used(comparison) if e.get("fluid") == "air"]
+    points, line_of = (series(in_air, f"quality_factor_{each}") for each in ("limit", "hysteretic"))
     fitted = comparison.get("hysteretic_coefficient")
     coefficient = number(fitted)
     if not len(points.x) or not np.isfinite(coefficient):
         raise NothingToDrawError("the campaign has no benchmark in air")
+    if len(line_of.x) == len(points.x):  # as it were at the moment of inertia of k
+        there = coefficient * points.x**2 / line_of.y
+        points = points._replace(y=points.y * there, y_sd=points.y_sd * there)
     squared, squared_sd = points.x**2, 2.0 * points.x * points.x_sd
     per_line, spread = 100.0 / (coefficient * squared), 100.0 * error(fitted) / coefficient
     edge = 1.05 * float(np.max(squared))

@@ -315,14 +315,24 @@ def headline(comparison: Comparison, truth: Mapping[str, Any]) -> list[Row]:
             (truth.get("sensor") or {}).get("volts_per_radian"),
         ),
         _row(
-            "Hysteretic coefficient k of Q = k f², from the air benchmark",
+            f"Hysteretic coefficient k of Q = k f², from the air benchmark{_reference(comparison)}",
             comparison.get("hysteretic_coefficient"),
             "hysteretic_coefficient",
             truth.get("hysteretic_coefficient_s2"),
         ),
+        *(
+            _row(f"Loss torque κ″ in {assembly}{_reference(comparison)}", found, "")
+            for assembly, found in (comparison.get("loss_torque") or {}).items()
+        ),
         _row(
-            "Drag measured over Eq. 16",
+            "Drag measured over Eq. 16, mean of the records",
             comparison.get("theory_factor"),
+            "theory_factor",
+            truth.get("drag_factor"),
+        ),
+        _row(
+            "Drag over Eq. 16 as one factor in the fit of all records",
+            comparison.get("drag_factor"),
             "theory_factor",
             truth.get("drag_factor"),
         ),
@@ -337,6 +347,12 @@ def headline(comparison: Comparison, truth: Mapping[str, Any]) -> list[Row]:
         *_extremes(comparison),
     ]
     return [row for row in rows if row is not None]
+
+
+def _reference(comparison: Comparison) -> str:
+    """The moment of inertia to which k belongs, in words."""
+    inertia = comparison.get("reference_inertia")
+    return f", at {number(inertia):g} kg m²" if inertia else ""
 
 
 def as_text(rows: list[Row]) -> str:

@@ -6,38 +6,30 @@ from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.analysis.compare import (
-    Comparison,
-    SharedErrors,
-    SharedEstimate,
-    Surroundings,
-    amplitude_misfit,
-    compare,
-    tail_fits,
-)
+from pendpipe.analysis.compare import amplitude_misfit, tail_fits
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import INPUT, OUTPUT, Arguments, load, shared
-from pendpipe.campaign.design import design_of
 from pendpipe.campaign.fit import InertiaSds, inertia_sds, joint_values
-from pendpipe.configuration.apparatus import pendulum
+from pendpipe.campaign.values import Line, Values, campaign_values
 from pendpipe.configuration.jobs import digest
 from pendpipe.configuration.load import Campaign
 from pendpipe.estimate import Estimate
 from pendpipe.files import read_json, write_json
 from pendpipe.manifest import job
-from pendpipe.physics import hysteretic_quality_factor, inertia_from_frequency
+from pendpipe.physics import inertia_from_frequency
 from pendpipe.provenance import code_version
 from pendpipe.stages.results import (
     RecordResult,
     branch_curves,
     campaign_data,
-    placed,
+    enough,
     read_results,
     record_files,
     record_theory,
     sensor_file,
+    twins,
 )
-from pendpipe.stages.separate import Separation, read_separation
+from pendpipe.stages.separate import is_line
 from pendpipe.version import __version__
 
 ARGUMENTS: Final = shared("--campaign", required=True) | {
@@ -63,22 +55,32 @@ def run(arguments: Arguments) -> None:
 def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: Path) -> None:
     """Compare the losses with Eq. 16 and write both files."""
     results = read_results(campaign)
-    separated = read_separation(separation)
+    separated = read_json(separation)
     together = campaign_data(campaign, results)
-    rows = [result.record for result in placed(campaign, results)]
-    spread = inertia_sds(design_of(campaign, rows)) if rows else {}
-    found = _comparison(campaign, separated, spread)
+    spread = inertia_sds(together[0]) if together else {}
+    values = together and campaign_values(*together)
+    found = values if values and values.wet and is_line(values) else None
+    split = {entry["record"]: entry for entry in separated["records"]}
+    joint = joint_values(*together) if together and enough(together[0]) else None
     settings = campaign.configuration
+    copies = twins(results)
     content = {
         "schema_version": 1,
         "title": settings.title,
         "typical_record": settings.typical_record,
         "has_theory": settings.apparatus is not None,
-        "records": [_record(campaign, result, separated, found, spread) for result in results],
-        "curves": _curves(campaign, separated),
-        "hysteretic_coefficient": separated.benchmark,
+        "records": [
+            _record(campaign, result, split, found, spread.get(result.record.record), copies)
+            for result in results
+        ],
+        "curves": _curves(campaign, separated["hysteretic_coefficient"]),
+        **{
+            name: separated[name]
+            for name in ("hysteretic_coefficient", "reference_inertia", "loss_torque", "benchmark")
+        },
+        "drag_factor": joint and joint["with_benchmark"]["drag_factor"],
         **_campaign_numbers(found),
-        "joint": None if together is None else joint_values(*together),
+        "joint": joint,
         # The trap of tail fits, on the typical record.
         "tail": [
             fit
@@ -101,43 +103,6 @@ def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: P
     write_json(summary, campaign_summary(content))
 
 
-def _comparison(
-    campaign: Campaign, separated: Separation, spread: dict[str, InertiaSds]
-) -> Comparison | None:
-    """Compare Eq. 16 with what Eq. 17 leaves; ``None`` where no record has a theory."""
-    apparatus = campaign.configuration.apparatus
-    if apparatus is None or apparatus.sphere is None or separated.benchmark is None:
-        return None
-    around, warm = {}, (0.0, 20.0)
-    for split in separated.records:
-        row = campaign.record(split.measured.record)
-        geometry = campaign.geometry(row)
-        if geometry is None or not geometry.sphere or not row.fluid:
-            continue
-        density, viscosity = pendulum(campaign, row).fluid
-        fluid = campaign.configuration.fluids[row.fluid]
-        if fluid.temperature_c is not None:
-            at = fluid.temperature_c if row.temperature_c is None else row.temperature_c
-            warm = max(warm, (fluid.temperature_sd_k, at))
-        around[row.record] = Surroundings(
-            apparatus.sphere.diameter_m / 2,
-            apparatus.sphere.distance_m,
-            float(np.asarray(viscosity)),
-            float(np.asarray(density)),
-        )
-    if not around:
-        return None
-    errors = SharedErrors(
-        inverse_k=float(separated.benchmark["inverse_sd"]),
-        radius_m=apparatus.sphere.diameter_sd_m / 2,
-        distance_m=apparatus.sphere.distance_sd_m,
-        relative_inertia=float(np.mean([spread[name].common for name in around])),
-        temperature_k=warm[0],
-        temperature_c=warm[1],
-    )
-    return compare(separated.records, around, errors)
-
-
 _OF_A_FIT: Final = (
     "quality_factor_limit",
     "method",
@@ -156,9 +121,10 @@ _OF_A_FIT: Final = (
 def _record(
     campaign: Campaign,
     result: RecordResult,
-    separated: Separation,
-    found: Comparison | None,
-    spread: dict[str, InertiaSds],
+    split: dict[str, dict[str, Any]],
+    found: Values | None,
+    spread: InertiaSds | None,
+    copies: dict[str, str],
 ) -> dict[str, Any]:
     """Everything that is known of one record."""
     row = result.record
@@ -174,8 +140,9 @@ def _record(
     if result.fit is None:
         return content
     fit = result.fit.to_dict()
-    split = next((s for s in separated.records if s.measured.record == row.record), None)
     excluded = [] if result.usable else [f"not separated: {fit['light_reason']}"]
+    if row.record in copies:
+        excluded.append(f"the same recording as {copies[row.record]}: it counts once")
     points = read_turning_points(campaign.folder / row.record / "turning_points.csv")
     content |= {
         **fit["parameters"],
@@ -186,23 +153,16 @@ def _record(
         "start_s": float(points.time_s[0]),
         "stop_s": float(points.time_s[-1]),
         "misfit": amplitude_misfit(points),
+        # The losses after Eq. 17, with the errors of the calibration and of the loss torque.
+        **split.get(row.record, {}),
     }
-    if split is not None:
-        # The losses after Eq. 17, the errors of the calibration and of k in them.
-        content |= {
-            "a": split.quadratic.as_json(),
-            "c": split.coulomb.as_json(),
-            "quality_factor_limit": split.quality_factor_limit.as_json(),
-            "quality_factor_hysteretic": split.quality_factor_hysteretic.as_json(),
-            "quality_factor_viscous": split.quality_factor_viscous.as_json(),
-        }
-    return content | _theory(campaign, result, found, spread.get(row.record))
+    return content | _theory(campaign, result, found, spread)
 
 
 def _theory(
     campaign: Campaign,
     result: RecordResult,
-    found: Comparison | None,
+    found: Values | None,
     spread: InertiaSds | None,
 ) -> dict[str, Any]:
     """Inertia in two ways, Eq. 16 and its neighbours."""
@@ -213,12 +173,10 @@ def _theory(
     frequency = result.parameter("frequency")
     known = theory["moment_of_inertia_kg_m2"]
     inertia = float(inertia_from_frequency(frequency.value, torque))
-    spread = spread or InertiaSds(0.0, 0.0, 0.0)
+    spread = spread or InertiaSds(0.0, 0.0)
     relative = np.hypot(2.0 * frequency.sd / frequency.value, spread.from_frequency)
     content: dict[str, Any] = {
-        "moment_of_inertia": Estimate(
-            known, known * float(np.hypot(spread.own, spread.common)), "kg m^2"
-        ).as_json(),
+        "moment_of_inertia": Estimate(known, known * spread.from_distances, "kg m^2").as_json(),
         "moment_of_inertia_from_frequency": Estimate(
             inertia, inertia * float(relative), "kg m^2"
         ).as_json(),
@@ -227,43 +185,49 @@ def _theory(
     if "a_over_delta" not in theory:
         return content
     content |= {name: theory[name] for name in ("a_over_delta", "lengthening")}
-    names = [] if found is None else found.table["record"].tolist()
-    if found is None or result.record.record not in names:
+    if found is None or result.record.record not in found.records:
         return content
-    index = names.index(result.record.record)
-    row = {name: column[index].item() for name, column in found.table.items()}
+    number = [run.record for run in found.design.runs].index(result.record.record)
     return content | {
-        "quality_factor_viscous_theory": Estimate(
-            row["quality_factor_theory"], row["quality_factor_theory_sd"], ""
-        ).as_json(),
-        "quality_factor_viscous_steady": row["quality_factor_steady"],
-        "quality_factor_limit_theory": row["quality_factor_limit"],
-        "drag_over_theory": row["drag_over_theory"],
+        "quality_factor_viscous_theory": found.quality("theory_rate", number).as_json(),
+        "quality_factor_viscous_steady": found.quality("steady_rate", number).value,
+        "quality_factor_limit_theory": found.quality("limit_theory_rate", number).value,
+        "drag_over_theory": float(found.quantities["factor"][number]),
     }
 
 
-def _curves(campaign: Campaign, separated: Separation) -> dict[str, Any]:
+def _curves(campaign: Campaign, coefficient: dict[str, Any] | None) -> dict[str, Any]:
     """Theory along each branch, with the hysteresis where k is known."""
     curves: dict[str, Any] = {}
     for branch in dict.fromkeys(record.branch for record in campaign.records if record.branch):
         curve = branch_curves(campaign, branch)
         if curve is None:
             continue
-        if separated.benchmark is not None:
-            viscous = np.array(curve["quality_factor_viscous_theory"])
-            hysteretic = hysteretic_quality_factor(
-                np.array(curve["frequency_hz"]), separated.benchmark["value"]
+        if coefficient is not None and campaign.configuration.apparatus is not None:
+            law = campaign.configuration.apparatus.hysteresis
+            viscous, frequency, inertia = (
+                np.array(curve[name])
+                for name in (
+                    "quality_factor_viscous_theory",
+                    "frequency_hz",
+                    "moment_of_inertia_kg_m2",
+                )
             )
+            relative = inertia / law.reference_inertia_kg_m2
+            hysteretic = coefficient["value"] * frequency**2
+            hysteretic = hysteretic * relative ** (1.0 - law.inertia_exponent)
             curve["quality_factor_limit_theory"] = (1 / (1 / viscous + 1 / hysteretic)).tolist()
         curves[branch] = curve
     return curves
 
 
-def _campaign_numbers(found: Comparison | None) -> dict[str, Any]:
+def _campaign_numbers(found: Values | None) -> dict[str, Any]:
     """The numbers that describe the whole campaign."""
     names = ("viscous_exponents", "theory_factor", "history_coefficient", "checks", "budget")
     if found is None:
         return dict.fromkeys((*names, "steady_stokes_percent"))
+    # Of the drag measured over that of the steady law, less 1.
+    excess = 100.0 * (found.quantities["over_steady"][found.wet] - 1.0)
     return {
         "viscous_exponents": {
             branch: {
@@ -278,18 +242,19 @@ def _campaign_numbers(found: Comparison | None) -> dict[str, Any]:
         },
         "theory_factor": _shared(found.theory_factor),
         "history_coefficient": _shared(found.history_coefficient),
-        "checks": found.checks,
-        "budget": [{"source": name, "relative_sd": sd} for name, sd in found.budget.items()],
-        "steady_stokes_percent": list(found.steady_stokes_percent),
+        "checks": found.checks(),
+        "budget": [
+            {"source": name, "relative_sd": sd} for name, sd in found.theory_factor.budget.items()
+        ],
+        "steady_stokes_percent": [float(np.min(excess)), float(np.max(excess))],
     }
 
 
-def _shared(number: SharedEstimate) -> dict[str, Any]:
+def _shared(number: Line) -> dict[str, Any]:
     return {
         **number.estimate.as_json(),
         "sd_own": number.sd_own,
         "sd_common": number.sd_common,
-        "shared": number.shared,
         "chi2": number.chi2,
         "dof": number.degrees_of_freedom,
         "p_value": number.p_value,
@@ -316,6 +281,9 @@ def campaign_summary(comparison: dict[str, Any]) -> dict[str, Any]:
     return {
         "schema_version": 1,
         "hysteretic_coefficient": _number(comparison["hysteretic_coefficient"]),
+        "reference_inertia": _number(comparison["reference_inertia"]),
+        "loss_torque": comparison["loss_torque"],
+        "drag_factor": _number(comparison["drag_factor"]),
         "viscous_exponents": {branch: _number(exponents.get(branch)) for branch in ("low", "high")},
         "theory_factor": _number(comparison["theory_factor"]),
         "history_coefficient": _number(comparison["history_coefficient"]),

@@ -14,7 +14,7 @@ from pendpipe.configuration.load import Campaign
 from pendpipe.files import write_json
 from pendpipe.manifest import job
 from pendpipe.provenance import code_version
-from pendpipe.stages.results import campaign_data, read_results, record_files
+from pendpipe.stages.results import campaign_data, enough, read_results, record_files
 from pendpipe.version import __version__
 
 FILE_NAME = "campaign_diagnosis.json"
@@ -59,7 +59,7 @@ def diagnose_campaign(campaign: Campaign) -> dict[str, Any]:
 
     provenance = {"version": __version__, "code": code_version(__name__)}
     found = campaign_data(campaign, read_results(campaign))
-    if found is None:
+    if found is None or not enough(found[0]):
         from pendpipe.diagnosis.result import not_analysable
 
         return not_analysable(

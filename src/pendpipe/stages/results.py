@@ -20,7 +20,7 @@ from pendpipe.estimate import Estimate
 from pendpipe.files import read_json
 
 FEWEST_RECORDS = 3
-"""With fewer there is nothing to compare: k and one effect are free."""
+"""With fewer there is nothing to compare."""
 POINTS_OF_A_CURVE = 60
 
 
@@ -81,20 +81,33 @@ def placed(campaign: Campaign, results: Sequence[RecordResult]) -> list[RecordRe
 def campaign_data(
     campaign: Campaign, results: Sequence[RecordResult]
 ) -> tuple[Design, Measured] | None:
-    """Design and data of the usable records with a geometry; None where too few swing.
-
-    The joint fit compares with Eq. 16: it needs an apparatus, and three records, two of them in a
-    fluid.
-    """
-    used = placed(campaign, results)
-    if len(used) < FEWEST_RECORDS:
+    """Design and data of the usable records with a geometry, each recording once; None without."""
+    copies = twins(results)
+    used = [one for one in placed(campaign, results) if one.record.record not in copies]
+    if not used:
         return None
     design = design_of(campaign, [result.record for result in used])
-    if design.wet.sum() < 2.0:
-        return None
     fits = [result.fit for result in used if result.fit is not None]
     values = np.array([(fit.value("frequency"), fit.value("b")) for fit in fits])
     return design, measured(values, np.array([fit.covariance_of("frequency", "b") for fit in fits]))
+
+
+def enough(design: Design) -> bool:
+    """Whether records can be compared: k and one effect are free."""
+    return len(design.runs) >= FEWEST_RECORDS and design.wet.sum() >= 2.0
+
+
+def twins(results: Sequence[RecordResult]) -> dict[str, str]:
+    """Records whose fit is another's to the last digit, and the first that has it."""
+    first: dict[tuple[float, float], str] = {}
+    found = {}
+    for result in results:
+        if result.fit is not None:
+            name = result.record.record
+            numbers = result.fit.value("frequency"), result.fit.value("b")
+            if first.setdefault(numbers, name) != name:
+                found[name] = first[numbers]
+    return found
 
 
 def record_theory(campaign: Campaign, record: Record) -> dict[str, Any] | None:

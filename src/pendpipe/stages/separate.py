@@ -1,28 +1,18 @@
 """Separate the hysteretic from the viscous losses of a campaign (Fig. 4, Eq. 17)."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from pendpipe.analysis.separate import (
-    MeasuredRecord,
-    SeparatedRecord,
-    fit_benchmark,
-    separate,
-)
+import numpy as np
+
 from pendpipe.arguments import OUTPUT, Arguments, load, shared
-from pendpipe.campaign.fit import InertiaSds, inertia_sds
+from pendpipe.campaign.values import WORST_LINE, Values, campaign_values
 from pendpipe.configuration.load import Campaign
-from pendpipe.estimate import Estimate
-from pendpipe.files import read_json, write_json
+from pendpipe.estimate import Z95, Estimate
+from pendpipe.files import write_json
 from pendpipe.manifest import job
-from pendpipe.stages.results import (
-    RecordResult,
-    campaign_data,
-    read_results,
-    record_files,
-    record_theory,
-)
+from pendpipe.stages.results import RecordResult, campaign_data, read_results, record_files
 
 ARGUMENTS: Final = shared("--campaign", required=True) | {
     "--out": {"type": Path, "required": True, "help": "the separation, JSON"} | OUTPUT
@@ -37,57 +27,72 @@ def run(arguments: Arguments) -> None:
         separate_campaign(campaign, arguments.out)
 
 
-@dataclass(frozen=True)
-class Separation:
-    """What the stage leaves: k of Q_hys = k f^2 with its test, and the separated records."""
-
-    benchmark: dict[str, Any] | None
-    records: list[SeparatedRecord]
-
-
 def separate_campaign(campaign: Campaign, out: Path) -> None:
-    """Fit k to the records in air and apply Eq. 17 to all; write ``separation.json``.
+    """Apply Eq. 17 to all records, with the loss torque of the joint fit; ``separation.json``.
 
-    A campaign without records of the branch ``air`` has no k: nothing is separated. Records whose
-    fitted law contradicts the decay (a red light) are left out; `compare` reports the reason.
+    A campaign without records that swing in no fluid has no k, and nothing is separated; so it is
+    where these contradict ``Q_h = k f^2 (I/I_0)^(1 - p)``. Records whose fitted law contradicts
+    the decay (a red light) are left out; `compare` reports the reason.
     """
-    results = [result for result in read_results(campaign) if result.usable]
+    results = read_results(campaign)
     together = campaign_data(campaign, results)
-    spread = {} if together is None else inertia_sds(together[0])
-    measured = [_measured(campaign, result, spread) for result in results]
-    air = [record for record in measured if record.branch == "air"]
-    if not air:
-        write_json(out, {"schema_version": 1, "hysteretic_coefficient": None, "records": []})
-        return
-    benchmark = fit_benchmark(air)
-    separated = separate(measured, benchmark, calibration_relative_sd=common_relative_sd(results))
-    write_json(
-        out,
-        {
-            "schema_version": 1,
-            # In the form of campaign.json, with the tests of the line.
-            "hysteretic_coefficient": benchmark.coefficient.as_json()
-            | {
-                "inverse": benchmark.inverse,
-                "inverse_sd": benchmark.inverse_sd,
-                "chi2": benchmark.chi2,
-                "dof": benchmark.degrees_of_freedom,
-                "p_value": benchmark.p_value,
-                "free_exponent": benchmark.free_exponent.as_json(),
-                "exponent_p_value": benchmark.exponent_p_value,
-                "records": list(benchmark.records),
-            },
-            "records": [asdict(record) for record in separated],
-        },
-    )
+    values = together and campaign_values(*together)
+    content: dict[str, Any] = {
+        "schema_version": 1,
+        "hysteretic_coefficient": None,
+        "reference_inertia": None,
+        "loss_torque": None,
+        "benchmark": None,
+    }
+    if values:
+        content["benchmark"] = _benchmark(values)
+        inertia = Estimate(values.design.reference_inertia, 0.0, "kg m^2")
+        content["reference_inertia"] = inertia.as_json()
+    if values and is_line(values):
+        content["hysteretic_coefficient"] = values.coefficient.as_json() | content["benchmark"]
+        content["loss_torque"] = {
+            name: each.as_json() for name, each in values.loss_torques.items()
+        }
+    spread = common_relative_sd(results)
+    content["records"] = [
+        {"record": result.record.record}
+        | {name: widened(result.parameter(name), spread).as_json() for name in "ac"}
+        | separated(values, result.record.record)
+        for result in results
+        if result.usable
+    ]
+    write_json(out, content)
 
 
-def read_separation(path: Path) -> Separation:
-    """Read ``separation.json`` back."""
-    content = read_json(path)
-    return Separation(
-        content["hysteretic_coefficient"], [_separated(entry) for entry in content["records"]]
-    )
+def is_line(values: Values) -> bool:
+    """Whether the benchmark is described by one k, so that a number can be made from it."""
+    return not values.benchmark.p_value < WORST_LINE
+
+
+def separated(values: Values | None, record: str) -> dict[str, Any]:
+    """Eq. 17 of one record: Q_hys and Q_v, empty where there is no k."""
+    if not values or not is_line(values):
+        return {}
+    names = [run.record for run in values.design.runs]
+    if record not in names:
+        return {}
+    number = names.index(record)
+    found = {"quality_factor_hysteretic": values.estimate("hysteretic_quality", number)}
+    if number in values.wet:
+        found["quality_factor_viscous"] = values.quality("viscous_rate", number)
+    return {name: each.as_json() for name, each in found.items()}
+
+
+def _benchmark(values: Values) -> dict[str, Any]:
+    found = values.benchmark
+    return {
+        "chi2": found.chi2,
+        "dof": found.degrees_of_freedom,
+        "p_value": found.p_value,
+        "free_exponent": found.free_exponent.as_json(),
+        "exponent_p_value": found.exponent_p_value,
+        "records": list(found.records),
+    }
 
 
 def common_relative_sd(results: list[RecordResult]) -> float:
@@ -95,42 +100,24 @@ def common_relative_sd(results: list[RecordResult]) -> float:
     shared = [
         result.calibration["volts_per_radian"]
         for result in results
-        if result.calibration.get("from") == "the caliper run"
+        if result.usable and result.calibration.get("from") == "the caliper run"
     ]
     return float(shared[0]["sd"]) / abs(float(shared[0]["value"])) if shared else 0.0
 
 
-def _measured(
-    campaign: Campaign, result: RecordResult, spread: dict[str, InertiaSds]
-) -> MeasuredRecord:
-    row = result.record
-    theory = record_theory(campaign, row)
-    inertia = None
-    if theory is not None:
-        value = theory["moment_of_inertia_kg_m2"]
-        # What the records share of it is in the comparison's budget.
-        own = spread[row.record].own if row.record in spread else 0.0
-        inertia = Estimate(value, value * own, "kg m^2")
-    return MeasuredRecord(
-        record=row.record,
-        fluid=row.fluid,
-        branch=row.branch,
-        frequency=result.parameter("frequency"),
-        quadratic=result.parameter("a"),
-        linear=result.parameter("b"),
-        coulomb=result.parameter("c"),
-        moment_of_inertia=inertia,
-    )
+def widened(estimate: Estimate, relative_sd: float) -> Estimate:
+    """Add a relative error to an estimate's own, and to each side of its interval.
 
-
-def _separated(content: dict[str, Any]) -> SeparatedRecord:
-    """Read a separated record back from its JSON."""
-
-    def fields(entries: dict[str, Any]) -> dict[str, Any]:
-        return {
-            name: Estimate.from_json(entry) if isinstance(entry, dict) else entry
-            for name, entry in entries.items()
-        }
-
-    measured = MeasuredRecord(**fields(content.pop("measured")))
-    return SeparatedRecord(measured=measured, **fields(content))
+    With an angle that is volts over V/rad, a goes as V/rad and c as its inverse; b, and with it
+    every quality factor, doesn't change.
+    """
+    added = relative_sd * abs(estimate.value)
+    interval = estimate.interval95
+    if interval is not None:
+        half = Z95 * added
+        below, above = estimate.value - interval[0], interval[1] - estimate.value
+        interval = (
+            estimate.value - float(np.hypot(below, half)),
+            estimate.value + float(np.hypot(above, half)),
+        )
+    return replace(estimate, sd=float(np.hypot(estimate.sd, added)), interval95=interval)
