@@ -18,6 +18,7 @@ from pendpipe.version import __version__
 
 if TYPE_CHECKING:
     from pendpipe.configuration.load import Campaign
+    from pendpipe.estimate import Estimate
     from pendpipe.formats import ReadOptions
     from pendpipe.recording import Recording
 
@@ -144,6 +145,16 @@ def number_within(low: float, high: float = math.inf) -> Callable[[str], float]:
     return read
 
 
+def measured_number(text: str) -> Estimate:
+    """Read a number with its error, as a type of argparse: 0.600(1)."""
+    from pendpipe.estimate import measured
+
+    try:
+        return measured(text)
+    except ValueError as problem:
+        raise argparse.ArgumentTypeError(str(problem)) from None
+
+
 def declare(parser: argparse.ArgumentParser, arguments: Flags) -> None:
     """Declare a command's arguments, each by its name and the options of argparse.
 
@@ -192,15 +203,23 @@ def read_options(arguments: Arguments) -> ReadOptions:
     return ReadOptions(**{each.name: getattr(arguments, each.name) for each in fields(ReadOptions)})
 
 
-def announce(arguments: Arguments, recording: Recording) -> None:
-    """Print what was guessed, the weak guesses first, to stderr."""
+def announce(
+    arguments: Arguments,
+    recording: Recording,
+    *,
+    quiet: bool = False,
+    say: Callable[[str], None] | None = None,
+) -> None:
+    """Print what was guessed, the weak guesses first, to stderr; these alone where `quiet`."""
     weak = [f"a guess: {guess}" for guess in recording.weak_guesses]
-    for line in (*weak, *recording.notes):
-        tell(f"{arguments.file}: {line}")
+    for line in (*weak, *(() if quiet else recording.notes)):
+        (say or tell)(f"{arguments.file}: {line}")
 
 
-def read_motion(arguments: Arguments) -> tuple[Recording, dict[str, Any]]:
-    """Read FILE, apply the sensor constant, and say what was guessed.
+def read_motion(
+    arguments: Arguments, *, quiet: bool = False, say: Callable[[str], None] | None = None
+) -> tuple[Recording, dict[str, Any]]:
+    """Read FILE, apply the sensor constant, and say what was guessed; see `announce`.
 
     Returns
     -------
@@ -217,7 +236,7 @@ def read_motion(arguments: Arguments) -> tuple[Recording, dict[str, Any]]:
     constant = arguments.volts_per_radian or _calibrated(arguments.calibration)
     was_volts = recording.quantity == "volts"
     recording = recording.as_motion(constant, arguments.file)
-    announce(arguments, recording)
+    announce(arguments, recording, quiet=quiet, say=say)
     return recording, {
         "input_sha256": hashlib.sha256(file_bytes(Path(arguments.file))).hexdigest(),
         "version": __version__,

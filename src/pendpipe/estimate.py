@@ -1,5 +1,6 @@
 """A number with its uncertainty, as it stands in every result file."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, nan, pi
@@ -105,3 +106,27 @@ def over(number: float, estimate: Estimate, unit: str = "") -> Estimate:
     low, high = estimate.bounds95
     ends = number / high if isfinite(high) else 0.0, number / low if low > 0.0 else inf
     return Estimate(value, value * estimate.sd / estimate.value, unit, ends)
+
+
+def measured(text: str) -> Estimate:
+    """Read a positive number as metrologists write it, with or without its error.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+
+    Examples
+    --------
+    >>> measured("0.600(1)")
+    Estimate(value=0.6, sd=0.001, unit='', interval95=None, at_bound=False)
+    >>> measured("0.6").sd
+    0.0
+    """
+    found = re.fullmatch(r"\s*(\d*\.?\d*)(?:\((\d+\.?\d*)\))?\s*", text)
+    if found is None or not any(map(str.isdigit, found[1])) or not float(found[1]) > 0.0:
+        raise ValueError(f"{text!r} is no positive number like 0.600 or 0.600(1)")
+    digits, inside = found.groups()
+    last = 10.0 ** -len(digits.partition(".")[2])
+    sd = 0.0 if inside is None else float(inside) * (1.0 if "." in inside else last)
+    return Estimate(float(digits), sd, "")

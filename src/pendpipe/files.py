@@ -42,6 +42,8 @@ _MARKS: Final = re.compile(
     rb"|\0made by pendpipe [^\0]*\0\Z"  # WinDaq: behind its last comment
     rb"|\x07made_by\x18.pendpipe (?s:.)*PAR1\Z"
     rb'|\A"record","fluid","branch","pendulum","T0_s",'  # for spreadsheets, which know no remarks
+    rb"|\A(?:\xef\xbb\xbf)?file,light,T0_s,T0_sd_s,"
+    rb"|\A% made_by: pendpipe "  # LaTeX
 )
 _ENDS: Final = 1 << 13
 """So many bytes at either end are searched for marks."""

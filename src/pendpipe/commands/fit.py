@@ -5,25 +5,28 @@ to all readings, --method turning-points fits Eq. 14 to the turning points (the 
 auto, the default, takes the turning points, or the larger amplitudes alone, only where the
 waveform's law contradicts the decay. The restoring torque is sin x where the recording asks for it.
 
-The light compares the fitted law's loss with the decrement of the turning points at three
-amplitudes. green: they agree, and noise explains the rest. amber: they agree, but the readings
-differ from the law by more than noise. red: they contradict each other; then the reason is
-printed instead of the law, and the exit status is 2 unless --accept is given.
+The light compares period and Q with those that the turning points show without a law. green: right
+to 5 %, and the misfit moves them by less than their errors. amber: it names what can't be quoted.
+red: the law contradicts the decay; then Q and the period of the turning points are printed instead,
+and the exit status is 2 unless --accept is given. Of several FILEs it is 2 if none could be fitted.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 from pendpipe import api
 from pendpipe.analysis.fit.by_points import parse_fixed
-from pendpipe.analysis.fit.result import FitResult, gravity_line, lines, row, table
+from pendpipe.analysis.fit.printed import gravity_line, lines
+from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import (
     FILES,
     OUTPUT,
     Arguments,
     Flags,
+    measured_number,
     number_within,
     print_answer,
     print_json,
@@ -33,19 +36,24 @@ from pendpipe.arguments import (
 )
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import is_stream, write_json
+from pendpipe.report.class_table import Fitted, form_of, printed, together, write_fits
 
 _OWN: Final[Flags] = {
-    "--out": {"metavar": "JSON", "help": "the result; - is standard output"} | OUTPUT,
+    "--out": {
+        "metavar": "FILE",
+        "help": "the result (.json), or the table (.csv, .xlsx, .html, .tex); - is standard output",
+    }
+    | OUTPUT,
     "--figure": {
         "type": Path,
         "metavar": "FILE",
-        "help": "draw the decay with its fit, the residual, and Q against amplitude (.svg, .png)",
+        "help": "draw decay, residual, and Q against amplitude (.svg, .png, .pdf)",
     }
     | OUTPUT,
     "--length": {
-        "type": number_within(0),
+        "type": measured_number,
         "metavar": "M",
-        "help": "length of a simple pendulum, m: prints g",
+        "help": "length of a simple pendulum, m, as 0.600 or 0.600(1): prints g",
     },
     "--gravity": {
         "type": number_within(0),
@@ -62,6 +70,12 @@ _OWN: Final[Flags] = {
         "action": "store_true",
         "help": "print a law that contradicts the decay, status 0",
     },
+    "--wide": {"action": "store_true", "help": "of several FILEs: a, b, c in columns"},
+    "-v": {
+        "dest": "verbose",
+        "action": "store_true",
+        "help": "tell how it was read, and harmless notes",
+    },
     "--seed": {"type": int, "metavar": "N", "help": "recorded only"},
 }
 ARGUMENTS: Final = (
@@ -74,6 +88,8 @@ ARGUMENTS: Final = (
 
 def run(arguments: Arguments) -> int:
     """Fit and print; write what is asked for."""
+    if arguments.out and arguments.record is None:
+        form_of(arguments.out)
     if len(arguments.files) > 1:
         return _table(arguments)
     arguments.file = arguments.files[0]
@@ -83,21 +99,24 @@ def run(arguments: Arguments) -> int:
     figure: Path | None = arguments.figure
     # A form that nobody can draw is refused before the file is written.
     refuse_if(
-        figure and figure.suffix not in (".svg", ".png"),
+        figure and figure.suffix not in (".svg", ".png", ".pdf"),
         f"--figure {figure}",
         "its form is unknown",
-        "end its name in .svg or .png",
+        "end its name in .svg, .png or .pdf",
     )
     result = _fit(arguments)
     if result.light == "red":
         why = result.light_reason if arguments.json else "no law is printed"
         tell(f"pendpipe: {arguments.file}: {why} (--accept prints it)")
     if arguments.out:
-        _write(arguments, result)
+        write_fits(arguments.out, [Fitted(arguments.file, result)], result.to_dict())
     if figure:
         from pendpipe.figures.style import save
 
         save(result.plot(), figure.with_suffix(""), forms=[figure.suffix[1:]])
+    if arguments.verbose:
+        for warning in result.warnings:
+            tell(f"{arguments.file}: {warning}")
     if arguments.out and is_stream(arguments.out):
         return _status(arguments, result)
     if arguments.json:
@@ -122,9 +141,9 @@ def _stage(arguments: Arguments) -> None:
     )
 
 
-def _fit(arguments: Arguments) -> FitResult:
+def _fit(arguments: Arguments, say: Callable[[str], None] = tell) -> FitResult:
     fixed = parse_fixed(arguments.fix, arguments.baseline)
-    recording, provenance = read_motion(arguments)
+    recording, provenance = read_motion(arguments, quiet=not arguments.verbose, say=say)
     points = arguments.turning_points and read_turning_points(arguments.turning_points)
     result = api.fit(
         recording,
@@ -154,11 +173,12 @@ def _write(arguments: Arguments, result: FitResult) -> None:
 
 
 def _print(arguments: Arguments, result: FitResult) -> None:
-    """Print the summary."""
-    printed = lines(result, law=result.light != "red" or arguments.accept)
+    """Print the answer."""
+    name = "standard input" if arguments.file == "-" else Path(arguments.file).name
+    printed = lines(result, name=name, law=arguments.accept)
     if arguments.length or arguments.gravity:
-        length_m, gravity = arguments.length, arguments.gravity
-        printed.insert(-1, gravity_line(result, length_m=length_m, gravity=gravity))
+        length, gravity = arguments.length, arguments.gravity
+        printed.insert(-2, gravity_line(result, length=length, gravity=gravity))
     print("\n".join(printed))
 
 
@@ -168,26 +188,38 @@ def _status(arguments: Arguments, result: FitResult) -> int:
 
 def _table(arguments: Arguments) -> int:
     """Fit several recordings; what can't be fitted gets its reason, and the others go on."""
-    for option in ("out", "figure", "turning_points", "record"):
+    for option in ("figure", "turning_points", "record"):
         refuse_if(
             getattr(arguments, option),
             f"--{option.replace('_', '-')}",
             "it belongs to one FILE",
             "fit that file alone",
         )
-    status, found, rows = 0, [], []
+    fits, found, notes = [], [], list[str]()
     for file in arguments.files:
         arguments.file = file
         try:
-            result = _fit(arguments)
+            result = _fit(arguments, notes.append)
         except InputError as problem:
-            tell(f"pendpipe: {problem}")
             found.append({"file": file, "error": str(problem)})
-            rows.append(row(file, None))
-            status = 2
+            fits.append(Fitted(file, None, str(problem).removeprefix(f"{file}: ")))
         else:
             found.append({"file": file, **result.to_dict()})
-            rows.append(row(file, result))
-            status = max(status, _status(arguments, result))
-    print_answer(arguments, {"schema_version": 1, "fits": found}, table(rows))
-    return status
+            fits.append(Fitted(file, result))
+    content = {
+        "schema_version": 1,
+        "fits": found,
+        "together": [each.as_json() for each in together(fits)],
+    }
+    if arguments.out:
+        write_fits(arguments.out, fits, content)
+    if not (arguments.out and is_stream(arguments.out)):
+        print_answer(arguments, content, printed(fits, wide=arguments.wide))
+    for each in fits:
+        notes += [f"pendpipe: {each.file}: {each.refusal}"] if each.refusal else []
+        if arguments.verbose and each.fit:
+            notes += [f"{each.file}: {warning}" for warning in each.fit.warnings]
+    for note in notes:
+        tell(note)
+    usable = [each.fit for each in fits if each.fit and not _status(arguments, each.fit)]
+    return 0 if usable else 2

@@ -13,8 +13,9 @@ from typing import Any, Final
 
 from markupsafe import Markup
 
-from pendpipe.analysis.fit.quality import qualities, small_period
-from pendpipe.analysis.fit.result import FitResult, cause, quotable, rate_with_error
+from pendpipe.analysis.fit.printed import cause, rate_with_error, sentence
+from pendpipe.analysis.fit.quality import qualities
+from pendpipe.analysis.fit.result import FitResult
 from pendpipe.figures.data import error, number, used
 from pendpipe.files import read_json, without_folders
 from pendpipe.quantities import compact, with_error
@@ -337,7 +338,7 @@ def render_recording(
         One HTML document that refers to nothing outside itself.
     """
     unit, has_law = result["amplitude"].unit, result.light != "red"
-    period = small_period(result)
+    period = result.period
     titles = {"a": "quadratic", "b": "linear", "c": "Coulomb"} if has_law else {}
     numbers = [
         ("Period", with_error(period.value, period.sd, "s")),
@@ -364,7 +365,7 @@ def render_recording(
             )
             for each in qualities(result)
         ],
-        advice=quotable(result),
+        advice=sentence(result),
         checks=[check.sentence(unit) for check in result.decrement_check],
         figures=[(title, inline_svg(drawn.getvalue(), "figure0", title, title))],
         statement=statement,

@@ -141,8 +141,11 @@ def _fit(
         return result
     by_points = fit_points(points, baseline=baseline, fixed=fixed, restoring=restoring)
     if _stands(by_points):
-        why = result.light_reason if result.settled else "it did not settle"
-        return _amber(by_points, f"from the turning points, because for the waveform {why}")
+        # What all readings deny is not quoted.
+        kept = tuple(name for name in by_points.quotable if name in ("period", "Q"))
+        why = result.light_reason if result.settled else "their fit did not settle"
+        reason = "don't quote a, b, c, from the turning points alone; of all readings"
+        return replace(_amber(by_points, f"{reason} {why}"), quotable=kept)
     for part in _larger_amplitudes(points):
         larger = fit_waveform(
             samples, part, baseline=baseline, fixed=fixed, restoring=restoring, length_m=length_m
@@ -243,4 +246,5 @@ def _of_larger(result: FitResult, points: TurningPoints, part: TurningPoints) ->
     size = f"{least:.2g} {pretty_unit(points.unit)}".rstrip()
     below = f"below {size} the decay is not that of the fitted law"
     cut = {"start_s": float(part.time_s[-1]), "stop_s": points.stop_s, "reason": below}
-    return replace(_amber(result, f"{below}: that is left out"), cuts=(*result.cuts, cut))
+    why = f"don't quote any of it below {size}: the decay there is not that of the fitted law"
+    return replace(_amber(result, why), cuts=(*result.cuts, cut))

@@ -6,12 +6,11 @@ middle and the smallest amplitude that was analysed.
 """
 
 import math
-from collections.abc import Sequence
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.goodness import LEVEL, combined, normal_tail
+from pendpipe.analysis.fit.goodness import normal_tail
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.quantities import compact, with_error
@@ -48,6 +47,8 @@ class Decrement(NamedTuple):
     seen: float
     """1/s, of the turning points."""
     seen_sd: float
+    scatter: float = 1.0
+    """Variance of the turning points about a smooth decay over their own."""
 
     @property
     def excess(self) -> float:
@@ -115,11 +116,12 @@ def check_decrement(points: TurningPoints, law: Eq8) -> tuple[Decrement, ...]:
         if further[-1][2] <= _CONFIRMED * abs(further[-1][1]):
             found = further
     return tuple(
-        Decrement(amplitude, loss_of(law, amplitude), loss, sd) for amplitude, loss, sd in found
+        Decrement(amplitude, loss_of(law, amplitude), loss, sd, scatter)
+        for amplitude, loss, sd, scatter in found
     )
 
 
-def _seen(points: TurningPoints) -> list[tuple[float, float, float]]:
+def _seen(points: TurningPoints) -> list[tuple[float, float, float, float]]:
     """The decrement about the large, the middle and the small amplitude; see `seen_loss`."""
     logs, count = np.log(points.amplitude_rad), len(points)
     index, found = np.arange(count), []
@@ -134,7 +136,7 @@ def _seen(points: TurningPoints) -> list[tuple[float, float, float]]:
     return found
 
 
-def seen_loss(points: TurningPoints) -> tuple[float, float, float]:
+def seen_loss(points: TurningPoints) -> tuple[float, float, float, float]:
     """Relative loss of amplitude of some neighbouring turning points.
 
     A parabola in time is fitted to ln y, beside an error of the level, which raises the
@@ -142,7 +144,7 @@ def seen_loss(points: TurningPoints) -> tuple[float, float, float]:
 
     Returns
     -------
-    amplitude, loss, sd
+    amplitude, loss, sd, scatter
         In the middle of the window: y in rad, -d ln y/dt in 1/s, and its standard deviation from
         the scatter about the parabola (neighbours may scatter alike) and not below the turning
         points' own.
@@ -163,13 +165,14 @@ def seen_loss(points: TurningPoints) -> tuple[float, float, float]:
     values = inverse @ (weight * np.log(amplitude)) / scale
     residual = weight * np.log(amplitude) - design @ values
     freedom = len(points) - len(columns)
-    variance = float(inverse[1] @ inverse[1]) / scale[1] ** 2
+    variance, scatter = float(inverse[1] @ inverse[1]) / scale[1] ** 2, 1.0
     if freedom > 0:
         square = float(residual @ residual)
         alike = float(residual[1:] @ residual[:-1]) / max(square, 1e-300)
         alike = min(max(alike, 0.0), 0.8)
-        variance *= max(1.0, square / freedom * (1.0 + alike) / (1.0 - alike))
-    return math.exp(values[0]), -float(values[1]) / span, math.sqrt(variance) / span
+        scatter = max(1.0, square / freedom * (1.0 + alike) / (1.0 - alike))
+    sd = math.sqrt(variance * scatter) / span
+    return math.exp(values[0]), -float(values[1]) / span, sd, scatter
 
 
 def loss_of(law: Eq8, amplitude: float) -> float:
@@ -197,40 +200,3 @@ def _slow_loss(law: Eq8, amplitude: float) -> float:
     """Eq. 13: a y + b + c/y."""
     b = law.hysteretic + law.viscous
     return law.quadratic * amplitude + b + law.coulomb / amplitude
-
-
-def light_of(
-    checks: Sequence[Decrement], p_values: Sequence[float], *, unit: str
-) -> tuple[Light, str]:
-    """Say how far a fit may be believed.
-
-    Parameters
-    ----------
-    checks
-        Of the decrement.
-    p_values
-        Of all questions of the test of fit.
-    unit
-        Of the amplitude.
-
-    Returns
-    -------
-    light
-        ``"red"``: the law contradicts the decay. ``"amber"``: it loses what the decay loses, but
-        the readings differ from it by more than noise (the errors are enlarged), or the decrement
-        is not seen well enough to confirm it. ``"green"``: neither.
-    reason
-        A clause.
-    """
-    wrong = [check for check in checks if check.contradicts]
-    if wrong:
-        worst = max(wrong, key=lambda check: abs(check.excess))
-        return "red", f"the fitted law contradicts the decay: {worst.sentence(unit)}"
-    if len(checks) < 3 or not all(check.confirms for check in checks):
-        return "amber", "the turning points do not show the decrement well enough to check the law"
-    if combined(p_values) < LEVEL:
-        return "amber", (
-            "the law loses what the decay loses, but the readings differ from it by more than"
-            " noise: the standard deviations are enlarged"
-        )
-    return "green", "the law loses what the decay loses, and noise explains the rest"

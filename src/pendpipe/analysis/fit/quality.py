@@ -185,6 +185,8 @@ def relative_loss_sd(result: FitResult, amplitude: float) -> float:
 
 
 def _sd(weights: FloatArray, covariance: FloatArray) -> float:
+    if not np.isfinite(covariance).all():
+        return math.inf
     return math.sqrt(max(float(weights @ covariance @ weights), 0.0))
 
 
@@ -192,7 +194,9 @@ def _covariance_of_losses(result: FitResult, amplitude: float) -> FloatArray:
     """Return the covariance of a y, b and c/y, over their sum squared, shape (3, 3)."""
     slope = np.array([amplitude, 1.0, 1.0 / amplitude])
     loss = float(slope @ [result.value(name) for name in "abc"])
-    relative = slope / loss if loss > 0.0 else np.full(3, math.inf)
+    if not loss > 0.0:
+        return np.diag(np.full(3, math.inf))
+    relative = slope / loss
     return relative[:, None] * result.covariance_of("a", "b", "c") * relative
 
 
@@ -206,7 +210,31 @@ def period_of(result: FitResult, amplitude: float) -> float:
     return float(cycle.time_s[2])
 
 
+def damping_of(result: FitResult) -> dict[str, Estimate]:
+    """Return damping time, half-life and logarithmic decrement; see `FitResult.damping`."""
+    found = result.quality_factors
+    if not found:
+        return {}
+    large = found[0]
+    q, relative = large.quality_factor.value, large.quality_factor.sd / large.quality_factor.value
+    tau = q * large.period_s / math.pi
+    return {
+        "amplitude_rad": Estimate(large.amplitude_rad, 0.0, result.parameters["amplitude"].unit),
+        "damping_time_s": Estimate(tau, tau * relative, "s"),
+        "half_life_s": Estimate(math.log(2.0) * tau, math.log(2.0) * tau * relative, "s"),
+        "logarithmic_decrement": Estimate(math.pi / q, math.pi / q * relative, ""),
+    }
+
+
 def small_period(result: FitResult) -> Estimate:
-    """Period 1/f of Eq. 8's frequency, s: with the torque of sin x that of small amplitudes."""
+    """Period 1/f of Eq. 8's frequency, s: with the torque of sin x that of small amplitudes.
+
+    With a red light that of the turning points; its error covers how far large, middle and small
+    swings are from it.
+    """
+    if result.light == "red" and result.period_check:
+        whole, *parts = result.period_check
+        spread = max((abs(each.seen - whole.seen) for each in parts), default=0.0)
+        return Estimate(whole.seen, math.hypot(whole.seen_sd, spread), "s")
     frequency = result.parameters["frequency"]
     return Estimate(1.0 / frequency.value, frequency.sd / frequency.value**2, "s")

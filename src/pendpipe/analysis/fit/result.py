@@ -10,25 +10,26 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from pendpipe.analysis.fit.decrement import Decrement, Light, check_decrement, light_of
-from pendpipe.analysis.fit.goodness import Goodness, combined
+from pendpipe.analysis.fit.consequence import PeriodCheck, Widening, judged
+from pendpipe.analysis.fit.decrement import Decrement, Light, check_decrement
+from pendpipe.analysis.fit.goodness import LEVEL, Goodness, combined
 from pendpipe.analysis.fit.least_squares import CHI2_95
+from pendpipe.analysis.fit.printed import lines
 from pendpipe.analysis.fit.quality import (
-    LOSSES,
     Quality,
+    damping_of,
     qualities,
     quality_at,
     released_quality,
-    seen_qualities,
     small_period,
 )
-from pendpipe.analysis.turning_points import BEAT, TurningPoints, write_turning_points
+from pendpipe.analysis.turning_points import TurningPoints, write_turning_points
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics import Eq8, Release, turning_points
+from pendpipe.dynamics import Eq8
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Estimate, number, quality_of_rate
 from pendpipe.files import read_json, write_json, writing
-from pendpipe.quantities import compact, in_columns, stretch, with_error
+from pendpipe.quantities import compact
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -119,7 +120,16 @@ class FitResult:
         Logarithm of the likelihood of the fitted torque over the other's; None where it was not
         asked for.
     light, light_reason
-        How far the numbers may be believed (`decrement.light_of`), and why.
+        How far the numbers may be believed, by what the misfit does to them (`consequence`), and
+        why.
+    quotable
+        What may be quoted: ``"period"``, ``"Q"``, ``"losses"``, ``"a"``, ``"b"``, ``"c"``.
+    period_check
+        The law's period beside that of the turning points: all, large, middle and small swings.
+    widening
+        By what standard deviations were multiplied for what the law misses.
+    name
+        Of the file that was fitted.
     points, decay
         The turning points and the readings of the fitted decay; None where the fit was read
         from a file.
@@ -152,6 +162,10 @@ class FitResult:
     torque_odds: float | None = None
     light: Light = "amber"
     light_reason: str = "the decrement was not checked"
+    quotable: tuple[str, ...] = ()
+    period_check: tuple[PeriodCheck, ...] = ()
+    widening: Widening = field(default_factory=Widening)
+    name: str = field(default="", compare=False)
     points: TurningPoints | None = field(default=None, repr=False, compare=False)
     decay: Recording | None = field(default=None, repr=False, compare=False)
 
@@ -163,7 +177,7 @@ class FitResult:
         >>> import pendpipe as pp
         >>> fit = pp.fit("examples/rod-pendulum.csv")
         >>> print(fit["period"], fit["Q"], sep="; ")
-        (1.1454713 ± 0.0000025) s; 170.06 ± 0.56
+        (1.1454717 ± 0.0000025) s; 170.00 ± 0.57
         """
         if name == "Q":
             return released_quality(self)
@@ -171,8 +185,23 @@ class FitResult:
 
     @property
     def period(self) -> Estimate:
-        """Period of small swings, s."""
+        """Period of small swings, s; with a red light that of the turning points."""
         return small_period(self)
+
+    @property
+    def refuted(self) -> bool:
+        """Whether the readings differ from the law by more than noise explains."""
+        test = self.fit_p_value is not None and self.fit_p_value < LEVEL
+        return test or max(self.widening) > 1.0
+
+    def damping(self) -> dict[str, Estimate]:
+        """Return other measures of the loss at the largest amplitude of `quality_factors`.
+
+        ``damping_time_s``, 1 over the loss: the amplitude falls to 1/e in it;
+        ``half_life_s``, ln 2 times that; ``logarithmic_decrement``, pi/Q, of a period. All at
+        ``amplitude_rad``, where the loss depends on it.
+        """
+        return damping_of(self)
 
     @property
     def quality_factors(self) -> tuple[Quality, ...]:
@@ -196,7 +225,7 @@ class FitResult:
         return quality_at(self, amplitude_rad)
 
     def __str__(self) -> str:
-        """Return the light, what can be quoted, and how to quote it."""
+        """Return what is known, the sentence to copy, and what to do next."""
         return "\n".join(lines(self))
 
     def __repr__(self) -> str:
@@ -269,6 +298,7 @@ class FitResult:
             where = compact(each.amplitude_rad, unit)
             found[f"Q({where})"] = each.quality_factor
             shares |= {f"share of {name} at {where}": of for name, of in each.losses.items()}
+        found |= {name: each for name, each in self.damping().items() if name != "amplitude_rad"}
         return found | {"Q": self["Q"]} | ({} if limit is None else {"Q limit": limit}) | shares
 
     def save(self, folder: str | Path, *, force: bool = False) -> Path:
@@ -313,10 +343,14 @@ class FitResult:
             **{name: getattr(self, name) and getattr(self, name).as_json() for name in OPTIONAL},
             "light": self.light,
             "light_reason": self.light_reason,
+            "quotable": list(self.quotable),
+            "widening": self.widening._asdict(),
+            "period_check": [check._asdict() for check in self.period_check],
             "decrement_check": [check._asdict() for check in self.decrement_check],
             "parameters": {name: self.parameters[name].as_json() for name in PARAMETERS},
             "period": self.period.as_json(),
             "quality_factors": [each.as_json() for each in self.quality_factors],
+            "damping": {name: each.as_json() for name, each in self.damping().items()},
             "quality_factor_limit": limit.as_json(),
             **{name: getattr(self, name) and getattr(self, name).as_json() for name in PARTS},
             "covariance": {
@@ -366,6 +400,9 @@ class FitResult:
             torque_odds=content["torque_log_odds"],
             light=content["light"],
             light_reason=content["light_reason"],
+            quotable=tuple(content["quotable"]),
+            widening=Widening(**content["widening"]),
+            period_check=tuple(PeriodCheck(**check) for check in content["period_check"]),
             decrement_check=tuple(Decrement(**check) for check in content["decrement_check"]),
             **held,
         )
@@ -422,7 +459,6 @@ def result_of(
     limit = quality_of_rate(parameters["frequency"].value, b) if b.value > 0.0 else None
     checks = check_decrement(points, law)
     p_values = (*goodness.p_values, *(check.p_value for check in checks))
-    light, reason = light_of(checks, p_values, unit=points.unit)
     rest |= {name: Estimate(fixed[name], 0.0, "") for name in PARTS if name in fixed}
     result = FitResult(
         parameters=parameters,
@@ -435,10 +471,10 @@ def result_of(
         chi2_per_dof=goodness.chi2_per_dof,
         fit_p_value=combined(p_values),
         decrement_check=checks,
-        light=light,
-        light_reason=reason,
         **rest,
     )
+    refuted = combined(p_values) < LEVEL
+    result = judged(result, points, law, enlarged=goodness.enlarged, refuted=refuted)
     return replace(result, warnings=(*points.notes, *_warnings(result, goodness.enlarged), *said))
 
 
@@ -493,164 +529,3 @@ def read_fit(path: str | Path) -> FitResult:
         return FitResult.from_json(content)
     except (KeyError, TypeError) as fault:
         raise InputError(path, f"this is no fit ({fault})", "run pendpipe fit") from None
-
-
-WITHOUT_LAW: Final = "from the turning points alone"
-_TOP: Final = 3.13
-"""Amplitude in rad beyond which no correction is made for sin x."""
-
-
-def cause(quality: Quality) -> str:
-    """Say which loss takes most at an amplitude, and how much, as far as it is told."""
-    if not quality.losses:
-        return WITHOUT_LAW
-    if (name := quality.dominant) is None:
-        return "by losses that this fit does not tell apart"
-    return f"{100.0 * quality.losses[name].value:.0f} % {LOSSES[name]} ({name})"
-
-
-def gravity_line(
-    result: FitResult, *, length_m: float | None = None, gravity: float | None = None
-) -> str:
-    """Print g from the length of a simple pendulum, or its length from g: omega_0^2 = g/l.
-
-    Parameters
-    ----------
-    result
-        A fit of angles.
-    length_m, gravity
-        The one that is known, m or m/s^2.
-
-    Notes
-    -----
-    With the torque of sin x the fitted omega is omega_0, that of small amplitudes. Otherwise
-    omega_0 = omega 2 K(sin(y/2))/pi at the root-mean-square amplitude y, and the line names this
-    correction.
-    """
-    omega = 2.0 * math.pi * result.value("frequency")
-    relative = 2.0 * result["frequency"].sd / result.value("frequency")
-    corrected = ""
-    if result.restoring == "linear":
-        squares = [quality.amplitude_rad**2 for quality in qualities(result)]
-        amplitude = math.sqrt(sum(squares) / len(squares))
-        release = Release(0.0, min(amplitude, _TOP))
-        swing = turning_points(Eq8(1.0, restoring="sine"), release, count=2)
-        factor = float(swing.time_s[1]) / math.pi
-        omega *= factor
-        corrected = f", finite-amplitude correction {100.0 * (factor**2 - 1.0):+.2g} % included"
-    if length_m is not None:
-        value, name, unit = omega**2 * length_m, "g", "m/s^2"
-    else:
-        assert gravity is not None
-        value, name, unit = gravity / omega**2, "length", "m"
-    return _line(name, with_error(value, relative * value, unit, short=True) + corrected)
-
-
-def lines(result: FitResult, *, law: bool | None = None) -> list[str]:
-    """Print a fit: the light first, then what can be quoted, each with its error.
-
-    Parameters
-    ----------
-    result
-        The fit.
-    law
-        Whether to print a, b, c; by default unless the light is red.
-    """
-    unit = result.parameters["amplitude"].unit
-
-    def quality(found: Quality) -> str:
-        q = with_error(found.quality_factor.value, found.quality_factor.sd, short=True)
-        return _line(f"Q at {compact(found.amplitude_rad, unit)}", f"{q}, {cause(found)}")
-
-    by_points = result.method == "turning-points"
-    count = result.turning_points if by_points else result.samples
-    head = [
-        f"{result.light}: {result.light_reason}",
-        f"  {result.equation} fitted to {count} {'turning points' if by_points else 'readings'}",
-        *(
-            _line("left out", f"{stretch(cut['start_s'], cut['stop_s'])}: {cut['reason']}")
-            for cut in result.cuts
-        ),
-    ]
-    if not (result.light != "red" if law is None else law):
-        checks = (f"  {check.sentence(unit)}" for check in result.decrement_check)
-        seen = (quality(each) for each in seen_qualities(result))
-        return [*head, *checks, *seen, "  " + quotable(result)]
-    period, limit = small_period(result), result.quality_factor_limit
-    name = "period, small amplitude" if result.restoring == "sine" else "period"
-    told = [limit] if limit is not None and limit.value > 3.0 * limit.sd else []
-    return [
-        *head,
-        _line(name, with_error(period.value, period.sd, "s", short=True)),
-        *(_line(letter, rate_with_error(result[letter])) for letter in "abc"),
-        *(quality(each) for each in qualities(result)),
-        *(_line("Q limit πf/b", with_error(each.value, each.sd, short=True)) for each in told),
-        "  " + quotable(result),
-    ]
-
-
-def _line(name: str, value: str) -> str:
-    return f"  {name:<26}{value}"
-
-
-def rate_with_error(rate: Estimate, *, short: bool = True) -> str:
-    """Print a rate with its error, or its upper limit where it lies at zero."""
-    if rate.at_bound:
-        limit = float(f"{rate.bounds95[1]:.2g}")
-        return f"below {with_error(limit, None, rate.unit)} (95 %)"
-    return with_error(rate.value, rate.sd, rate.unit, short=short)
-
-
-def quotable(result: FitResult) -> str:
-    """Advise which of the numbers to quote."""
-    if result.light == "green":
-        if all(each.dominant for each in qualities(result)):
-            return "Quote these numbers with their errors."
-        return (
-            "Quote the period and Q with their errors: this decay does not tell a, b and c apart."
-        )
-    if result.light_reason.startswith(BEAT):
-        return "Quote the frequency and the loss of each mode; pendpipe diagnose fits both."
-    if result.light == "red":
-        what = "Q alone" if seen_qualities(result) else "none of these numbers"
-        return f"Quote {what}, not a, b or c: run pendpipe diagnose to learn what the law lacks."
-    if result.chi2_per_dof > 2.0:
-        return (
-            "Quote Q at these amplitudes. The fit leaves more than white noise: ask pendpipe"
-            " diagnose for the cause before you quote a, b or c."
-        )
-    return "Quote Q at these amplitudes. a, b and c are correlated: quote all three."
-
-
-HEAD: Final = ("file", "light", "period (s)", "a (1/rad s)", "b (1/s)", "c (rad/s)", "Q", "at")
-
-
-def row(file: str, result: FitResult | None) -> tuple[str, ...]:
-    """Make a line of `table`; a recording that was refused has its name only."""
-    if result is None:
-        return (file, "refused", *[""] * (len(HEAD) - 2))
-    period, large = small_period(result), qualities(result)[0]
-    # Without the unit, which is in the head of the table.
-    rates = [
-        ""
-        if result.light == "red"
-        else rate_with_error(replace(result[name], unit=""))
-        .removesuffix(" (95 %)")
-        .replace("below ", "< ")
-        for name in "abc"
-    ]
-    return (
-        file,
-        result.light,
-        with_error(period.value, period.sd, short=True),
-        *rates,
-        ""
-        if result.light == "red"
-        else with_error(large.quality_factor.value, large.quality_factor.sd, short=True),
-        compact(large.amplitude_rad, result["amplitude"].unit),
-    )
-
-
-def table(rows: list[tuple[str, ...]]) -> str:
-    """Lay rows out below their head."""
-    return in_columns([HEAD, *rows])

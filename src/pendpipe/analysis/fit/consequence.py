@@ -1,0 +1,259 @@
+"""What the misfit of a law does to the numbers that are quoted: the light by consequence.
+
+The period, and Q at three amplitudes, are known from the turning points without a law. What a
+misfit does to a fit is what the fit's numbers differ by from these: so much are the errors
+widened, and not by how loud the misfit is in the readings. A sensor's third harmonic may stand out
+by a thousand standard deviations and move neither Q nor the period.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from statistics import median
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.fit.decrement import TOLERANCE, Decrement, Light
+from pendpipe.analysis.fit.period import fit_period
+from pendpipe.analysis.fit.quality import relative_loss_sd
+from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.dynamics import Eq8
+from pendpipe.estimate import Estimate
+from pendpipe.quantities import compact
+
+if TYPE_CHECKING:
+    from pendpipe.analysis.fit.result import FitResult
+
+_FEWEST: Final = 6
+"""Turning points of which a period is asked."""
+_LATE: Final = 4.0
+"""Variance of their times over their own beyond which they are late as no law has it."""
+_CLEAR: Final = 8.0
+"""Standard deviations that a turning point must stand out."""
+_LOSSES: Final = ("a", "b", "c", "amplitude", "offset")
+_TIMES: Final = ("frequency", "phase")
+
+
+class PeriodCheck(NamedTuple):
+    """The period of small swings, by the law and as the turning points show it."""
+
+    amplitude_rad: float
+    """Of the swings that show it."""
+    fitted: float
+    """s."""
+    seen: float
+    """s, from the times of the turning points and the torque that was fitted."""
+    seen_sd: float
+    scatter: float = 1.0
+    """Variance of the times about a steady period over their own."""
+
+    @property
+    def excess(self) -> float:
+        """By what part of the seen period the law's is longer."""
+        return self.fitted / self.seen - 1.0
+
+
+class Widening(NamedTuple):
+    """By what standard deviations are multiplied for what the law misses; 1 for nothing."""
+
+    period: float = 1.0
+    losses: float = 1.0
+
+
+def check_period(points: TurningPoints, law: Eq8) -> tuple[PeriodCheck, ...]:
+    """Compare a law's period with the times of the turning points.
+
+    Returns
+    -------
+    tuple of PeriodCheck
+        Of the whole decay, and of its large, middle and small swings; empty where there are too
+        few of them.
+    """
+    clear = points.chosen(points.amplitude_rad > _CLEAR * points.angle_sd_rad)
+    count = len(clear)
+    if count < _FEWEST:
+        return ()
+    parts = [slice(0, count)]
+    if count >= 3 * _FEWEST:
+        ends = [count * k // 3 for k in range(4)]
+        parts += [slice(first, last) for first, last in pairwise(ends)]
+    return tuple(_seen_period(clear.chosen(part), law) for part in parts)
+
+
+def _seen_period(points: TurningPoints, law: Eq8) -> PeriodCheck:
+    rates = law.quadratic, law.hysteretic + law.viscous, law.coulomb
+    found = fit_period(points, points.amplitude_rad, rates, restoring=law.restoring)
+    late = found.late_rad - np.mean(found.late_rad)
+    # Neighbours that are late alike are fewer than they seem.
+    alike = float(late[1:] @ late[:-1]) / max(float(late @ late), 1e-300)
+    alike = min(max(alike, 0.0), 0.9)
+    omega = found.angular_frequency
+    correlated = (1.0 + alike) / (1.0 - alike)
+    variance = float(found.covariance[0, 0]) * correlated
+    seen = 2.0 * math.pi / omega
+    middle = math.sqrt(float(points.amplitude_rad[0]) * abs(float(points.amplitude_rad[-1])))
+    return PeriodCheck(
+        middle,
+        2.0 * math.pi / law.angular_frequency,
+        seen,
+        seen * math.sqrt(variance) / omega,
+        max(found.chi2_per_dof * correlated, 1.0),
+    )
+
+
+def judged(
+    result: FitResult, points: TurningPoints, law: Eq8, *, enlarged: float, refuted: bool
+) -> FitResult:
+    """Light a fit, and leave its errors as wide as the turning points ask.
+
+    Parameters
+    ----------
+    result
+        A fit with its ``decrement_check``, whose variances were enlarged.
+    points, law
+        What was fitted.
+    enlarged
+        By what the variances were multiplied.
+    refuted
+        Whether the test of fit finds more than noise.
+    """
+    periods, checks = check_period(points, law), result.decrement_check
+    root = math.sqrt(enlarged)
+    relative = result.period.sd / result.period.value / root
+    of_times = [(each.excess, each.seen_sd / each.seen, relative) for each in periods]
+    of_losses = [
+        (
+            each.excess,
+            each.seen_sd / abs(each.seen),
+            relative_loss_sd(result, each.amplitude_rad) / root,
+        )
+        for each in checks
+    ]
+    # Turning points that are fitted alone may be late as no law is, and fall as one does.
+    late = result.method == "turning-points" and bool(periods) and periods[0].scatter > _LATE
+    refuted = refuted or late
+    if enlarged > 1.0 or late:
+        widening = Widening(
+            max(_asked(of_times), _scattered(periods, enlarged)),
+            max(_asked(of_losses), _scattered(checks, enlarged)) if enlarged > 1.0 else 1.0,
+        )
+        result = replace(_widened(result, widening, enlarged), widening=widening)
+    quotable, problems = _quotable(result, periods, refuted=refuted)
+    light, reason = _light(checks, problems, refuted=refuted, unit=points.unit)
+    return replace(
+        result, light=light, light_reason=reason, quotable=quotable, period_check=periods
+    )
+
+
+def _scattered(checks: Sequence[PeriodCheck | Decrement], most: float) -> float:
+    """By how much more than their own errors the turning points scatter about any smooth law."""
+    return math.sqrt(min(median([each.scatter for each in checks] or [1.0]), most))
+
+
+def _asked(differences: Sequence[tuple[float, float, float]]) -> float:
+    """By what a fit's errors are to be multiplied, so that they explain what it is off by.
+
+    Parameters
+    ----------
+    differences
+        Difference of fit and turning points, standard deviation of the latter, and of the former.
+
+    Returns
+    -------
+    float
+        The least factor from 1 on for which ``difference^2/(factor^2 own^2 + seen^2)`` adds up to
+        the number of differences.
+    """
+    known = [each for each in differences if all(map(math.isfinite, each)) and each[2] > 0.0]
+
+    def excess(factor: float) -> float:
+        return sum(off**2 / ((factor * own) ** 2 + seen**2) for off, seen, own in known) - len(
+            known
+        )
+
+    if not known or excess(1.0) <= 0.0:
+        return 1.0
+    low = high = 1.0
+    while excess(high) > 0.0:
+        low, high = high, 4.0 * high
+    for _ in range(40):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
+    return high
+
+
+def _widened(result: FitResult, widening: Widening, enlarged: float) -> FitResult:
+    """Replace one factor of all variances by those of the period and of the losses."""
+    root = math.sqrt(enlarged)
+    factors = dict.fromkeys(_LOSSES, widening.losses / root)
+    factors |= dict.fromkeys(_TIMES, widening.period / root)
+    scale = np.array([factors[name] for name in result.covariance_order])
+    parameters = {
+        name: _scaled(each, factors[name], at_least=0.0 if name in "abc" else -math.inf)
+        for name, each in result.parameters.items()
+    }
+    limit = result.quality_factor_limit
+    return replace(
+        result,
+        parameters=parameters,
+        covariance=result.covariance * scale[:, None] * scale,
+        quality_factor_limit=limit and _scaled(limit, factors["b"], at_least=0.0),
+    )
+
+
+def _scaled(estimate: Estimate, factor: float, *, at_least: float) -> Estimate:
+    value, (low, high) = estimate.value, estimate.bounds95
+    ends = max(value - factor * (value - low), min(at_least, low)), value + factor * (high - value)
+    return replace(estimate, sd=factor * estimate.sd, interval95=ends)
+
+
+def _quotable(
+    result: FitResult, periods: Sequence[PeriodCheck], *, refuted: bool
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What may be quoted, and why the rest may not."""
+    checks, unit = result.decrement_check, result.parameters["amplitude"].unit
+    problems, quotable = [], []
+    worst = max(periods, key=lambda each: abs(each.excess), default=None)
+    if worst is None:
+        problems.append("the period: too few turning points confirm it")
+    elif abs(worst.excess) > TOLERANCE:
+        problems.append(
+            f"the period: swings about {compact(worst.amplitude_rad, unit)} show"
+            f" {worst.seen:.4g} s, and the law has {worst.fitted:.4g} s"
+        )
+    else:
+        quotable.append("period")
+    unseen = [each for each in checks if not each.confirms]
+    if len(checks) < 3:
+        problems.append("Q: too few turning points confirm it")
+    elif unseen:
+        where = ", ".join(compact(each.amplitude_rad, unit) for each in unseen)
+        known = max(each.seen_sd / abs(each.seen) for each in unseen)
+        problems.append(f"Q at {where}: the turning points show it to {100.0 * known:.0f} % only")
+    else:
+        quotable.append("Q")
+        if all(each.dominant for each in result.quality_factors):
+            quotable += ["losses"] if refuted else ["losses", "a", "b", "c"]
+    return tuple(quotable), tuple(problems)
+
+
+def _light(
+    checks: Sequence[Decrement], problems: Sequence[str], *, refuted: bool, unit: str
+) -> tuple[Light, str]:
+    """Return the light and its reason, a clause."""
+    wrong = [check for check in checks if check.contradicts]
+    if wrong:
+        worst = max(wrong, key=lambda check: abs(check.excess))
+        return "red", f"the fitted law contradicts the decay: {worst.sentence(unit)}"
+    if problems:
+        return "amber", f"don't quote {'; nor '.join(problems)}"
+    if refuted:
+        return "green", (
+            f"period and Q are right to {100.0 * TOLERANCE:.0f} % and to their errors; the law is"
+            " not the whole story: see pendpipe diagnose"
+        )
+    return "green", "period and Q are those of the turning points, and noise explains the rest"

@@ -1,0 +1,307 @@
+"""The answer of a fit in words: a dozen lines to read, one to copy, one that says what next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pendpipe.analysis.fit.quality import LOSSES, Quality
+from pendpipe.analysis.turning_points import BEAT
+from pendpipe.dynamics import Eq8, Release, turning_points
+from pendpipe.estimate import Estimate
+from pendpipe.quantities import compact, pretty_unit, stretch, with_error
+
+if TYPE_CHECKING:
+    from pendpipe.analysis.fit.result import FitResult
+
+WITHOUT_LAW: Final = "from the turning points alone"
+_TOP: Final = 3.13
+"""Amplitude in rad beyond which no correction is made for sin x."""
+_KINDS: Final = {
+    "rad": "angle",
+    "m": "displacement",
+    "rad/s": "rate of the angle",
+    "V": "voltage",
+    "1": "readings of unknown unit",
+}
+SHORT: Final = {"a": "drag ~ speed²", "b": "viscous or internal", "c": "dry friction"}
+_SLIGHT: Final = 0.05
+"""Share of a loss below which it is not named."""
+_DIAGNOSE: Final = "pendpipe diagnose FILE says what the law lacks"
+
+
+def size(amplitude: float, unit: str) -> str:
+    """Print an amplitude; an angle in degrees and radians.
+
+    >>> size(0.5135, "rad")
+    '29.4° (514 mrad)'
+    """
+    if unit != "rad":
+        return compact(amplitude, unit)
+    return f"{degrees(amplitude)} ({compact(amplitude, unit)})"
+
+
+def degrees(angle_rad: float) -> str:
+    """Print an angle in degrees, to three digits.
+
+    >>> degrees(0.5135)
+    '29.4°'
+    """
+    return f"{math.degrees(angle_rad):.3g}°"
+
+
+def short_size(amplitude: float, unit: str) -> str:
+    """Print an amplitude in degrees, or in its own unit."""
+    return degrees(amplitude) if unit == "rad" else compact(amplitude, unit)
+
+
+def lines(result: FitResult, *, name: str = "", law: bool = False) -> list[str]:
+    """Print a fit: what is known first, what to do next last.
+
+    Parameters
+    ----------
+    result
+        The fit.
+    name
+        What to call the recording; by default the name of its file.
+    law
+        Whether to print a law that contradicts the decay.
+    """
+    return [
+        f"{heading(result, name)}   {result.light.upper()}",
+        *(f"  {line}" for line in _remarks(result)),
+        *(_line(title, value) for title, value in facts(result, law=law)),
+        f"Copy: {sentence(result)}",
+        f"Next: {following(result)}",
+    ]
+
+
+def heading(result: FitResult, name: str = "") -> str:
+    """Name the recording and say what was fitted of it, in one line."""
+    points, decay = result.points, result.decay
+    unit = result.parameters["amplitude"].unit if decay is None else decay.unit
+    kind = _KINDS.get(unit, f"readings in {pretty_unit(unit)}")
+    if points is None or decay is None:
+        return f"{name or 'a fit'}: {kind}, {result.turning_points} turning points"
+    name = name or result.name or "recording"
+    first, last = float(points.time_s[0]), float(points.time_s[-1])
+    rate = 1.0 / decay.interval_s if decay.interval_s > 0.0 else math.nan
+    amplitude = points.amplitude_rad
+    swings = 0.5 * float(points.half_cycle[-1] - points.half_cycle[0])
+    ends = (short_size(abs(float(y)), points.unit) for y in (amplitude[0], amplitude[-1]))
+    return (
+        f"{name}: {kind}, {rate:.4g} Hz, {last - first:.3g} s, {swings:.0f} swings from"
+        f" {' to '.join(ends)}"
+    )
+
+
+def _remarks(result: FitResult) -> Iterator[str]:
+    """What must be known before any number is read."""
+    if result.light != "green":
+        yield result.light_reason
+    if (other := result.other_frequency) is not None:
+        period = Estimate(1.0 / other.value, other.sd / other.value**2, "s")
+        text = with_error(period.value, period.sd, "s", short=True)
+        yield f"as a spring or torsion wheel (--restoring linear) its period would be {text}"
+    for cut in result.cuts:
+        yield f"left out: {stretch(cut['start_s'], cut['stop_s'])}, {cut['reason']}"
+
+
+def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
+    """Yield what is known, a title and a value each."""
+    unit, has_law = result.parameters["amplitude"].unit, result.light != "red" or law
+    qualities = result.quality_factors
+    period, wide = result.period, result.widening
+    small = "period, small swings" if result.restoring == "sine" else "period"
+    text = with_error(period.value, period.sd, "s", short=True)
+    if result.light == "red":
+        text += f", {WITHOUT_LAW}" if result.period_check else ""
+    elif result.restoring == "sine" and qualities:
+        large = qualities[0]
+        text += f"  ({large.period_s:.5g} s at {short_size(large.amplitude_rad, unit)})"
+    yield small, text + _widened(wide.period if result.light != "red" else 1.0)
+    if qualities:
+        found = ", ".join(
+            f"{_number(each.quality_factor)} at {size(each.amplitude_rad, unit)}"
+            for each in qualities
+        )
+        without = f", {WITHOUT_LAW}" if result.light == "red" else _widened(wide.losses)
+        yield "Q", found + without
+        yield "damping", damping(result)
+    if not has_law:
+        return
+    if result.light != "red":
+        yield "energy goes to", energy(result)
+    yield "law", f"−dy/dt = a y² + b y + c: {_law(result)}"
+    yield "misfit", misfit(result)
+
+
+def _widened(factor: float) -> str:
+    times = f"{factor:.0f}" if factor > 9.95 else f"{factor:.2g}"
+    return f"  (error × {times} for what the law misses)" if factor > 1.05 else ""
+
+
+def damping(result: FitResult) -> str:
+    """Print damping time, half-life and logarithmic decrement at the largest amplitude shown."""
+    numbers, unit = result.damping(), result.parameters["amplitude"].unit
+    tau, half, decrement = (
+        _number(numbers[name])
+        for name in ("damping_time_s", "half_life_s", "logarithmic_decrement")
+    )
+    where = short_size(numbers["amplitude_rad"].value, unit)
+    return f"to 1/e in {tau} s, to 1/2 in {half} s, decrement {decrement} a swing, at {where}"
+
+
+def energy(result: FitResult) -> str:
+    """Say where the energy goes at the largest amplitude shown, as far as the fit tells."""
+    large = result.quality_factors[0]
+    where = short_size(large.amplitude_rad, result.parameters["amplitude"].unit)
+    if large.dominant is None:
+        return f"the decay does not tell drag, viscous loss and dry friction apart (at {where})"
+    ordered = sorted(large.losses.items(), key=lambda pair: -pair[1].value)
+    named = [
+        f"{100.0 * share.value:.0f} % {SHORT[name]} ({name})"
+        for name, share in ordered
+        if share.value >= _SLIGHT
+    ]
+    absent = [SHORT[name] for name, share in ordered if share.value < _SLIGHT]
+    none = f"; no {' or '.join(absent)} seen" if absent else ""
+    return f"{', '.join(named)}, at {where}{none}"
+
+
+def _law(result: FitResult) -> str:
+    text = ", ".join(f"{name} {rate_with_error(result[name])}" for name in "abc")
+    limit = result.quality_factor_limit
+    if limit is not None and limit.value > 3.0 * limit.sd:
+        text += f"; πf/b {_number(limit)}"
+    return text
+
+
+def misfit(result: FitResult) -> str:
+    """Say how well the fit follows the swings, as a share of the swing."""
+    swing = result.value("amplitude")
+    if result.decay is not None and result.method == "waveform":
+        # In the unit of the readings.
+        swing = 0.5 * float(np.nanmax(result.decay.values) - np.nanmin(result.decay.values))
+    share = 100.0 * result.residual_rms_rad / swing if swing > 0.0 else math.nan
+    noise = 100.0 * result.noise_rms_rad / swing if swing > 0.0 else math.nan
+    what = "swings" if result.method == "waveform" else "turning points"
+    if not result.refuted:
+        return f"the fit follows the {what} to {share:.2g} %; nothing but noise is left"
+    story = "right to 5 %, but the law is" if result.light == "green" else "the law is"
+    missed = f"the fit misses the {what} by {share:.2g} % (noise {noise:.1g} %)"
+    return f"{missed}: {story} not the whole story"
+
+
+def sentence(result: FitResult) -> str:
+    """Return the sentence to copy."""
+    if result.light_reason.startswith(BEAT):
+        return f"{result.light_reason.partition(';')[0]}."
+    unit, said = result.parameters["amplitude"].unit, []
+    if "period" in result.quotable:
+        period = result.period
+        name = "T0" if result.restoring == "sine" else "T"
+        said.append(f"{name} = {with_error(period.value, period.sd, 's')}")
+    known = [each for each in result.quality_factors if each.amplitude_rad not in _unseen(result)]
+    if result.light == "red":
+        known = list(result.quality_factors)
+    if known:
+        q = known[0]
+        text = with_error(q.quality_factor.value, q.quality_factor.sd)
+        said.append(f"Q = {text} at {compact(q.amplitude_rad, unit)}")
+        if "losses" in result.quotable and (loss := q.dominant):
+            share = 100.0 * q.losses[loss].value
+            said.append(f"{share:.0f} % of the loss there is {LOSSES[loss]}")
+    if not said:
+        return "nothing of this fit can be quoted."
+    without = " (from the turning points, without a law)" if result.light == "red" else ""
+    return f"{'; '.join(said)}{without}."
+
+
+def _unseen(result: FitResult) -> set[float]:
+    return {each.amplitude_rad for each in result.decrement_check if not each.confirms}
+
+
+def following(result: FitResult) -> str:
+    """Say what to do next."""
+    if result.light_reason.startswith(BEAT):
+        return "pendpipe diagnose FILE fits both modes"
+    if result.light == "red":
+        return f"{_DIAGNOSE}; --accept prints the law"
+    if result.refuted:
+        return f"{_DIAGNOSE}; pendpipe page FILE makes a sheet to hand out"
+    if "Q" not in result.quotable:
+        return "record more swings: the turning points must show the decrement"
+    if "losses" not in result.quotable:
+        return "release from farther out and record longer, to tell a, b and c apart"
+    return "pendpipe page FILE makes a sheet to hand out; --figure draws it, --json is for programs"
+
+
+def gravity_line(
+    result: FitResult, *, length: Estimate | None = None, gravity: float | None = None
+) -> str:
+    """Print g from the length of a simple pendulum, or its length from g: omega_0^2 = g/l.
+
+    Parameters
+    ----------
+    result
+        A fit of angles.
+    length, gravity
+        The one that is known, m or m/s^2.
+
+    Notes
+    -----
+    With the torque of sin x the fitted omega is omega_0, that of small amplitudes. Otherwise
+    omega_0 = omega 2 K(sin(y/2))/pi at the root-mean-square amplitude y, and the line names this
+    correction. A bob of radius r on a light string adds 2 r^2/(5 l^2) to g, air of density rho
+    rho/rho_bob and more, a string of mass m less than m/(6 M): they are named and not made.
+    """
+    omega = 2.0 * math.pi * result.value("frequency")
+    relative = 2.0 * result["frequency"].sd / result.value("frequency")
+    corrected = ""
+    if result.restoring == "linear":
+        squares = [quality.amplitude_rad**2 for quality in result.quality_factors]
+        amplitude = math.sqrt(sum(squares) / len(squares))
+        release = Release(0.0, min(amplitude, _TOP))
+        swing = turning_points(Eq8(1.0, restoring="sine"), release, count=2)
+        factor = float(swing.time_s[1]) / math.pi
+        omega *= factor
+        corrected = f", finite-amplitude correction {100.0 * (factor**2 - 1.0):+.2g} % included"
+    if length is not None:
+        relative = math.hypot(relative, length.sd / length.value)
+        value, name, unit = omega**2 * length.value, "g", "m/s^2"
+        corrected += "; not in it: the finite bob, the string's mass, buoyancy and added mass"
+        if length.sd == 0.0:
+            corrected += "; the length's error, which --length 0.600(1) would give"
+    else:
+        assert gravity is not None
+        value, name, unit = gravity / omega**2, "length", "m"
+    return _line(name, with_error(value, relative * value, unit, short=True) + corrected)
+
+
+def _line(title: str, value: str) -> str:
+    return f"  {title:<22}{value}"
+
+
+def _number(estimate: Estimate) -> str:
+    return with_error(estimate.value, estimate.sd, short=True)
+
+
+def rate_with_error(rate: Estimate, *, short: bool = True) -> str:
+    """Print a rate with its error, or its upper limit where it lies at zero."""
+    low, high = rate.bounds95
+    if rate.at_bound or (low <= 0.0 and rate.value < rate.sd):
+        return f"< {with_error(float(f'{high:.2g}'), None, rate.unit)}"
+    return with_error(rate.value, rate.sd, rate.unit, short=short)
+
+
+def cause(quality: Quality) -> str:
+    """Say which loss takes most at an amplitude, and how much, as far as it is told."""
+    if not quality.losses:
+        return WITHOUT_LAW
+    if (name := quality.dominant) is None:
+        return "by losses that this fit does not tell apart"
+    return f"{100.0 * quality.losses[name].value:.0f} % {LOSSES[name]} ({name})"

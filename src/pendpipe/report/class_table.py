@@ -1,0 +1,289 @@
+"""The fits of many recordings as one table: printed, and as CSV, Excel, HTML or LaTeX."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import statistics
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+from pendpipe.analysis.fit.printed import SHORT, rate_with_error, short_size
+from pendpipe.errors import refuse_if
+from pendpipe.estimate import Estimate, chi_square_p_value
+from pendpipe.files import MADE_BY, is_stream, write_json, write_whole
+from pendpipe.quantities import in_columns, with_error
+
+if TYPE_CHECKING:
+    from pendpipe.analysis.fit.result import FitResult
+
+COLUMNS: Final = (
+    *("file", "light", "T0_s", "T0_sd_s", "Q", "Q_sd", "amplitude", "amplitude_unit"),
+    *("amplitude_deg", "dominant_loss", "dominant_share", "a", "a_sd", "a_unit", "b", "b_sd"),
+    *("b_unit", "c", "c_sd", "c_unit", "damping_time_s", "half_life_s", "logarithmic_decrement"),
+    *("quotable", "remark"),
+)
+"""Of the table that is written: a value and its standard deviation have a column each."""
+FORMS: Final = (".json", ".csv", ".xlsx", ".html", ".tex")
+_AGREES: Final = 5.0
+"""Standard deviations, or robust ones of the class, within which a file agrees with its median."""
+
+
+class Fitted(NamedTuple):
+    """One recording of a class: its fit, or why there is none."""
+
+    file: str
+    fit: FitResult | None
+    refusal: str = ""
+
+
+class Together(NamedTuple):
+    """A quantity over the files that agree."""
+
+    name: str
+    files: int
+    of: int
+    mean: Estimate
+    """Weighted by the variances."""
+    scatter: float
+    """Standard deviation of the values."""
+    chi2: float
+    p_value: float
+
+    def as_json(self) -> dict[str, Any]:
+        """Return its form in JSON."""
+        return self._asdict() | {"mean": self.mean.as_json()}
+
+    def __str__(self) -> str:
+        mean, unit = self.mean, self.mean.unit
+        return (
+            f"{self.name}: {self.files} of {self.of} files agree: mean"
+            f" {with_error(mean.value, mean.sd, unit, short=True)}, scatter"
+            f" {with_error(self.scatter, None, unit)}, chi² {self.chi2:.3g} for"
+            f" {self.files - 1} (p = {self.p_value:.2g})"
+        )
+
+
+def form_of(out: str | Path) -> str:
+    """Return the form that a file's suffix asks for.
+
+    Raises
+    ------
+    InputError
+        If nothing is written in that form.
+    """
+    suffix = ".json" if is_stream(out) else Path(out).suffix.lower()
+    refuse_if(
+        suffix not in FORMS,
+        f"--out {out}",
+        "its form is unknown",
+        f"end its name in {', '.join(FORMS[:-1])} or {FORMS[-1]}",
+    )
+    return suffix
+
+
+def write_fits(out: str | Path, fits: Sequence[Fitted], content: Mapping[str, Any]) -> None:
+    """Write fits in the form that the suffix asks for; `content` is the JSON."""
+    form = form_of(out)
+    if form == ".json":
+        write_json(out, content)
+        return
+    makers: dict[str, Callable[[Sequence[Fitted]], str | bytes]] = {
+        ".csv": _csv,
+        ".xlsx": _excel,
+        ".html": _html,
+        ".tex": _latex,
+    }
+    write_whole(out, makers[form](fits))
+
+
+def record(fitted: Fitted) -> dict[str, Any]:
+    """Return a row of the table that is written, by `COLUMNS`; what is not there is None."""
+    fit, row = fitted.fit, dict.fromkeys(COLUMNS)
+    row |= {"file": fitted.file, "light": "refused", "remark": fitted.refusal or None}
+    if fit is None:
+        return row
+    unit = fit["amplitude"].unit
+    numbers = {"T0": (fit.period, "_s")}
+    if fit.quality_factors:
+        large = fit.quality_factors[0]
+        numbers["Q"] = large.quality_factor, ""
+        row |= {"amplitude": large.amplitude_rad, "amplitude_unit": unit}
+        if unit == "rad":
+            row["amplitude_deg"] = math.degrees(large.amplitude_rad)
+        if (loss := large.dominant) is not None:
+            row |= {"dominant_loss": SHORT[loss], "dominant_share": large.losses[loss].value}
+        row |= {name: each.value for name, each in fit.damping().items() if name != "amplitude_rad"}
+    if fit.light != "red":
+        numbers |= {name: (fit[name], "") for name in "abc"}
+        row |= {f"{name}_unit": fit[name].unit for name in "abc"}
+    for name, (estimate, end) in numbers.items():
+        row |= {f"{name}{end}": estimate.value, f"{name}_sd{end}": estimate.sd}
+    return row | {
+        "light": fit.light,
+        "quotable": " ".join(fit.quotable),
+        "remark": None if fit.light == "green" and not fit.refuted else fit.light_reason,
+    }
+
+
+def together(fits: Sequence[Fitted]) -> list[Together]:
+    """Return mean, scatter and chi^2 of T0 and Q over the files that agree."""
+    found = [each.fit for each in fits if each.fit is not None and each.fit.light != "red"]
+    of_q = [fit.quality_factors[0].quality_factor for fit in found if "Q" in fit.quotable]
+    of_t = [fit.period for fit in found if "period" in fit.quotable]
+    return [
+        _together(name, values) for name, values in (("T0", of_t), ("Q", of_q)) if len(values) > 1
+    ]
+
+
+def _together(name: str, values: Sequence[Estimate]) -> Together:
+    middle = statistics.median(each.value for each in values)
+    robust = 1.4826 * statistics.median(abs(each.value - middle) for each in values)
+    kept = [each for each in values if abs(each.value - middle) <= _AGREES * max(each.sd, robust)]
+    weights = [each.sd**-2 for each in kept]
+    mean = sum(w * each.value for w, each in zip(weights, kept, strict=True)) / sum(weights)
+    chi2 = sum(w * (each.value - mean) ** 2 for w, each in zip(weights, kept, strict=True))
+    scatter = statistics.stdev([each.value for each in kept]) if len(kept) > 1 else 0.0
+    estimate = Estimate(mean, sum(weights) ** -0.5, values[0].unit)
+    p_value = chi_square_p_value(chi2, len(kept) - 1)
+    return Together(name, len(kept), len(values), estimate, scatter, chi2, p_value)
+
+
+HEAD: Final = ("file", "light", "T0", "Q", "at", "loses most by", "remark")
+WIDE: Final = ("a", "b", "c")
+_REMARK: Final = 60
+
+
+def printed(fits: Sequence[Fitted], *, wide: bool = False) -> str:
+    """Lay a class out, a line a file, a unit a number; then what the files say together."""
+    rows = [_row(each, wide=wide) for each in fits]
+    head = (*HEAD[:-1], *(WIDE if wide else ()), HEAD[-1])
+    kept = sum(each.fit is not None and each.fit.light != "red" for each in fits)
+    red = sum(each.fit is not None and each.fit.light == "red" for each in fits)
+    refused = len(fits) - kept - red
+    counts = f"{kept} fitted, {red} red, {refused} refused"
+    return "\n".join([in_columns([head, *rows]), *map(str, together(fits)), counts])
+
+
+def _row(fitted: Fitted, *, wide: bool) -> tuple[str, ...]:
+    fit, blank = fitted.fit, ("",) * (len(WIDE) if wide else 0)
+    if fit is None:
+        return (fitted.file, "refused", *[""] * 4, *blank, fitted.refusal)
+    unit, found = fit["amplitude"].unit, fit.quality_factors
+    large = found[0] if found else None
+    loss = large.dominant if large else None
+    rates = tuple("" if fit.light == "red" else rate_with_error(fit[n]) for n in WIDE if wide)
+    remark = "" if fit.light == "green" else fit.light_reason
+    if not remark and fit.refuted:
+        remark = "more than noise is left: diagnose"
+    return (
+        fitted.file,
+        fit.light,
+        with_error(fit.period.value, fit.period.sd, "s", short=True),
+        with_error(large.quality_factor.value, large.quality_factor.sd, short=True)
+        if large
+        else "",
+        short_size(large.amplitude_rad, unit) if large else "",
+        f"{100.0 * large.losses[loss].value:.0f} % {SHORT[loss]}" if large and loss else "",
+        *rates,
+        remark if len(remark) <= _REMARK else f"{remark[: _REMARK - 1]}…",
+    )
+
+
+def _csv(fits: Sequence[Fitted]) -> str:
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows(
+        ["" if cell is None else cell for cell in record(each).values()] for each in fits
+    )
+    return out.getvalue()
+
+
+def _excel(fits: Sequence[Fitted]) -> bytes:
+    from openpyxl import Workbook
+
+    book, out = Workbook(), io.BytesIO()
+    sheet = book.active
+    assert sheet is not None
+    sheet.title = "fits"
+    sheet.append(COLUMNS)
+    for each in fits:
+        # A name that begins with = is no formula.
+        sheet.append(list(record(each).values()))
+        sheet.cell(sheet.max_row, 1).data_type = "s"
+    sheet.freeze_panes = "B2"
+    for line in together(fits):
+        sheet.append([str(line)])
+    book.save(out)
+    with zipfile.ZipFile(out, "a") as archive:
+        archive.comment = f"\0made by {MADE_BY}\0".encode()
+    return out.getvalue()
+
+
+def _cells(fits: Sequence[Fitted]) -> list[tuple[str, ...]]:
+    return [_row(each, wide=True) for each in fits]
+
+
+def _html(fits: Sequence[Fitted]) -> str:
+    from pendpipe.report.page import own_files
+    from pendpipe.templates import render
+
+    head = (*HEAD[:-1], *WIDE, HEAD[-1])
+    return render(
+        "pendpipe.report",
+        "class.html",
+        style=own_files()["style"],
+        head=head,
+        rows=[(cells, None) for cells in _cells(fits)],
+        together=[str(each) for each in together(fits)],
+    )
+
+
+_TEX: Final = {"±": r"$\pm$", "×": r"$\times$", "°": r"\textdegree{}", "²": r"\textsuperscript{2}"}
+
+
+def latex(text: str) -> str:
+    r"""Escape a cell for LaTeX.
+
+    >>> latex("70 % drag_1")
+    '70 \\% drag\\_1'
+    """
+    special = str.maketrans(
+        {sign: "\\" + sign for sign in "&%$#_{}"}
+        | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+    )
+    text = text.translate(special)
+    raised = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+    out, power = [], ""
+    for sign in [*text, ""]:
+        if sign and sign in "⁻⁰¹²³⁴⁵⁶⁷⁸⁹":
+            power += sign.translate(raised)
+            continue
+        if power:
+            out.append(rf"\textsuperscript{{{power}}}")
+            power = ""
+        out.append(_TEX.get(sign, sign))
+    return "".join(out).replace("\N{MINUS SIGN}", "$-$").replace("π", r"$\pi$")
+
+
+def _latex(fits: Sequence[Fitted]) -> str:
+    head = (*HEAD[:5], *WIDE)
+    rows = [(*cells[:5], *cells[6:9]) for cells in _cells(fits)]
+    lines = [" & ".join(map(latex, cells)) + r" \\" for cells in rows]
+    return "\n".join(
+        [
+            f"% made_by: {MADE_BY}",
+            rf"\begin{{tabular}}{{{'l' * len(head)}}}",
+            r"\hline",
+            " & ".join(map(latex, head)) + r" \\",
+            r"\hline",
+            *lines,
+            r"\hline",
+            r"\end{tabular}",
+            "",
+        ]
+    )

@@ -1,0 +1,98 @@
+"""The light says what the misfit does to the numbers, and not how loud it is."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pendpipe as pp
+from pendpipe.analysis.fit.result import FitResult
+from pendpipe.arrays import FloatArray
+
+OMEGA, LOSS = 6.0, 0.03
+TIME = np.arange(0.0, 80.0, 0.02)
+PERIOD = 2.0 * math.pi / math.hypot(OMEGA, LOSS)
+
+
+def viscous(time_s: FloatArray, phase: FloatArray | None = None) -> FloatArray:
+    """0.3 rad, Q = omega/(2 b) = 100."""
+    turn = OMEGA * time_s if phase is None else phase
+    return np.asarray(0.3 * np.exp(-LOSS * time_s) * np.cos(turn))
+
+
+def fitted(values: FloatArray, rms: float = 1e-4, **options: Any) -> FitResult:
+    noise = rms * np.random.default_rng(5).standard_normal(len(values))
+    recording = pp.Recording(time_s=TIME[: len(values)], angle_rad=values + noise)
+    return pp.fit(recording, restoring="linear", **options)
+
+
+def test_noise_alone_widens_nothing() -> None:
+    fit = fitted(viscous(TIME))
+    assert (fit.light, fit.refuted) == ("green", False)
+    assert fit.widening == (1.0, 1.0)
+    assert {"period", "Q"} <= set(fit.quotable)
+
+
+def test_a_loud_even_harmonic_of_the_sensor_moves_neither_period_nor_q() -> None:
+    """A sensor's x + 0.05 x^2: a hundred times the noise."""
+    angle = viscous(TIME)
+    fit = fitted(angle + 0.05 * angle**2)
+    assert fit.chi2_per_dof > 20.0
+    assert fit.refuted
+    assert fit.light == "green"
+    assert "right to 5 %" in fit.light_reason
+    assert "diagnose" in fit.light_reason
+    assert abs(fit["Q"].value - 100.0) < 0.5
+    assert abs(fit["period"].value / PERIOD - 1.0) < 1e-5
+    # chi^2 would have asked for the root of it.
+    assert fit.widening.losses < 0.8 * math.sqrt(fit.chi2_per_dof)
+
+
+def test_a_period_that_drifts_is_quoted_with_an_error_that_covers_it() -> None:
+    """A frequency that falls by 0.5 % along the record."""
+    drift = 0.005
+    phase = OMEGA * TIME * (1.0 - 0.5 * drift * TIME / TIME[-1])
+    fit = fitted(viscous(TIME, phase))
+    assert fit.refuted
+    assert fit.widening.period > 5.0
+    assert 0.05 * drift < fit["period"].sd / PERIOD < drift
+    parts = fit.period_check[1:]
+    assert abs(parts[-1].seen / parts[0].seen - 1.0 - 0.6 * drift) < 0.3 * drift
+    assert abs(fit["Q"].value - 100.0) < 5.0
+
+
+def test_amber_names_what_cannot_be_quoted() -> None:
+    fit = fitted(viscous(TIME[:400]), rms=0.01)
+    assert fit.light == "amber"
+    assert fit.light_reason.startswith("don't quote ")
+    assert "Q at" in fit.light_reason
+    assert "Q" not in fit.quotable
+    assert fit.light_reason in str(fit)
+
+
+def test_red_keeps_the_period_and_q_of_the_turning_points() -> None:
+    fit = fitted(viscous(TIME), fixed={"b": 2.0 * LOSS})
+    assert fit.light == "red"
+    assert abs(fit["period"].value / PERIOD - 1.0) < 1e-3
+    for each in fit.quality_factors:
+        assert abs(each.quality_factor.value - 100.0) < 4.0 * each.quality_factor.sd
+    assert "from the turning points alone" in str(fit)
+    assert "−dy/dt" not in str(fit)
+
+
+@pytest.mark.parametrize("b", [LOSS, 2.0 * LOSS])
+def test_what_stands_in_fit_json_comes_back(b: float) -> None:
+    fit = fitted(viscous(TIME), fixed={"b": b})
+    again = FitResult.from_json(fit.to_dict())
+    assert again.to_dict() == fit.to_dict()
+    assert again.period == fit.period
+
+
+def test_damping_time_half_life_and_decrement_are_q_in_other_words() -> None:
+    found = fitted(viscous(TIME)).damping()
+    assert found["damping_time_s"].value == pytest.approx(1.0 / LOSS, rel=2e-3)
+    assert found["half_life_s"].value == pytest.approx(math.log(2.0) / LOSS, rel=2e-3)
+    assert found["logarithmic_decrement"].value == pytest.approx(LOSS * PERIOD, rel=2e-3)
