@@ -1,4 +1,4 @@
-"""Every file of ``../shared/recordings``, read unaided: right, refused rightly, or wrong.
+"""Every file of the shared recordings and inputs: read right, refused rightly, or wrong.
 
     python -m benchmarks.files
 
@@ -125,6 +125,36 @@ KNOWN: dict[str, Holds | Refused] = {
     f"windaq-pylle-di149-ascii/{number:08d}.cso": Holds("channel 1", "V", 0.0, 11.44, 10.0)
     for number in (21, 23, 25, 27, 29, 31, 38, 40, 44, 46, 48, 50)
 }
+INPUTS: dict[str, Holds | Refused] = {
+    "inputs/k02_cassy1.lab": Holds("Spannung U_A1", "V", 0.399, 50.0, 59.98),
+    "inputs/k03_tek_dpo2000.csv": Holds("CH1", "V", 0.68, 500.0, 9.998),
+    "inputs/k04_two_columns.csv": Holds("X", "m", 0.0733, 25.0, 39.96),
+    "inputs/k05_all_cut.csv": Holds("x", "any", 150.0, 30.0, 110.47),
+    "inputs/k05_cut_hundredths_240Hz.csv": Holds("x", "any", 151.5, 240.0, 39.996),
+    "inputs/k06_bursts.csv": Holds("Velocity", "m/s", 0.766, 60.0, 98.0),
+    "inputs/k08_mm_0.txt": Holds("x, y", "rad", 0.304, 29.97, 74.98),
+    "inputs/k09_from_upright.csv": Holds(
+        "/joint_states/joint1/position", "rad", 3.094, 516.75, 29.03, 0.0
+    ),
+    "inputs/k09_plain_names.csv": Holds("position", "rad", 3.094, 516.75, 29.03, 0.0),
+    "inputs/k10_camera_28deg.csv": Holds("angle", "rad", 0.505, 30.0, 13.97),
+    "inputs/k13_dead_zone_wobble.csv": Holds("Position", "m", 0.1227, 30.0, 79.97),
+    "inputs/k19_date_comma_angle.csv": Holds("angle", "any", 0.3009, 25.0, 59.96),
+    "inputs/k19_ms_angle_deg.csv": Holds("angle", "any", 17.2, 25.0, 59.96),
+    "inputs/k19_ms_volts.csv": Holds("volts", "V", 0.301, 25.0, 59.96, 2.498),
+    "inputs/k19_point_time_comma_angle.csv": Holds("angle", "any", 0.3009, 25.0, 59.96),
+    "inputs/k20_control_wrap_reads.csv": Holds("adc", "any", 300.0, 100.0, 39.99),
+    "inputs/k20_wrap_three_digits.csv": Holds("adc", "any", 300.0, 100.0, 39.99),
+    "inputs/k26_relaxing_baseline.txt": Holds("column 2", "any", 1.057, 499.3, 1.4),
+    "inputs/k27_arrays_per_stamp.json": Holds("Meas.Gyro.ArrayGyro.y", "any", 114.6, 100.0, 39.99),
+    "inputs/k28_says_p_1.csv": Holds("angle", "rad", 0.953, 50.0, 59.98),
+} | {
+    f"inputs/k23_{kind}.txt": Holds("angle", "any", 20.0, 50.0, 39.98)
+    for kind in (
+        *("garbled_start", "garbled_utf8", "letters", "lost_comma", "nul_bytes"),
+        *("torn_first", "torn_value", "two_in_one"),
+    )
+}
 NOT_RECORDINGS = ("README.md", "LICENSE", ".commit", "DataExplanation.md", "description.txt")
 
 
@@ -144,7 +174,7 @@ class Row:
 
 def judge(name: str, known: Holds | Refused | None) -> Row:
     """Read one file and compare it with what is known of it."""
-    path = SHARED / name
+    path = (SHARED.parent if name.startswith("inputs/") else SHARED) / name
     try:
         recording, found = read(path), inspect(path)
     except InputError as fault:
@@ -192,7 +222,12 @@ def rows() -> list[Row]:
         for path in SHARED.rglob("*")
         if path.is_file() and path.name not in NOT_RECORDINGS
     )
-    return [judge(name, KNOWN.get(name)) for name in files]
+    known = KNOWN | {name: holds for name, holds in INPUTS.items() if _is_here(name)}
+    return [judge(name, known.get(name)) for name in (*files, *sorted(known.keys() - {*files}))]
+
+
+def _is_here(name: str) -> bool:
+    return (SHARED.parent / name).is_file()
 
 
 def main() -> None:

@@ -76,8 +76,10 @@ def test_a_package_that_imports_its_own_modules_depends_on_each(library: Path) -
 
 def test_the_readers_of_files_count() -> None:
     """They are imported by name, each when a file needs it."""
-    readers = {"pendpipe.formats.windaq", "pendpipe.formats.trees", "pendpipe.formats.containers"}
-    assert readers <= provenance._imports("pendpipe.formats.reading")
+    dialects = "pendpipe.formats.dialects"
+    assert dialects in provenance._imports("pendpipe.formats.reading")
+    assert {f"{dialects}.windaq", f"{dialects}.octave"} <= provenance._imports(dialects)
+    assert "pendpipe.formats.trees" in provenance._imports(f"{dialects}.arrays")
 
 
 def test_the_versions_of_all_commands_can_be_found() -> None:

@@ -634,8 +634,8 @@ def _from_column(
 
 def refuse_text(table: Table, column: Column, remedy: str) -> None:
     """Refuse a column by the first of its cells that should be a number and is not."""
-    row, text = column.fault or (0, "")
-    refuse_if(column.fault, table.where(row), f"'{text}' is no number", remedy)
+    row, text = next(iter(column.garbled.items()), (0, ""))
+    refuse_if(column.garbled, table.where(row), f"'{text}' is no number", remedy)
 
 
 def _time_unit(column: Column, reading: Column, options: ReadOptions) -> tuple[float, str, bool]:

@@ -21,7 +21,6 @@ from pendpipe.formats.table import (
     ReadOptions,
     Table,
     damaged_if,
-    next_reader_if,
     refuse_unpacked,
 )
 from pendpipe.formats.text import read_table as read_text
@@ -37,19 +36,29 @@ _Sheets = dict[str, list[list[Any]]]
 _OLD_EXCEL: Final = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 
 
+def is_old_workbook(head: bytes) -> bool:
+    """Say whether a file is an old workbook (.xls), or another of Microsoft's compound files."""
+    return head.startswith(_OLD_EXCEL)
+
+
+def read_old_workbook(place: Path, data: bytes, options: ReadOptions) -> Table:
+    """Read the sheet of an old workbook that holds most numbers."""
+    return _of_sheets(place, _sheets_of_excel(data), options)
+
+
+def is_archive(head: bytes) -> bool:
+    """Say whether a file is a zip archive, as workbooks are, and none of arrays."""
+    return head.startswith(b"PK") and b".npy" not in head[:128]
+
+
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     """Read the workbook's sheet, or the archive's table, that holds most numbers.
 
     Raises
     ------
-    NotThisFormatError
-        When the file is no zip archive.
     InputError
-        When it is one that can't be read, or holds no table.
+        When it can't be read, or holds no table.
     """
-    if data.startswith(_OLD_EXCEL):
-        return _of_sheets(place, _sheets_of_excel(data), options)
-    next_reader_if(not data.startswith(b"PK"), "the file is no zip archive")
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         names = archive.namelist()
         refuse_unpacked(sum(part.file_size for part in archive.infolist()), len(data))
@@ -196,6 +205,11 @@ _LARGEST = 64 << 20
 _START = re.compile(rb"\s*(?:\xef\xbb\xbf)?\s*<(\?xml|cassylab|Document|object)\b")
 
 
+def is_project(head: bytes) -> bool:
+    """Say whether a file is XML that begins as one of these programs' projects."""
+    return _START.match(head[:200]) is not None
+
+
 def read_project(place: Path, data: bytes, options: ReadOptions) -> Table:  # noqa: ARG001
     """Read the samples out of a project file.
 
@@ -209,7 +223,6 @@ def read_project(place: Path, data: bytes, options: ReadOptions) -> Table:  # no
     InputError
         When it is damaged, or holds no samples.
     """
-    next_reader_if(not _START.match(data[:200]), "the file is no XML")
     for wrong, what in (
         (b"<!DOCTYPE" in data or b"<!ENTITY" in data, "declares entities"),
         (len(data) > _LARGEST, f"holds more than {_LARGEST >> 20} MB"),

@@ -1,7 +1,6 @@
 """Any supported file to a recording: the readers in turn, then the choice of columns."""
 
 import bz2
-import importlib
 import lzma
 import re
 import stat
@@ -19,6 +18,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.formats.columns import TimeBase, choose, readings, refuse_text, time_base
+from pendpipe.formats.plugin import HEAD
 from pendpipe.formats.table import (
     Column,
     Gap,
@@ -67,26 +67,6 @@ _PACKED: Final[tuple[tuple[bytes, Callable[[], Any]], ...]] = (
     (b"BZh", bz2.BZ2Decompressor),
     (b"\xfd7zXZ\0", lambda: lzma.LZMADecompressor(memlimit=_MOST_UNPACKING)),
 )
-
-_BY_LIBRARIES: Final = ("file of arrays", "zip archive")
-"""Of these a library takes the file apart, and raises whatever it stumbles on."""
-
-Reader = Callable[[Path, bytes, ReadOptions], Table]
-
-READERS: Final = (
-    ("WinDaq", "windaq.read_table"),
-    ("file of arrays", "trees.read_table"),
-    ("zip archive", "containers.read_table"),
-    ("XML", "containers.read_project"),
-    ("WinDaq CSV", "windaq.read_export"),
-    ("DI-149 capture", "windaq.read_capture"),
-    ("text table", "text.read_table"),
-)
-"""In the order in which they are tried, each imported in its turn.
-
-A new format is a module with `read_table` and a line here. A reader raises `NotThisFormatError`
-where the file is none of its own.
-"""
 
 
 def read(path: str | Path, options: ReadOptions = _ANYTHING) -> Recording:
@@ -193,29 +173,36 @@ def _refuse_size(place: Path, size: int) -> None:
 
 
 def table_of(place: Path, data: bytes, options: ReadOptions) -> Table:
-    """Try the readers in turn."""
+    """Read a file by the dialect that calls it its own; else as a plain table of text."""
+    from pendpipe.formats.dialects import of_file
+    from pendpipe.formats.text import read_table
+
     for mark, what, remedy in _OTHERS:
         refuse_if(data.startswith(mark), place, f"this is {what}", remedy)
+    mine, notes = of_file(data[:HEAD], place.suffix.lower())
     reason: NotThisFormatError | None = None
-    for name, (module, _, function) in ((name, where.partition(".")) for name, where in READERS):
-        reader: Reader = getattr(importlib.import_module(f"pendpipe.formats.{module}"), function)
+    for dialect in mine:
         try:
-            return reader(place, data, options)
+            table = dialect.read(place, data, options)
+            return replace(table, notes=(*table.notes, *notes))
         except NotThisFormatError as fault:
             reason = fault
+        except InputError:
+            raise
         except Exception as fault:
-            if isinstance(fault, InputError) or name not in _BY_LIBRARIES:
-                raise
             said = " ".join(str(fault).split())[:200]
             raise InputError(
-                place, f"the {name} can't be read ({said})", "save it again, or export CSV"
+                place, f"the {dialect.name} can't be read ({said})", "save it again, or export CSV"
             ) from None
-    # The last reader takes any text, and so it knows what is wrong.
-    raise InputError(
-        place,
-        f"no reader knows this file: {reason}",
-        "export it as CSV with a time and an angle column",
-    )
+    try:
+        table = read_table(place, data, options)
+    except NotThisFormatError as fault:
+        raise InputError(
+            place,
+            f"no reader knows this file: {fault if reason is None else reason}",
+            "export it as CSV with a time and an angle column",
+        ) from None
+    return replace(table, notes=(*table.notes, *notes)) if notes else table
 
 
 # Infinite cells are refused in the end; until then their differences are no numbers.

@@ -363,8 +363,8 @@ class Column:
         As the file gives them; ``""`` where it does not.
     values
         The numbers, shape (n,); NaN where the file has none.
-    fault
-        Row and text of the first cell that should be a number and is not.
+    garbled
+        The cells that should be numbers and are not, by their row.
     number
         Its place in the file, from 1.
     time_s
@@ -383,7 +383,7 @@ class Column:
     unit: str
     values: FloatArray
     number: int
-    fault: tuple[int, str] | None = None
+    garbled: Mapping[int, str] = field(default_factory=dict)
     time_s: FloatArray | None = None
     resolution: float | None = None
     limits: tuple[float, float] | None = None

@@ -11,7 +11,7 @@ import re
 import struct
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import islice
 from math import prod
@@ -22,6 +22,8 @@ import numpy as np
 
 from pendpipe.arrays import AnyArray, FloatArray
 from pendpipe.errors import refuse_if
+from pendpipe.formats.clock import column_of_clock_times
+from pendpipe.formats.header import interval_of
 from pendpipe.formats.table import (
     Column,
     NotThisFormatError,
@@ -29,11 +31,10 @@ from pendpipe.formats.table import (
     Table,
     damaged_if,
     most_unpacked,
-    next_reader_if,
     refuse_unpacked,
     swing_of,
 )
-from pendpipe.formats.text import column_of_clock_times, interval_of, table_of_text
+from pendpipe.formats.text import table_of_text
 from pendpipe.formats.words import role_of, split_header
 
 _MOST: Final = 1 << 27
@@ -173,23 +174,17 @@ def _interval(arrays: dict[str, FloatArray]) -> float | None:
     return interval_of(lines)
 
 
-def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
-    """Read a file of HDF5, MATLAB, NumPy, JSON or sound (.wav).
-
-    Raises
-    ------
-    NotThisFormatError
-        When it is none of these.
-    InputError
-        When it holds no numbers.
-    Exception
-        Whatever a library raises that stumbles on a damaged file.
-    """
-    form, reader = next((form, reader) for form, begins, reader in _FORMS if begins(data))
-    return reader(place, data, form, options)
+def is_hdf5(head: bytes) -> bool:
+    """Say whether a file is HDF5, or MATLAB's of version 7.3, which is that."""
+    return _HDF5 in head[:1024] or head[:10] == b"MATLAB 7.3"
 
 
-def _of_hdf5(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
+def is_numpy(head: bytes) -> bool:
+    """Say whether a file is NumPy's, of one array (.npy) or several (.npz)."""
+    return head[:6] == b"\x93NUMPY" or (head[:2] == b"PK" and b".npy" in head[:128])
+
+
+def read_hdf5(place: Path, data: bytes, options: ReadOptions) -> Table:
     """Read the data sets of all groups, with the units among their attributes."""
     import h5py
 
@@ -214,18 +209,25 @@ def _of_hdf5(place: Path, data: bytes, form: str, options: ReadOptions) -> Table
     with h5py.File(io.BytesIO(data), "r") as file:
         tree.update(file.attrs)
         file.visititems(gather)  # follows no link to another file
-    return table_of_tree(place, tree, form, options, units)
+    return table_of_tree(place, tree, "hdf5", options, units)
 
 
-def _of_numpy(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
+def read_numpy(place: Path, data: bytes, options: ReadOptions) -> Table:
+    """Read an array, or several by their names."""
     if data.startswith(b"PK"):
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             refuse_unpacked(sum(part.file_size for part in archive.infolist()), len(data))
     loaded = np.load(io.BytesIO(data), allow_pickle=False)
-    return table_of_tree(place, dict(loaded) if hasattr(loaded, "files") else loaded, form, options)
+    tree = dict(loaded) if hasattr(loaded, "files") else loaded
+    return table_of_tree(place, tree, "numpy", options)
 
 
-def _of_json(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
+def is_json(head: bytes) -> bool:
+    """Say whether a file may be JSON: it begins with a bracket."""
+    return head.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"[")
+
+
+def read_json(place: Path, data: bytes, options: ReadOptions) -> Table:
     """Read a document, or one record a line."""
     refuse_if(
         len(data) > _LARGEST_JSON,
@@ -255,8 +257,8 @@ def _of_json(place: Path, data: bytes, form: str, options: ReadOptions) -> Table
         if rows:
             cells = (names, *([row.get(name, "") for name in names] for row in rows))
             text = "\n".join("\t".join(map(str, row)) for row in cells)
-            return table_of_text(place, text, replace(options, delimiter="\t", decimal="."), form)
-    return table_of_tree(place, tree, form, options)
+            return table_of_text(place, text, replace(options, delimiter="\t", decimal="."), "json")
+    return table_of_tree(place, tree, "json", options)
 
 
 def _flat(record: dict[str, Any]) -> dict[str, Any]:
@@ -265,7 +267,7 @@ def _flat(record: dict[str, Any]) -> dict[str, Any]:
     return {f"{k}.{j}".strip("."): w for k, v in parts for j, w in v.items() if w is not None}
 
 
-def _of_tdms(place: Path, data: bytes, form: str, options: ReadOptions) -> Table:
+def read_tdms(place: Path, data: bytes, options: ReadOptions) -> Table:
     """Read the channels of LabVIEW's TDMS, each with its interval and its unit."""
     import logging
 
@@ -282,10 +284,10 @@ def _of_tdms(place: Path, data: bytes, form: str, options: ReadOptions) -> Table
     units = {name: str(each.get("unit_string", "")) for name, each in told.items()}
     for each in told.values():
         tree |= {"dt": each["wf_increment"]} if "wf_increment" in each else {}
-    return table_of_tree(place, tree, form, options, units)
+    return table_of_tree(place, tree, "tdms", options, units)
 
 
-def _of_sound(place: Path, data: bytes, form: str, _options: ReadOptions) -> Table:
+def read_sound(place: Path, data: bytes, _options: ReadOptions) -> Table:
     """Read the channels of a .wav, full scale as 1; a tone that a swing modulates by its strength.
 
     A sound card passes no constant, so that some put the sensor's voltage on a tone.
@@ -306,7 +308,7 @@ def _of_sound(place: Path, data: bytes, form: str, _options: ReadOptions) -> Tab
             notes = (f"a tone whose strength swings: that, every {_STRETCH_S:g} s, is the reading",)
     return Table(
         place,
-        form,
+        "sound",
         tuple(
             Column(f"channel {number}", "1", column, number)
             for number, column in enumerate(np.ascontiguousarray(values.T), start=1)
@@ -423,6 +425,23 @@ def _array(kind: int, content: bytes, order: str, depth: int = 0) -> tuple[str, 
     return name, entries
 
 
+def read_matlab(place: Path, data: bytes, options: ReadOptions) -> Table:
+    """Read the variables of a file of version 5 to 7."""
+    return table_of_tree(place, tree_of(data), "matlab-v5", options)
+
+
+def is_matlab_4(head: bytes) -> bool:
+    """Say whether a file begins as one of version 4: type, size, whether complex, a name."""
+    words = struct.unpack("<5i", head[:20].ljust(20, b"\xff"))
+    limits = ((0, _LAST_TYPE_4), (0, _MOST), (0, _MOST), (0, 1), (1, 64))
+    return all(low <= word <= high for word, (low, high) in zip(words, limits, strict=True))
+
+
+def read_matlab_4(place: Path, data: bytes, options: ReadOptions) -> Table:
+    """Read the variables of a file of version 4."""
+    return table_of_tree(place, tree_of_version_4(data), "matlab-v4", options)
+
+
 def tree_of_version_4(data: bytes) -> dict[str, Any]:
     """Read the variables of a file of version 4, which scipy reads without compiled code.
 
@@ -431,27 +450,9 @@ def tree_of_version_4(data: bytes) -> dict[str, Any]:
     NotThisFormatError
         When the file is none of that version.
     """
-    type_of_first = int.from_bytes(data[:4], "little")
-    next_reader_if(type_of_first > _LAST_TYPE_4, "the file does not begin with 'MATLAB 5.0'")
     from scipy.io import loadmat
 
     try:
         return dict(loadmat(io.BytesIO(data)))  # type: ignore[arg-type]
     except Exception as fault:
         raise NotThisFormatError(f"it is no file of MATLAB 4 ({fault})") from None
-
-
-_Reader = Callable[[Path, bytes, str, ReadOptions], Table]
-_FORMS: Final[tuple[tuple[str, Callable[[bytes], bool], _Reader], ...]] = (
-    ("hdf5", lambda data: _HDF5 in data[:1024] or data[:10] == b"MATLAB 7.3", _of_hdf5),
-    (
-        "numpy",
-        lambda data: data[:6] == b"\x93NUMPY" or (data[:2] == b"PK" and b".npy" in data[:128]),
-        _of_numpy,
-    ),
-    ("tdms", lambda data: data[:4] == b"TDSm", _of_tdms),
-    ("sound", lambda data: data[:4] == b"RIFF" and data[8:12] == b"WAVE", _of_sound),
-    ("matlab-v5", is_matlab, lambda p, d, f, o: table_of_tree(p, tree_of(d), f, o)),
-    ("json", lambda data: data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"["), _of_json),
-    ("matlab-v4", bool, lambda p, d, f, o: table_of_tree(p, tree_of_version_4(d), f, o)),
-)

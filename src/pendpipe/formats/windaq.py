@@ -19,6 +19,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import refuse_if
+from pendpipe.formats.grammar import Layout
 from pendpipe.formats.table import (
     Column,
     Marker,
@@ -27,7 +28,7 @@ from pendpipe.formats.table import (
     Table,
     next_reader_if,
 )
-from pendpipe.formats.text import Layout, decode, table_of_text
+from pendpipe.formats.text import decode, table_of_text
 
 SUFFIXES: Final = (".wdq", ".wdh", ".wdc", ".whc")
 _FIELDS: Final = {
@@ -231,6 +232,11 @@ def _channel(place: Path, number: int, told: Any) -> Channel:
         _ANOTHER_COPY,
     )
     return Channel(number, slope, intercept, unit, divisor=max(int(told["divisor"]), 1))
+
+
+def has_mark(head: bytes) -> bool:
+    """Say whether the mark stands where a header of one of WinDaq's sizes ends."""
+    return bool(_size(head)[0])
 
 
 def _size(data: bytes) -> tuple[int, list[str]]:
@@ -581,7 +587,7 @@ def read_export(place: Path, data: bytes, options: ReadOptions) -> Table:
     layout = Layout(next((sign for sign in ";\t" if sign in head[0]), ","), ".", 0)
     names, lines = layout.split(head[0].strip()), text.split("\n")
     time = table.columns[0]
-    if time.number != 1 or time.fault is not None or not np.isfinite(time.values).all():
+    if time.number != 1 or time.garbled or not np.isfinite(time.values).all():
         return table
     labels = dict(enumerate(map(str.lower, names), start=1))
     rows = [layout.split(lines[n - 1]) for n in (table.lines if table.lines is not None else ())]

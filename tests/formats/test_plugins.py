@@ -1,0 +1,75 @@
+"""A dialect of another package is found; one that fails is named in a line and passed over."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pendpipe.errors import InputError
+from pendpipe.formats import dialects, read
+from pendpipe.formats.plugin import Dialect, text_dialect
+
+TIME_S = np.arange(200) / 20.0
+ANGLE_RAD = 0.2 * np.exp(-0.1 * TIME_S) * np.cos(5.0 * TIME_S)
+ROWS = "".join(f"{t:.2f}:{x:.6f}\n" for t, x in zip(TIME_S, ANGLE_RAD, strict=True))
+
+
+def _lines(lines: list[str]) -> list[str]:
+    return ["t (s),theta (rad)", *(line.replace(":", ",") for line in lines[1:])]
+
+
+COLONS = text_dialect("table of colons", re.compile("COLONS\n").match, _lines)
+
+
+def _fails(head: bytes) -> bool:
+    raise ValueError("no head for this")
+
+
+BROKEN = Dialect("broken reader", _fails, COLONS.read)
+
+
+@pytest.fixture
+def plugins(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+    names: list[str] = []
+    points = (EntryPoint(name, f"{__name__}:{name}", dialects.ENTRY_POINT) for name in names)
+    monkeypatch.setattr(dialects, "entry_points", lambda group: list(points))
+    monkeypatch.setitem(__import__("sys").modules, __name__, __import__("types").ModuleType("x"))
+    module = __import__("sys").modules[__name__]
+    vars(module).update(COLONS=COLONS, BROKEN=BROKEN)
+    dialects.dialects.cache_clear()
+    yield names
+    dialects.dialects.cache_clear()
+
+
+def test_another_package_adds_a_dialect(tmp_path: Path, plugins: list[str]) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text("COLONS\n" + ROWS)
+    plugins.append("COLONS")
+    recording = read(path)
+    np.testing.assert_allclose(recording.values, ANGLE_RAD, atol=1e-6)
+    assert recording.unit == "rad"
+
+
+def test_without_it_the_file_is_refused(tmp_path: Path, plugins: list[str]) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text("COLONS\n" + ROWS)
+    with pytest.raises(InputError):
+        read(path)
+
+
+@pytest.mark.parametrize("name", ["BROKEN", "ABSENT"])
+def test_a_plugin_that_fails_is_named_and_passed_over(
+    tmp_path: Path, plugins: list[str], name: str
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t (s),theta (rad)\n" + ROWS.replace(":", ","))
+    plugins.append(name)
+    recording = read(path)
+    np.testing.assert_allclose(recording.values, ANGLE_RAD, atol=1e-6)
+    (note,) = (note for note in recording.notes if "passed over" in note)
+    assert {"BROKEN": "broken reader", "ABSENT": "ABSENT"}[name] in note
