@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from importlib.metadata import EntryPoint
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -33,29 +33,35 @@ def _fails(head: bytes) -> bool:
 BROKEN = Dialect("broken reader", _fails, COLONS.read)
 
 
+@dataclass(order=True)
+class Entry:
+    """An entry point of a package that is installed."""
+
+    name: str
+
+    def load(self) -> object:
+        return {"COLONS": COLONS, "BROKEN": BROKEN}[self.name]
+
+
 @pytest.fixture
-def plugins(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
-    names: list[str] = []
-    points = (EntryPoint(name, f"{__name__}:{name}", dialects.ENTRY_POINT) for name in names)
-    monkeypatch.setattr(dialects, "entry_points", lambda group: list(points))
-    monkeypatch.setitem(__import__("sys").modules, __name__, __import__("types").ModuleType("x"))
-    module = __import__("sys").modules[__name__]
-    vars(module).update(COLONS=COLONS, BROKEN=BROKEN)
+def plugins(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Entry]]:
+    entries: list[Entry] = []
+    monkeypatch.setattr(dialects, "entry_points", lambda **_: entries)
     dialects.dialects.cache_clear()
-    yield names
+    yield entries
     dialects.dialects.cache_clear()
 
 
-def test_another_package_adds_a_dialect(tmp_path: Path, plugins: list[str]) -> None:
+def test_another_package_adds_a_dialect(tmp_path: Path, plugins: list[Entry]) -> None:
     path = tmp_path / "a.txt"
     path.write_text("COLONS\n" + ROWS)
-    plugins.append("COLONS")
+    plugins.append(Entry("COLONS"))
     recording = read(path)
     np.testing.assert_allclose(recording.values, ANGLE_RAD, atol=1e-6)
     assert recording.unit == "rad"
 
 
-def test_without_it_the_file_is_refused(tmp_path: Path, plugins: list[str]) -> None:
+def test_without_it_the_file_is_refused(tmp_path: Path, plugins: list[Entry]) -> None:
     path = tmp_path / "a.txt"
     path.write_text("COLONS\n" + ROWS)
     with pytest.raises(InputError):
@@ -64,11 +70,11 @@ def test_without_it_the_file_is_refused(tmp_path: Path, plugins: list[str]) -> N
 
 @pytest.mark.parametrize("name", ["BROKEN", "ABSENT"])
 def test_a_plugin_that_fails_is_named_and_passed_over(
-    tmp_path: Path, plugins: list[str], name: str
+    tmp_path: Path, plugins: list[Entry], name: str
 ) -> None:
     path = tmp_path / "a.csv"
     path.write_text("t (s),theta (rad)\n" + ROWS.replace(":", ","))
-    plugins.append(name)
+    plugins.append(Entry(name))
     recording = read(path)
     np.testing.assert_allclose(recording.values, ANGLE_RAD, atol=1e-6)
     (note,) = (note for note in recording.notes if "passed over" in note)
