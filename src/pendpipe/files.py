@@ -184,6 +184,22 @@ def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
         raise
 
 
+def is_file(path: Path) -> bool:
+    """Whether there is such a file, whatever stands in its name."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name that is too long, a folder that nobody may enter
+        return False
+
+
+def names_in(folder: Path) -> list[str]:
+    """The names in a folder; none where it can't be read."""
+    try:
+        return [path.name for path in folder.iterdir()]
+    except (OSError, ValueError):
+        return []
+
+
 def make_folder(path: str | Path) -> None:
     """Make a folder for results, with those above it.
 

@@ -15,6 +15,7 @@ so that each damage runs the stage once.
 """
 
 import os
+import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -22,7 +23,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from pendpipe.errors import DamagedError, InputError
-from pendpipe.files import digest, read_json, sha256, write_json, writing
+from pendpipe.files import digest, is_file, read_json, sha256, write_json, writing
 from pendpipe.version import __version__
 
 FOLDER: Final = "manifest"
@@ -112,7 +113,7 @@ class Manifest:
         """
         if self.own_damage or not self.path.is_file():
             return [self.own_damage] if self.own_damage else []
-        since = None if hash_all else self.path.stat().st_mtime_ns
+        since = None if hash_all else _written_ns(self.path)
         return [
             damage
             for name, made in (self.outputs | self.extras).items()
@@ -264,7 +265,7 @@ def job(
         outputs={_name(path, home): sum_of(path) for path in running.outputs if path.is_file()},
         extras={_name(path, home): sum_of(path) for path in running.extras if path.is_file()},
         inputs={_name(path, home): made for path, made in checked.items()},
-        sources={path.name: sum_of(path) for path in sources if path.is_file()},
+        sources={path.name: made for path in sources if (made := _sum_of_source(path))},
         repaired=repaired,
     ).write()
 
@@ -329,14 +330,38 @@ def sum_of(path: Path) -> Sum:
     return Sum(path.stat().st_size, sha256(path))
 
 
+def _sum_of_source(path: Path) -> Sum | None:
+    """Measure a user's file; None where it can't be read, which its stage has said."""
+    try:
+        return sum_of(path) if path.is_file() else None
+    except (OSError, ValueError):
+        return None
+
+
 def source_sha256(home: Path, stage: str, source: Path) -> str | None:
     """Hash a file of the user; from the manifest if it has not changed since."""
-    if not source.is_file():
+    if not is_file(source):
         return None
     manifest = read_manifest(home, stage)
     made = manifest.sources.get(source.name)
-    kept = made is not None and _unchanged(source, made, manifest.path.stat().st_mtime_ns)
-    return made.sha256 if made is not None and kept else sha256(source)
+    since = _written_ns(manifest.path) if made is not None else None
+    kept = made is not None and since is not None and _unchanged(source, made, since)
+    try:
+        return made.sha256 if made is not None and kept else sha256(source)
+    except OSError:  # its own job says why it can't be read
+        return None
+
+
+def _written_ns(path: Path) -> int | None:
+    """When a manifest was written; None where its time is no measure, since it lies ahead of us.
+
+    A clock that was set back, or a touched file. What has changed since may bear any time.
+    """
+    status = path.stat()
+    # On Windows st_ctime is the time of creation.
+    changed_ns = status.st_mtime_ns if os.name == "nt" else status.st_ctime_ns
+    since = min(status.st_mtime_ns, changed_ns)
+    return since if since <= time.time_ns() else None
 
 
 def _name(path: Path, home: Path) -> str:

@@ -90,6 +90,28 @@ def test_planning_notices_a_damage_whose_time_was_put_back_and_touches_nothing(
     assert sorted(home.rglob("*")) == before
 
 
+@pytest.mark.parametrize("stage", ["fit", "acquire"])
+def test_a_manifest_whose_time_lies_ahead_hides_no_damage(home: Path, stage: str) -> None:
+    """Somebody has touched it: the result is altered before that time and after the manifest."""
+    for path in (home / manifest.FOLDER).glob("*.json"):
+        os.utime(path, (4e9, 4e9))
+    with_its_old_time(home / {"fit": "fit.json", "acquire": "recording.csv"}[stage], altered)
+    (line,) = noticed(home)
+    assert "altered" in line
+
+
+def test_a_clock_that_was_set_back_hides_no_damage(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Then the time of a change says nothing, and everything is hashed."""
+    (home / "fit.json").write_text('{"a": 2}\n')
+    monkeypatch.setattr(manifest, "_unchanged", lambda *_: True)
+    assert noticed(home) == []
+    monkeypatch.setattr("pendpipe.manifest.time.time_ns", lambda: 0)
+    (line,) = noticed(home)
+    assert "fit.json" in line
+
+
 def test_a_damage_changes_the_rules_parameter_once(home: Path) -> None:
     """It is new when the damage is noticed, and the same after the repair."""
     assert history(home) == ""

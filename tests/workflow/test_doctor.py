@@ -74,7 +74,7 @@ def test_sound_results_have_no_finding(results: Path, capsys: pytest.CaptureFixt
         (other_recording, ("stale", "fit.json")),
         (put("air-01/notes.csv"), ("orphaned", "notes.csv")),
         (put("notes.json"), ("orphaned", "notes.json")),
-        (put("air-01/.fit.json.ab_12xyz"), ("temporary", ".fit.json.ab_12xyz")),
+        (put("air-01/.fit.json.ab120f3c"), ("temporary", ".fit.json.ab120f3c")),
         (put("air-01/fit.json.damaged-1a2b3c4d"), ("set-aside", "fit.json.damaged-1a2b3c4d")),
         (put("live/raw/2026.raw"), ("raw", "2026.raw")),
         (put("decay.raw"), ("raw", "decay.raw")),
@@ -95,6 +95,98 @@ def test_each_thing_that_is_wrong_is_named(
     for line in capsys.readouterr().out.splitlines():
         assert line.count("; ") >= 1, "each line ends with what is safe to do"
     assert {path: path.stat().st_mtime_ns for path in results.rglob("*")} == before
+
+
+def other_campaign(results: Path) -> None:
+    """Results of another campaign in a folder of these, as config/recordings.yaml has them."""
+    record = results / "recordings/steel"
+    with manifest.job(record, "fit") as running:
+        for name in ("fit.json", "diagnosis/diagnosis.json"):
+            write_json(record / name, {})
+            running.outputs.append(record / name)
+    with manifest.job(record.parent, "compare") as running:
+        write_json(record.parent / "comparison.json", {})
+        running.outputs.append(record.parent / "comparison.json")
+    put("recordings/steel/logs/fit.log")(results)
+    put("recordings/steel/raw/README.md")(results)
+    put("recordings/report-of-mine/notes.txt")(results)
+
+
+def record_named_raw(results: Path) -> None:
+    with manifest.job(results / "raw", "fit") as running:
+        write_json(results / "raw/fit.json", {})
+        running.outputs.append(results / "raw/fit.json")
+
+
+@pytest.mark.parametrize("change", [other_campaign, record_named_raw, put("my notes/plan.txt")])
+def test_other_campaigns_and_the_users_own_folders_are_no_findings(
+    results: Path, change: Callable[[Path], object]
+) -> None:
+    change(results)
+    assert examine(results) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "damaged"),
+    [
+        (other_campaign, "recordings/steel/fit.json"),
+        (other_campaign, "recordings/comparison.json"),
+        (record_named_raw, "raw/fit.json"),
+    ],
+)
+def test_what_is_damaged_is_named_in_every_folder(
+    results: Path, change: Callable[[Path], object], damaged: str
+) -> None:
+    change(results)
+    put(damaged, "torn")(results)
+    assert kinds(results) == {("altered", Path(damaged).name)}
+
+
+def test_the_diagnosis_of_a_pendulum_is_a_result_as_all_others(results: Path) -> None:
+    files = []
+    for name in ("air-01", "air-02"):
+        put(f"{name}/refused.json", '{"reason": "short", "stage": "acquire"}')(results)
+        put(f"{name}/swing.csv", "time_s,angle_rad\n0.0,0.1\n")(results)
+        files.append(str(results / name / "swing.csv"))
+    out = results / "pendulums/steel"
+    words = ["diagnose", *files, "--record", "steel", "--out", str(out), "--refused", "-"]
+    assert main(words) == 0
+    assert "pendulums" not in "".join(each.path for each in examine(results))
+    for content in ("", '{"torn": ', '{"schema_version": 1}'):
+        put("pendulums/steel/diagnosis.json", content)(results)
+        assert ("altered", "diagnosis.json") in kinds(results)
+        history, (line,) = manifest.histories(out)
+        assert "diagnosis.json" in history["diagnose-pendulum"]
+        assert "makes it again" in line
+
+
+def test_a_hidden_file_of_the_user_is_not_taken_for_an_unfinished_result(results: Path) -> None:
+    put("air-01/.notes.20240101")(results)
+    (found,) = examine(results)
+    assert found.kind == "orphaned"
+
+
+def test_nothing_sound_is_called_deletable(results: Path) -> None:
+    """Only what a killed process had not finished may be deleted."""
+    for change in (
+        other_recording,
+        put("air-01/mine.csv"),
+        put("air-01/fit.json.damaged-1a2b3c4d"),
+    ):
+        change(results)
+    put("air-01/raw/1.raw")(results)
+    assert len(found := examine(results)) >= 3
+    assert not [each for each in found if "delete" in f"{each.problem} {each.safe}"]
+
+
+def test_a_folder_without_results_is_the_users_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "holiday").mkdir()
+    (tmp_path / "holiday/picture.svg").touch()
+    assert main(["doctor", "holiday"]) == 2
+    assert "no stage has left results here" in capsys.readouterr().err
 
 
 def test_programs_get_json(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -121,7 +213,7 @@ def test_a_raw_file_is_decoded_left_alone_or_deleted(
         lock(stream)
         assert "wait for its end" in advice()
     raw.write_bytes(raw.read_bytes().partition(b"\n")[0] + b"\n")
-    assert "it holds no scan; delete it" in advice()
+    assert "it holds no scan; no stage reads it: keep it" in advice()
 
 
 def test_a_lock_is_named_before_there_are_results(

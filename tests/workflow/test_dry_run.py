@@ -67,6 +67,25 @@ def test_records_of_one_pendulum_have_a_job_together(tmp_path: Path) -> None:
     assert jobs(done.stdout + done.stderr)["diagnose_pendulum"] == 1
 
 
+def test_a_source_of_any_name_stops_no_other_record(tmp_path: Path) -> None:
+    """Its own job reads it, or refuses the record."""
+    (tmp_path / "folder").mkdir()
+    names = ["a{b}.csv", "{.csv", "b{.csv", "folder", "x" * 300, "none.csv"]
+    names += [] if sys.platform == "win32" else ["a<b>.csv", "a*b.csv"]
+    for name in names[:3] + names[6:]:
+        (tmp_path / name).write_text("time_s,angle_rad\n0.0,0.1\n")
+    table, configuration = tmp_path / "records.tsv", tmp_path / "config.yaml"
+    rows = (f"record-{n}\t{tmp_path.as_posix()}/{name}\n" for n, name in enumerate(names))
+    table.write_text("record\tsource\n" + "".join(rows))
+    configuration.write_text(
+        f"title: Odd\nrecords: {table.as_posix()}\nresults: x\napparatus: null\n"
+        "calibration: null\nsimulated: null\ntypical_record: null\n"
+    )
+    done = dry_run(tmp_path / "results", "--configfile", str(configuration))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert jobs(done.stdout + done.stderr)["acquire"] == len(names)
+
+
 def test_recordings_of_others_need_no_file_for_a_dry_run(tmp_path: Path) -> None:
     """On a clean checkout there is no ../shared; the records are then refused, one by one."""
     done = dry_run(tmp_path / "results", "--configfile", "benchmarks/shared_recordings.yaml")

@@ -46,7 +46,8 @@ STRICT = CAMPAIGN.configuration.strict
 
 def in_every_folder(look):
     """What `look` finds in the campaign's folders of results, by folder."""
-    folders = ("", "calibration", *RECORDS)
+    pendulums = (f"pendulums/{name}" for name in PENDULUMS)
+    folders = ("", "calibration", *RECORDS, *pendulums)
     return {folder: checked(look, Path(RESULTS, folder)) for folder in folders}
 
 

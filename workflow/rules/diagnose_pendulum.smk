@@ -5,7 +5,7 @@ rule diagnose_pendulum:
     output:
         f"{RESULTS}/pendulums/{{pendulum}}/diagnosis.json",
     log:
-        f"{RESULTS}/pendulums/{{pendulum}}/diagnose.log",
+        f"{RESULTS}/pendulums/{{pendulum}}/logs/diagnose.log",
     conda:
         "../envs/pendpipe.yaml"
     params:
@@ -14,10 +14,11 @@ rule diagnose_pendulum:
         baseline=CAMPAIGN.configuration.diagnose.baseline,
         level=CAMPAIGN.configuration.diagnose.level,
         seed=CAMPAIGN.configuration.seed,
+        repaired=repaired("pendulums/{pendulum}", "diagnose-pendulum"),
         code=code_version("pendpipe.commands.diagnose"),
     message:
         "{wildcards.pendulum}: what its recordings say together"
     shell:
         "pendpipe diagnose {input.recordings:q} --calibration {input.calibrations:q}"
         " --baseline {params.baseline:q} --level {params.level:q} --seed {params.seed}"
-        " --out {params.folder:q} {params.refusal} > {log:q} 2>&1"
+        " --record {wildcards.pendulum:q} --out {params.folder:q} {params.refusal} > {log:q} 2>&1"

@@ -102,16 +102,23 @@ def run(arguments: Arguments) -> int:
     if arguments.out is not None:
         for path in (arguments.out / FILE_NAME, *_figures_in(arguments.out)):
             check_output(path)
-    if len(arguments.files) > 1:
+    several = len(arguments.files) > 1
+    if several and arguments.record is None:
         return _diagnose_several(arguments)
-    arguments.file, given = arguments.files[0], arguments.calibration
-    arguments.calibration = given[0] if given else None
     refuse_if(
         arguments.record is not None and arguments.out is None,
         "--record",
         "a campaign's record needs a folder",
         "add --out DIR",
     )
+    if several:
+        # Recordings of one pendulum of a campaign.
+        inputs = [Path(file) for file in (*arguments.files, *arguments.calibration)]
+        out = arguments.out / FILE_NAME
+        with job(arguments.out, "diagnose-pendulum", inputs=inputs, outputs=[out]):
+            return _diagnose_several(arguments)
+    arguments.file, given = arguments.files[0], arguments.calibration
+    arguments.calibration = given[0] if given else None
     fixed = parse_fixed(arguments.fix, arguments.baseline)
     if arguments.out is not None and Path(arguments.file).is_file():
         # Before the work: a long diagnosis must not end without a folder to write to.
@@ -163,7 +170,7 @@ def _diagnose_several(arguments: Arguments) -> int:
     """Diagnose recordings of one pendulum together."""
     from pendpipe.diagnosis.several import diagnose_several
 
-    for single in ("fix", "turning_points", "record", "restoring"):
+    for single in ("fix", "turning_points", "restoring"):
         option, given = f"--{single.replace('_', '-')}", getattr(arguments, single)
         refuse_if(
             given not in (None, [], "auto"),
@@ -251,7 +258,8 @@ def _figures_in(folder: Path) -> list[Path]:
 
 def _write_placeholders(arguments: Arguments, reason: str) -> None:
     """Write one line instead of each figure that a workflow waits for and that was not drawn."""
-    wanted = arguments.record is not None and arguments.figures != "none"
+    of_a_record = arguments.record is not None and len(arguments.files) == 1
+    wanted = of_a_record and arguments.figures != "none"
     paths = [arguments.out / f"{name}.svg" for name in OF_EVERY_DIAGNOSIS if wanted]
     for path in (path for path in paths if not path.exists()):
         write_whole(path, _EMPTY.format(reason))

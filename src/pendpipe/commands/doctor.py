@@ -11,12 +11,21 @@ from typing import Final, NamedTuple
 
 from pendpipe import manifest
 from pendpipe.arguments import SHARED, Arguments, print_answer
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 
-TEMPORARY: Final = re.compile(r"\..+\.[a-z0-9_]{8}")
+TEMPORARY: Final = re.compile(r"\.(.+)\.[0-9a-f]{8}")
 """The name of a file that `pendpipe.files.replaced` had not finished."""
-_NO_RESULTS: Final = (manifest.FOLDER, "logs", "raw", "challenge", "challenge-sealed")
+_OF_NO_STAGE: Final = (manifest.FOLDER, "logs", "raw")
+"""Folders in one with results that hold none."""
+_CHALLENGE: Final = ("challenge", "challenge-sealed")
+_LEAVE: Final = "no stage reads it: keep it, or move it elsewhere"
 _RUN: Final = "snakemake makes it again"
+_NAMES: Final = (
+    *("recording.csv", "calibration.json", "turning_points.csv", "fit.json", "refused.json"),
+    *("diagnosis.json", "caliper.csv", "sensor.json", "separation.json", "comparison.json"),
+    *("campaign.json", "report.html", "records.csv", "records.parquet"),
+)
+"""Of results, beside those that manifests list."""
 
 
 ARGUMENTS: Final = {
@@ -72,7 +81,7 @@ def examine(results: Path) -> list[Finding]:
     Raises
     ------
     InputError
-        If there is no such folder, nor a sign of a run that was to make it.
+        If there is no such folder, or no results in it, nor a sign of a run that was to make it.
     """
     found = [
         finding
@@ -83,8 +92,7 @@ def examine(results: Path) -> list[Finding]:
         if found:  # killed before the first result
             return found
         raise InputError(results, "there is no such folder", "name a folder of results")
-    homes = [results, *sorted(path for path in results.iterdir() if path.is_dir())]
-    homes = [home for home in homes if home.name not in _NO_RESULTS]
+    homes = _homes(results)
     stages = [stage for home in homes for stage in manifest.manifests(home)]
     found += [finding for stage in stages for finding in _of_manifest(stage)]
     listed = {
@@ -92,7 +100,24 @@ def examine(results: Path) -> list[Finding]:
         for stage in stages
         for name in (*stage.outputs, *stage.extras)
     }
-    return [*found, *_of_files(results, listed)]
+    found += _of_files(results, homes, listed)
+    refuse_if(
+        not (homes or found),
+        results,
+        "no stage has left results here",
+        "name a campaign's folder of results",
+    )
+    return found
+
+
+def _homes(results: Path) -> list[Path]:
+    """The folders with a manifest: a campaign's, its records', and those of others in it."""
+    found = (path.parent for path in results.rglob(manifest.FOLDER) if any(path.glob("*.json")))
+    return sorted(home for home in found if not set(_inside(home, results)) & set(_CHALLENGE))
+
+
+def _inside(path: Path, folder: Path) -> tuple[str, ...]:
+    return path.relative_to(folder).parts
 
 
 def _of_manifest(stage: manifest.Manifest) -> Iterator[Finding]:
@@ -114,13 +139,17 @@ def _of_manifest(stage: manifest.Manifest) -> Iterator[Finding]:
         )
 
 
-def _of_files(results: Path, listed: set[Path]) -> Iterator[Finding]:
+def _of_files(results: Path, homes: list[Path], listed: set[Path]) -> Iterator[Finding]:
     """Files that no stage claims, and recordings that were never decoded."""
+    names, known = {path.name for path in listed} | set(_NAMES), set(homes)
+    campaigns = {parent for home in homes for parent in home.parents}
     for path in sorted(path for path in results.rglob("*") if path.is_file()):
-        inside = path.relative_to(results).parts[:-1]
-        home = results / inside[0] if inside else results
+        if set(_inside(path, results)) & set(_CHALLENGE):
+            continue
+        home = next((parent for parent in path.parents if parent in known), None)
         ours = path.resolve() in listed or path.name.lower() == "readme.md"
-        if TEMPORARY.fullmatch(path.name):
+        begun = TEMPORARY.fullmatch(path.name)
+        if begun and (begun[1] in names or path.parent.name == manifest.FOLDER):
             yield Finding(
                 "temporary",
                 str(path),
@@ -132,32 +161,32 @@ def _of_files(results: Path, listed: set[Path]) -> Iterator[Finding]:
                 "set-aside",
                 str(path),
                 "a damaged result, kept when it was made again",
-                "delete it when nobody needs it",
+                _LEAVE,
             )
         elif path.suffix == ".raw":
             yield from _undecoded(path)
-        elif not set(inside) & set(_NO_RESULTS) and not ours and (home / manifest.FOLDER).is_dir():
-            yield Finding(
-                "orphaned",
-                str(path),
-                "no stage has written this",
-                "move it elsewhere, or delete it",
-            )
+        elif home is None or ours or set(_inside(path, home)) & set(_OF_NO_STAGE):
+            continue
+        # A folder in the campaign's own is the user's, unless a stage works there.
+        elif path.parent == home or home not in campaigns:
+            yield Finding("orphaned", str(path), "no stage has written this", _LEAVE)
 
 
 def _undecoded(raw: Path) -> Iterator[Finding]:
     """A raw recording without its CSV."""
     in_campaign = raw.parent.name == "raw"
     table = raw.parent.parent / "recording.csv" if in_campaign else raw.with_suffix(".csv")
-    if table.is_file() and not table.read_bytes().startswith(b"# refused:"):
-        return
+    if table.is_file():
+        with table.open("rb") as stream:
+            if stream.read(10) != b"# refused:":
+                return
     from pendpipe.acquisition.decode import read_attempts
 
     call = "snakemake" if in_campaign else f"pendpipe acquire --recover {raw} --out {table}"
     problem, safe = f"there is no {table.name} of it", f"{call} makes it"
     try:
         if not read_attempts([raw]):
-            problem, safe = "it holds no scan", "delete it"
+            problem, safe = "it holds no scan", _LEAVE
     except InputError as fault:
         problem, safe = fault.problem, fault.remedy
     yield Finding("raw", str(raw), problem, safe)

@@ -4,7 +4,7 @@ import os
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pendpipe import files
 from pendpipe.configuration.load import Campaign
@@ -42,14 +42,20 @@ def store(campaign: Campaign, folder: str | Path) -> str:
     return path.as_posix()
 
 
+_OF_SNAKEMAKE: Final = "{}<>"
+
+
 def source_files(campaign: Campaign, record: str) -> list[str]:
     """The file that a record comes from, where it is one and exists.
 
     A missing file is no input: the record is then refused by its own job, in one line,
-    while Snakemake would stop the whole campaign.
+    while Snakemake would stop the whole campaign. So is one in whose name Snakemake would see
+    wildcards; its content is part of `acquisition` all the same.
     """
     path = campaign.record(record).file
-    return [path.as_posix()] if path is not None and path.is_file() else []
+    if path is None or set(path.as_posix()) & set(_OF_SNAKEMAKE) or not files.is_file(path):
+        return []
+    return [path.as_posix()]
 
 
 def acquisition(campaign: Campaign, record: str) -> str:

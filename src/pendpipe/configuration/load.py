@@ -20,7 +20,7 @@ from pydantic.dataclasses import dataclass as checked
 
 from pendpipe.configuration.models import Configuration, Geometry, Section
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.files import read_json, read_text
+from pendpipe.files import is_file, names_in, read_json, read_text
 
 COLUMNS: Final = (
     "record",
@@ -219,9 +219,8 @@ class Campaign:
         lines = []
         for record in self.selected:
             path = record.file
-            if path is not None and not path.is_file():
-                beside = path.parent.iterdir() if path.parent.is_dir() else ()
-                close = difflib.get_close_matches(path.name, [each.name for each in beside], n=1)
+            if path is not None and not is_file(path):
+                close = difflib.get_close_matches(path.name, names_in(path.parent), n=1)
                 hint = f"did you mean '{close[0]}'?" if close else "it will be refused"
                 where = f"{self.configuration.records}, record {record.record}"
                 lines.append(f"{where}: there is no file {path}; {hint}")
