@@ -517,6 +517,31 @@ def find_step(values: FloatArray) -> float | None:
     return None if step and len(large) > 8 and _multiples(large, 10.0 * step) else step
 
 
+_SOME: Final = 256
+_DIGITS: Final = 9
+"""Decimals beyond which numbers are taken as not rounded."""
+
+
+def decimal_step(values: FloatArray) -> float | None:
+    """Find the last decimal that numbers are written to; ``None`` beyond nine decimals.
+
+    Examples
+    --------
+    >>> decimal_step(np.array([0.02, 0.03, 0.05]))
+    0.01
+    """
+    if len(values) > 2 * _SOME and decimal_step(values[:_SOME]) is None:
+        return None
+    largest = float(np.abs(values).max(initial=0.0))
+    for digits in range(_DIGITS + 1):
+        scaled = values * 10.0**digits
+        # Doubles hold sixteen digits, whatever the decimals are.
+        slack = 1e-6 + 4e-16 * largest * 10.0**digits
+        if slack < 0.01 and np.all(np.abs(scaled - np.rint(scaled)) < slack):
+            return float(10.0**-digits)
+    return None
+
+
 def _multiples(values: FloatArray, step: float) -> bool:
     """Whether all values are multiples of a step."""
     return bool(np.all(np.abs(values / step - np.rint(values / step)) < 0.02))

@@ -242,3 +242,13 @@ def test_a_line_takes_two_of_the_points() -> None:
     slopes = np.array([each.volts_per_radian.value for each in found])
     given = np.mean([each.volts_per_radian.sd**2 for each in found])
     assert given == pytest.approx(slopes.var(), rel=0.2)
+
+
+@pytest.mark.parametrize("count", [5, 9])
+def test_digits_are_no_curvature(count: int) -> None:
+    """Points on a line to all four digits that are written, but for the last one of one of them."""
+    angle = np.linspace(-0.2, 0.2, count)
+    volts = np.round(3.85 * angle, 4)
+    volts[-1] += 1e-4
+    found = calibrate(angle, volts)
+    assert found.linearity is None if count == 5 else found.linearity.p_value > 0.01  # type: ignore[union-attr]

@@ -7,6 +7,7 @@ in the angle it is ordinary (weighted) least squares.
 """
 
 import csv
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -18,6 +19,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Z95, Estimate, chi_square_p_value
 from pendpipe.files import read_text
+from pendpipe.recording import decimal_step
 
 ANGLES: Final = ("angle_rad", "angle_deg", "displacement_m")
 _LARGEST: Final = 1e6
@@ -166,7 +168,8 @@ class Calibration:
         Lack of fit: probability of a larger chi^2. NaN where the errors come from the
         residuals, since these then can't judge them.
     linearity
-        Test against a curve; ``None`` with fewer than five points or four angles.
+        Test against a curve; ``None`` with fewer than six points (five where their errors are
+        given), or four angles.
     """
 
     volts_per_radian: Estimate
@@ -214,7 +217,7 @@ class Calibration:
         constant, offset = self.volts_per_radian, self.offset
         low, high = self.angle_rad.min(), self.angle_rad.max()
         misfit = self.chi2_p_value
-        linear = "linearity        not tested: it takes five points at four angles"
+        linear = "linearity        not tested: it takes six points, or five with errors"
         if curve := self.linearity:
             verdict = (
                 "no curvature seen" if curve.p_value >= 0.01 else "the sensor is not linear here"
@@ -291,8 +294,9 @@ def calibrate(
         angle_sd_rad=angle_sd if known or not angle_sd.any() else np.sqrt(scale) * angle_sd,
         residual_sd_volts=float(np.sqrt(np.sum(residual**2) / (count - 2))),
         chi2_p_value=chi_square_p_value(chi2, count - 2) if known else float("nan"),
-        linearity=_linearity(placed, residual, weights, slope, known=known)
-        if count >= 5 and len(np.unique(angle_rad)) >= 4
+        # What is left of one degree of freedom says nothing of its own size.
+        linearity=_linearity(placed, residual, weights, slope, _rounding(volts), known=known)
+        if count >= (5 if known else 6) and len(np.unique(angle_rad)) >= 4
         else None,
     )
 
@@ -325,8 +329,19 @@ def _line(
     return slope, float(centre[1] - slope * centre[0]), weights, placed, covariance
 
 
+def _rounding(volts: FloatArray) -> float:
+    """Rms of the rounding to the digits that are written."""
+    return (decimal_step(volts) or 0.0) / math.sqrt(12.0)
+
+
 def _linearity(
-    angle: FloatArray, residual: FloatArray, weights: FloatArray, slope: float, *, known: bool
+    angle: FloatArray,
+    residual: FloatArray,
+    weights: FloatArray,
+    slope: float,
+    rounding: float,
+    *,
+    known: bool,
 ) -> Linearity:
     """Fit a cubic to the residuals of the line; test its two additional terms.
 
@@ -340,7 +355,8 @@ def _linearity(
     coefficients = np.linalg.lstsq(powers, target, rcond=None)[0]
     chi2_curve = float(np.sum((target - powers @ coefficients) ** 2))
     improvement = float(np.sum(target**2)) - chi2_curve
-    scale = 1.0 if known else chi2_curve / (count - 4)
+    least = rounding**2 * float(np.mean(weights))
+    scale = 1.0 if known else max(chi2_curve / (count - 4), least)
     # One point far beyond the others leaves no inverse: they have one angle beside it.
     sds = np.sqrt(scale * np.diag(np.linalg.pinv(powers.T @ powers)))
     # An exact line leaves residuals of rounding only, in which there is nothing to test.

@@ -23,6 +23,7 @@ from pendpipe.analysis.fit.by_waveform import (
     fitted_waveform,
     waveform_result,
 )
+from pendpipe.analysis.fit.goodness import Goodness
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring, read_fit
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.find import turning_points_of
@@ -33,6 +34,8 @@ from pendpipe.quantities import after_number, pretty_unit, with_error
 from pendpipe.recording import Recording
 
 __all__ = ["FitResult", "fit_recording", "read_fit"]
+
+Forms = tuple[tuple[Fitted, Goodness], ...]
 
 _STEP: Final = 1.25
 """By which the least amplitude grows, where the smaller ones contradict every law tried."""
@@ -170,12 +173,12 @@ def _waveform(
 ) -> FitResult:
     """Fit all readings, with the torque that is given, presumed, or that they ask for."""
 
-    def fitted(torque: Restoring) -> tuple[Fitted, ...]:
+    def fitted(torque: Restoring) -> Forms:
         return fitted_waveform(
             samples, points, baseline=baseline, fixed=fixed, restoring=torque, length_m=length_m
         )
 
-    def result(forms: tuple[Fitted, ...]) -> FitResult:
+    def result(forms: Forms) -> FitResult:
         return waveform_result(forms, samples, points, baseline, fixed or {})
 
     if restoring is None and not may_be_sine(points):
@@ -185,20 +188,20 @@ def _waveform(
     if restoring is not None:
         return result(fitted(restoring))
     sine = fitted("sine")
-    noise = sine[0].goodness.noise_rms
-    plain = sine[0].minimum.converged and sine[0].goodness.enlarged == 1.0
-    if plain and told_apart(points, len(samples), noise) > _CERTAIN:
+    swung, goodness = sine[0]
+    plain = swung.minimum.converged and goodness.enlarged == 1.0
+    if plain and told_apart(points, len(samples), goodness.noise_rms) > _CERTAIN:
         return result(sine)
     linear = fitted("linear")
-    odds = sine[0].better_by(linear[0])
-    if linear[0].minimum.converged and (odds < -ODDS or not sine[0].minimum.converged):
+    odds, converged = swung.better_by(linear[0][0]), linear[0][0].minimum.converged
+    if converged and (odds < -ODDS or not swung.minimum.converged):
         found, words = result(linear), f"10^{-odds / math.log(10.0):.0f}"
         said = (
             f"x fits better than sin x by a likelihood ratio of {words}: a spring or torsion wheel"
         )
         return replace(found, torque_odds=-odds, warnings=(*found.warnings, said))
     found = replace(result(sine), torque_odds=odds)
-    if odds > ODDS or not linear[0].minimum.converged:
+    if odds > ODDS or not converged:
         return found
     other = result(linear)["frequency"]
     own = found["frequency"]

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -30,6 +30,7 @@ from pendpipe.analysis.fit.least_squares import (
     Bounds,
     Minimum,
     Quadratic,
+    bounded_step,
     covariance,
     intervals95,
     minimise,
@@ -172,6 +173,9 @@ class Waveform:
     drag: Drag = "energy"
     seen: Seen = "angle"
     length_m: float = 1.0
+    _last: list[tuple[FloatArray, FloatArray, FloatArray]] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
 
     def model(self, value: FloatArray) -> tuple[Eq8, Release]:
         """What moves, and from where, for a set of parameters."""
@@ -182,6 +186,15 @@ class Waveform:
         if self.drag == "speed":
             law = replace(law, drag="speed")
         return law, Release(time, angle, offset if self.seen == "angle" else 0.0)
+
+    @property
+    def bounds(self) -> Bounds:
+        """Of the nine parameters: with sin x the start lies below the top."""
+        if self.restoring == "linear":
+            return BOUNDS
+        low, high = BOUNDS.lower.copy(), BOUNDS.upper.copy()
+        low[START], high[START] = -TOP, TOP
+        return Bounds(low, high)
 
     def _zero(self, value: FloatArray, time_s: FloatArray) -> FloatArray | float:
         """What the zero adds beyond the engine's offset."""
@@ -293,22 +306,36 @@ class Waveform:
             unit = self.noise_rms**-2
             gradient, normal = unit * gradient, unit * normal
             by_drift, drifts = unit * by_drift, unit * drifts
-        # From the engine's parameters to ours.
-        change = self.change(value)
         full, slope = np.zeros((9, 9)), np.zeros(9)
-        full[:DRIFT, :DRIFT], slope[:DRIFT] = change.T @ normal @ change, change.T @ gradient
-        full[DRIFT, :DRIFT] = full[:DRIFT, DRIFT] = change.T @ by_drift
+        full[:DRIFT, :DRIFT], slope[:DRIFT] = normal, gradient
+        full[DRIFT, :DRIFT] = full[:DRIFT, DRIFT] = by_drift
         slope[DRIFT], full[DRIFT, DRIFT] = drifts
-        return Quadratic(chi2, slope, full)
+        self._last[:] = [(value.copy(), slope, full)]
+        change = self.change(value)
+        return Quadratic(chi2, change.T @ slope, change.T @ full @ change)
+
+    def by_parts(self, value: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Gradient and normal matrix by the engine's parameters, the two parts of b among them.
+
+        The readings are as good as linear in these, however far the share goes.
+        """
+        at, gradient, normal = self._last[0]
+        return gradient - normal @ (self.parts(value) - self.parts(at)), normal
+
+    def parts(self, value: FloatArray) -> FloatArray:
+        """Return a, both parts of b, c, omega, the start's angle and time, offset and drift."""
+        law, release = self.model(value)
+        start = release.angle_rad, release.time_s, value[OFFSET], value[DRIFT]
+        return np.array([*law.rates(), law.angular_frequency, *start])
 
     def change(self, value: FloatArray) -> FloatArray:
-        """Derivative of the engine's parameters by ours, shape (8, 8)."""
+        """Derivative of the engine's parameters by ours, shape (9, 9)."""
         # What is told of one part of b leaves its changes to the other.
         told = [part in self.split for part in ("hysteretic", "viscous")]
         share = float(told[1]) if any(told) else float(value[SHARE])
         by_share = 0.0 if any(told) else float(value[B])
-        change = np.zeros((8, 8))
-        change[[0, 3, 4, 5, 6, 7], [A, C, OMEGA, START, TIME, OFFSET]] = 1.0
+        change = np.zeros((9, 9))
+        change[[0, 3, 4, 5, 6, 7, 8], [A, C, OMEGA, START, TIME, OFFSET, DRIFT]] = 1.0
         change[1:3, B] = share, 1.0 - share
         change[1:3, SHARE] = by_share, -by_share
         return change
@@ -435,8 +462,12 @@ _TOLERANCE: Final = 1e-2
 _ROUNDS: Final = 2
 _SETTLED: Final = 0.1
 """Standard deviations by which the mean share may change when the others have followed it."""
-_REACH: Final = 6.0
-"""Standard deviations within which the share's likelihood is looked at."""
+_SHARES: Final = 9
+"""Shares at which the likelihood is looked at, in a range that narrows until half of them count."""
+_UNLIKELY: Final = 0.02
+"""Of the likeliest, below which a share does not count."""
+_LEAST: Final = 1e-300
+_ZOOMS: Final = 12
 _MOST: Final = 12
 _OTHER: Final = 0.9
 """Of the noise that was weighed with: below, the minimum was not looked for closely enough."""
@@ -448,16 +479,24 @@ ODDS: Final = math.log(1000.0)
 """Logarithm of the likelihood ratio from which one of two laws is believed."""
 
 
-class Fitted(NamedTuple):
-    """A law at its minimum."""
+@dataclass(frozen=True)
+class Fitted:
+    """A law at its minimum.
+
+    Parameters
+    ----------
+    problem, minimum
+        What was minimised, and where.
+    held
+        Indices that were not fitted.
+    start
+        Where the search began.
+    """
 
     problem: Waveform
     minimum: Minimum
     held: tuple[int, ...]
     start: Start
-    goodness: Goodness
-    share_variance: float
-    """Of the hysteretic share of b, anything from 0 to 1 being as likely beforehand."""
 
     @property
     def value(self) -> FloatArray:
@@ -469,12 +508,20 @@ class Fitted(NamedTuple):
         """Of the readings, in units of the noise that was weighed with."""
         return self.minimum.quadratic.chi2
 
+    @property
+    def noise_rms(self) -> float:
+        """What the fit leaves, as if all of it were noise."""
+        if self.problem.step:
+            return self.problem.noise_rms
+        freedom = max(len(self.problem.values) - 9 + len(self.held), 1)
+        return self.problem.noise_rms * math.sqrt(max(self.chi2, 1e-300) / freedom)
+
     def better_by(self, other: Fitted) -> float:
         """Logarithm of the likelihood over another law's, the noise being the better fit's."""
         if self.problem.step or other.problem.step:
             return 0.5 * (other.chi2 - self.chi2)
         square, others = (each.chi2 * each.problem.noise_rms**2 for each in (self, other))
-        noise = (self if square < others else other).goodness.noise_rms
+        noise = min(self.noise_rms, other.noise_rms)
         return 0.5 * (others - square) / noise**2
 
 
@@ -503,7 +550,7 @@ def fitted_waveform(
     fixed: Mapping[str, float] | None = None,
     restoring: Restoring = "linear",
     length_m: float | None = None,
-) -> tuple[Fitted, ...]:
+) -> tuple[tuple[Fitted, Goodness], ...]:
     """Fit Eq. 8 to the readings, starting from the turning points.
 
     Parameters
@@ -523,7 +570,7 @@ def fitted_waveform(
 
     Returns
     -------
-    tuple of Fitted
+    tuple of Fitted with its Goodness
         With the drag's energy form and with v|v|, the likelier first; one where there is no drag.
 
     Notes
@@ -548,25 +595,32 @@ def fitted_waveform(
         seen=seen,
         length_m=length_m or 1.0,
     )
-    free_share = SHARE not in held
     first = np.append(start.value, 0.0)
-    found = _settled(problem, start, first, (*held, DRIFT), samples, points, free_share)
-    found = _drifting(found, samples, points, free_share)
+    found = _settled(problem, start, first, (*held, DRIFT), samples)
+    level = _judged(found, samples, points)
+    if OFFSET not in held and combined(level.p_values[:2]) < _DRIFTS:
+        drifting = _settled(found.problem, start, found.value, held, samples)
+        sd = math.sqrt(_over_shares(drifting).covariance[DRIFT, DRIFT])
+        clear = abs(drifting.value[DRIFT]) > _CLEAR_DRIFT * sd
+        if drifting.minimum.converged and clear:
+            found, level = drifting, _judged(drifting, samples, points)
     without = found.value[A] <= 0.0
-    if A in held or not found.minimum.converged or (without and found.goodness.enlarged == 1.0):
-        return (found,)
+    if A in held or not found.minimum.converged or (without and level.enlarged == 1.0):
+        return ((found, level),)
     other, value = replace(found.problem, drag="speed"), first if without else found.value
-    speed = _settled(other, start, value, found.held, samples, points, free_share)
+    speed = _settled(other, start, value, found.held, samples)
     if not speed.minimum.converged:
-        return (found,)
-    return (speed, found) if speed.better_by(found) > 0.0 else (found, speed)
+        return ((found, level),)
+    if speed.better_by(found) < 0.0:
+        return (found, level), (speed, level)
+    return (speed, _judged(speed, samples, points)), (found, level)
 
 
 def _minimised(problem: Waveform, value: FloatArray, held: tuple[int, ...]) -> Minimum:
     return minimise(
         problem.evaluate,
         value,
-        BOUNDS,
+        problem.bounds,
         held=(*held, SHARE),
         tolerance=_TOLERANCE,
         predict_remaining=problem.predict_remaining,
@@ -575,52 +629,32 @@ def _minimised(problem: Waveform, value: FloatArray, held: tuple[int, ...]) -> M
 
 
 def _settled(
-    problem: Waveform,
-    start: Start,
-    value: FloatArray,
-    held: tuple[int, ...],
-    samples: Samples,
-    points: TurningPoints,
-    free_share: bool,
+    problem: Waveform, start: Start, value: FloatArray, held: tuple[int, ...], samples: Samples
 ) -> Fitted:
     """Minimise until noise, rounding and share are those of the minimum."""
-    minimum = _minimised(problem, value, held)
-    goodness = _judged(problem, minimum, held, samples, points)
+    found = Fitted(problem, _minimised(problem, value, held), held, start)
     for _ in range(_MOST):
-        if not math.isfinite(minimum.quadratic.chi2) or problem.step:
-            break
-        moved = False
-        if goodness.noise_rms < _OTHER * problem.noise_rms:
-            problem, moved = replace(problem, noise_rms=goodness.noise_rms), True
-            minimum = minimum._replace(quadratic=problem.evaluate(minimum.value))
-        if free_share:
-            scale = (problem.noise_rms / goodness.noise_rms) ** 2
-            mean, variance, others = _share(minimum, held, scale)
-            change = mean - float(minimum.value[SHARE])
-            if abs(change) > _SETTLED * math.sqrt(variance):
-                moved = True
-                step = change * others
-                at = BOUNDS.clip(problem.curved(minimum.value, step))
-                minimum = minimum._replace(value=at)
+        if not math.isfinite(found.chi2):
+            return found
+        moved, minimum = False, found.minimum
+        if found.noise_rms < _OTHER * problem.noise_rms:
+            problem, moved = replace(problem, noise_rms=found.noise_rms), True
+        if SHARE not in held:
+            shared = _over_shares(found)
+            change = float(shared.value[SHARE] - minimum.value[SHARE])
+            if abs(change) > _SETTLED * math.sqrt(shared.covariance[SHARE, SHARE]):
+                step = shared.value - minimum.value
+                at = problem.bounds.clip(problem.curved(minimum.value, step))
+                moved, minimum = True, minimum._replace(value=at)
         if not moved:
             break
-        minimum = _minimised(problem, minimum.value, held)
-        goodness = _judged(problem, minimum, held, samples, points)
-    problem, minimum, goodness = _rounded(problem, minimum, held, samples, points, goodness)
-    scale = 1.0 if problem.step else (problem.noise_rms / goodness.noise_rms) ** 2
-    variance = _share(minimum, held, scale)[1] if free_share else 0.0
-    return Fitted(problem, minimum, held, start, goodness, variance)
+        found = replace(found, problem=problem, minimum=_minimised(problem, minimum.value, held))
+    return _rounded(found, samples)
 
 
-def _judged(
-    problem: Waveform,
-    minimum: Minimum,
-    held: tuple[int, ...],
-    samples: Samples,
-    points: TurningPoints,
-) -> Goodness:
+def _judged(fitted: Fitted, samples: Samples, points: TurningPoints) -> Goodness:
     """Noise and test of fit of what a minimum leaves."""
-    value = minimum.value
+    value, held, problem = fitted.value, fitted.held, fitted.problem
     at_bound = [j for j in (A, B, C) if j not in held and value[j] <= 0.0]
     lines = 2 - (OFFSET in held) - (DRIFT in held)
     free = 9 - len({*held, *at_bound, SHARE, OFFSET, DRIFT})
@@ -638,100 +672,113 @@ def _judged(
     )
 
 
-def _share(
-    minimum: Minimum, held: tuple[int, ...], scale: float
-) -> tuple[float, float, FloatArray]:
-    """Mean and variance of b's hysteretic share, each from 0 to 1 as likely beforehand.
+class _Shared(NamedTuple):
+    """The parameters where b's hysteretic share is what the readings expect of it.
 
-    Returns
-    -------
-    mean, variance
-        Of the likelihood between 0 and 1, the other parameters following.
-    others
-        By how much each parameter follows the share, shape (9,).
+    Any two parts of b are as likely beforehand.
     """
-    value, (_, gradient, normal) = minimum.value, minimum.quadratic
-    stuck = [j for j in (A, B, C) if value[j] <= 0.0]
-    free = [j for j in range(len(value)) if j not in {*held, *stuck, SHARE}]
-    others = np.zeros(len(value))
-    part = normal[np.ix_(free, free)]
-    size = 1.0 / np.sqrt(np.maximum(part.diagonal(), 1e-300))
-    inverse = np.linalg.pinv(part * size[:, None] * size, rcond=1e-13, hermitian=True)
-    others[free] = -size * (inverse @ (size * normal[free, SHARE]))
-    others[SHARE] = 1.0
-    precision = scale * float(normal[SHARE, SHARE] + normal[SHARE, free] @ others[free])
-    pull = scale * float(others @ gradient)
-    precision = max(precision, 1e-6)
-    best = min(max(float(value[SHARE]) + pull / precision, 0.0), 1.0)
-    reach = _REACH / math.sqrt(precision)
-    shares = np.linspace(max(best - reach, 0.0), min(best + reach, 1.0), 401)
-    away = shares - value[SHARE]
-    logs = pull * away - 0.5 * precision * away**2
-    likely = np.exp(logs - logs.max())
+
+    value: FloatArray
+    """Shape (9,), the share among them."""
+    covariance: FloatArray
+    """With what the unknown share adds, shape (9, 9)."""
+    gradient: FloatArray
+    """Of -chi^2/2 at the mean share, shape (9,)."""
+
+
+def _over_shares(fitted: Fitted, noise_rms: float | None = None, enlarged: float = 1.0) -> _Shared:
+    """Average over the share: at each the others are at their bounded minimum."""
+    problem, value, held = fitted.problem, fitted.value, (*fitted.held, SHARE)
+    gradient, normal = problem.by_parts(value)
+    scale = 1.0 / enlarged
+    if not problem.step:
+        scale *= (problem.noise_rms / (noise_rms or fitted.noise_rms)) ** 2
+    gradient, normal = gradient * scale, normal * scale
+    here = problem.parts(value)
+
+    def at(share: float) -> tuple[FloatArray, float, FloatArray, FloatArray]:
+        """Minimum, chi^2 above that of the fit, normal matrix and gradient at one share."""
+        first = value.copy()
+        first[SHARE] = share
+        change = problem.change(first)
+        change[:, SHARE] = 0.0
+        off = problem.parts(first) - here
+        own, slope = change.T @ normal @ change, change.T @ (gradient - normal @ off)
+        step = bounded_step(own, slope, problem.bounds.about(first), held)
+        off = off + change @ step
+        chi2 = float(off @ normal @ off - 2.0 * gradient @ off)
+        return first + step, chi2, own, slope - own @ step
+
+    y = abs(float(value[START]))
+    loss = float(value[A]) * y + float(value[B]) + float(value[C]) / y
+    # No loss is more than the whole.
+    whole = np.zeros((9, 9))
+    whole[[A, B, C], [A, B, C]] = np.array([y, 1.0, 1.0 / y]) ** 2 / max(loss, 1e-300) ** 2
+    if SHARE in fitted.held:
+        best, _, own, slope = at(float(value[SHARE]))
+        return _Shared(value, covariance(own + whole, held), slope)
+    low, high = 0.0, 1.0
+    for _ in range(_ZOOMS):
+        shares = np.linspace(low, high, _SHARES)
+        found = [at(share) for share in shares.tolist()]
+        spreads = [covariance(each[2] + whole, held) for each in found]
+        chi2 = np.array([each[1] for each in found])
+        width = np.array([math.sqrt(max(each[B, B], 0.0)) for each in spreads])
+        size = np.array([float(each[0][B]) for each in found])
+        # Parts of b are as likely beforehand, so that at a share b counts as b db.
+        likely = np.exp(0.5 * (chi2.min() - chi2)) * np.maximum(
+            np.maximum(size, width) * width, _LEAST
+        )
+        likely /= likely.max()
+        inside = np.flatnonzero(likely > _UNLIKELY)
+        if len(inside) >= _SHARES // 2:
+            break
+        first, last = max(int(inside[0]) - 1, 0), min(int(inside[-1]) + 1, _SHARES - 1)
+        low, high = float(shares[first]), float(shares[last])
     likely[[0, -1]] *= 0.5
     likely /= likely.sum()
-    mean = float(likely @ shares)
-    variance = float(likely @ (shares - mean) ** 2)
-    return mean, max(variance, 1e-12), others
+    best, _, _, slope = at(float(likely @ shares))
+    spread = np.zeros((9, 9))
+    for weight, (there, *_), each in zip(likely.tolist(), found, spreads, strict=True):
+        spread += weight * (each + np.outer(there - best, there - best))
+    return _Shared(best, spread, slope)
 
 
-def _drifting(fitted: Fitted, samples: Samples, points: TurningPoints, free_share: bool) -> Fitted:
-    """Let the zero drift by a line where its level asks for it."""
-    if OFFSET in fitted.held or combined(fitted.goodness.p_values[:2]) > _DRIFTS:
-        return fitted
-    held = tuple(j for j in fitted.held if j != DRIFT)
-    found = _settled(fitted.problem, fitted.start, fitted.value, held, samples, points, free_share)
-    sd = math.sqrt(covariance(found.minimum.quadratic.normal, (*held, SHARE))[DRIFT, DRIFT])
-    clear = found.minimum.converged and abs(found.value[DRIFT]) > _CLEAR_DRIFT * sd
-    return found if clear else fitted
-
-
-def _rounded(
-    problem: Waveform,
-    minimum: Minimum,
-    held: tuple[int, ...],
-    samples: Samples,
-    points: TurningPoints,
-    goodness: Goodness,
-) -> tuple[Waveform, Minimum, Goodness]:
+def _rounded(fitted: Fitted, samples: Samples) -> Fitted:
     """Take the rounding for what it is, where noise does not make it random.
 
     Only where Eq. 8 describes the readings to within the step: else every misfit would be
     blamed on the rounding.
     """
-    step, value = samples.step, minimum.value
-    if step is None or not math.isfinite(minimum.quadratic.chi2):
-        return problem, minimum, goodness
-    residual = problem.residual(value)
-    rms = math.sqrt(float(residual @ residual) / len(residual))
-    if not rms < math.hypot(_DITHERED, math.sqrt(1.0 / 12.0)) * step:
-        return problem, minimum, goodness
-    rough = problem, minimum, goodness
+    step, problem, found = samples.step, fitted.problem, fitted
+    dithered = math.hypot(_DITHERED, math.sqrt(1.0 / 12.0))
+    if step is None or problem.step or not fitted.noise_rms < dithered * step:
+        return fitted
     for _ in range(_ROUNDS):
-        noise = best_noise(problem.residual(value), step, 0.1 * step)
+        noise = best_noise(problem.residual(found.value), step, 0.1 * step)
         problem = replace(problem, noise_rms=noise, step=step)
-        minimum = _minimised(problem, value, held)
+        minimum = _minimised(problem, found.value, found.held)
         if not math.isfinite(minimum.quadratic.chi2):
-            return rough
-        value = minimum.value
-    return problem, minimum, _judged(problem, minimum, held, samples, points)
+            return fitted
+        found = replace(found, problem=problem, minimum=minimum)
+    return found
 
 
 def waveform_result(
-    forms: Sequence[Fitted],
+    forms: Sequence[tuple[Fitted, Goodness]],
     samples: Samples,
     points: TurningPoints,
     baseline: Baseline,
     fixed: Mapping[str, float],
 ) -> FitResult:
     """Put the numbers of the likelier form of the drag together, with errors that cover both."""
-    fitted = forms[0]
-    problem, goodness, value = fitted.problem, fitted.goodness, fitted.value
-    value, matrix, ends = _numbers(fitted, float(samples.time_s[0]))
+    fitted, goodness = forms[0]
+    problem, start_s = fitted.problem, float(samples.time_s[0])
+    value, matrix, ends = _numbers(fitted, goodness, start_s)
     form: DragForm = problem.drag
-    if len(forms) > 1 and fitted.better_by(forms[1]) < ODDS:
+    if len(forms) > 1 and fitted.better_by(forms[1][0]) < ODDS:
         form = "undecided"
-        others, _, other_ends = _numbers(forms[1], float(samples.time_s[0]))
+        others, _, other_ends = _numbers(*forms[1], start_s)
         apart = others - value
         apart[5] = math.remainder(apart[5], math.tau)
         matrix = matrix + np.outer(apart, apart)
@@ -742,7 +789,8 @@ def waveform_result(
     inside = (points.time_s >= times[0]) & (points.time_s <= times[-1])
     drift = None
     if DRIFT not in fitted.held:
-        sd = math.sqrt(covariance(_weighed(fitted)[0], fitted.held)[DRIFT, DRIFT])
+        shared = _over_shares(fitted, goodness.noise_rms, goodness.enlarged)
+        sd = math.sqrt(shared.covariance[DRIFT, DRIFT])
         drift = Estimate(float(fitted.value[DRIFT]), sd, f"{samples.unit}/s")
     return result_of(
         value,
@@ -781,33 +829,18 @@ def _held(
     return tuple(held)
 
 
-def _weighed(fitted: Fitted) -> tuple[FloatArray, FloatArray]:
-    """Normal matrix and gradient by the noise that was found, the share's prior in it."""
-    _, gradient, normal = fitted.minimum.quadratic
-    goodness, problem = fitted.goodness, fitted.problem
-    # What rounding leaves is slow by nature; its likelihood knows that already.
-    scale = 1.0 if problem.step else (problem.noise_rms / goodness.noise_rms) ** 2
-    scale /= goodness.enlarged
-    normal, gradient = normal * scale, gradient * scale
-    if fitted.share_variance > 0.0:
-        own = covariance(normal, fitted.held)[SHARE, SHARE]
-        told = 1.0 / own if own > 0.0 and normal[SHARE, SHARE] > 0.0 else 0.0
-        normal[SHARE, SHARE] += max(1.0 / fitted.share_variance - told, 0.0)
-        gradient[SHARE] = 0.0
-    return normal, gradient
-
-
 def _numbers(
-    fitted: Fitted, start_s: float
+    fitted: Fitted, goodness: Goodness, start_s: float
 ) -> tuple[FloatArray, FloatArray, list[tuple[float, float]]]:
     """The seven parameters, their covariance, and the intervals of a, b, c."""
     value, held = fitted.value, fitted.held
-    normal, gradient = _weighed(fitted)
+    shared = _over_shares(fitted, goodness.noise_rms, goodness.enlarged)
+    own, gradient = shared.covariance, shared.gradient
+    normal = covariance(own, held)
     (amplitude, phase), jacobian = _first_turning_point(fitted, start_s)
-    own = covariance(normal, held)
     frequency = 0.5 * value[OMEGA] / math.pi
     numbers = np.array([*value[:3], frequency, amplitude, phase, value[OFFSET]])
-    ends = intervals95(value, normal, gradient, BOUNDS, range(3), held, own)
+    ends = intervals95(value, normal, gradient, fitted.problem.bounds, range(3), held, own)
     return numbers, jacobian @ own @ jacobian.T, ends
 
 
@@ -826,7 +859,7 @@ def _first_turning_point(fitted: Fitted, start_s: float) -> tuple[tuple[float, f
     count = fitted.start.before + 1
     turning, by_time, by_angle = turning_points_with_jacobian(model, release, count)
     change = fitted.problem.change(value)
-    late, high = by_time[-1] @ change, by_angle[-1] @ change
+    late, high = by_time[-1] @ change[:8, :8], by_angle[-1] @ change[:8, :8]
     time, side = float(turning.time_s[-1]), math.copysign(1.0, release.angle_rad)
     side *= -1.0 if fitted.start.before % 2 else 1.0
     omega = float(value[OMEGA])

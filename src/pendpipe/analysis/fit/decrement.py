@@ -72,7 +72,7 @@ class Decrement(NamedTuple):
     @property
     def confirms(self) -> bool:
         """Whether they agree, and so closely that this says something."""
-        return not self.contradicts and abs(self.excess) <= _CONFIRMED
+        return not self.contradicts and self.seen_sd <= _CONFIRMED * abs(self.seen)
 
     def sentence(self, unit: str) -> str:
         """Say it in a clause."""

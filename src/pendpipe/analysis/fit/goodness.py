@@ -129,7 +129,9 @@ def judge(
     p_values = tuple(tail(each.chi2 / each.freedom, each.freedom, of_noise) for each in asked)
     ratio = square / freedom / noise**2
     if combined(p_values) >= LEVEL:
-        return Goodness(noise, ratio, p_values, 1.0)
+        # Where all of the residual is noise, all of it tells how large that is.
+        whole = max(math.sqrt(square / freedom), quantisation_rms(step), floor)
+        return Goodness(whole, ratio, p_values, 1.0)
     # What a, b, c suffer from is what is left at the motion's own frequency.
     own = max((each.chi2 / each.freedom for each in asked if each.name == "motion"), default=1.0)
     return Goodness(noise, ratio, p_values, max(ratio, own, 1.0))

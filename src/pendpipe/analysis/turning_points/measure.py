@@ -30,7 +30,7 @@ from pendpipe.analysis.noise import noise_rms
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.dynamics.kernel import IntMatrix, Matrix, Stack, kernel
 from pendpipe.errors import NotAnalysableError, refuse_if
-from pendpipe.recording import Recording, find_step
+from pendpipe.recording import Recording, decimal_step, find_step
 
 HALF_PI = 0.5 * np.pi
 HARMONICS = 3
@@ -482,6 +482,10 @@ _FEWEST: Final = 16
 _SATURATED: Final = 0.1
 _HELD: Final = 0.2
 """Share of rows that repeat the one above, in fast motion, from which readings are held."""
+_EVEN: Final = 1e-6
+"""Of an interval, by which even times differ at most."""
+_ROUNDED: Final = 0.6
+"""Of the last digit, by which rounded or cut stamps may lie off the line through them."""
 _SEVERAL: Final = 3.0
 """Steps from row to row in fast motion."""
 
@@ -562,6 +566,7 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
         NotAnalysableError,
     )
     _refuse_saturated(values, low, high, place)
+    time = even_times(time)
     step = recording.resolution or find_step(values[:_BEGINNING])
     if step is not None and _one_row_a_count(time, values, step):
         # Counts are turned into the angles at which they changed, half a step back: the same edge
@@ -576,6 +581,26 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
     noise = noise_rms(values, step)
     held = rows - len(values)
     return Samples(time, values, recording.unit, step, noise, radius_excess=radius, held=held)
+
+
+def even_times(time_s: FloatArray) -> FloatArray:
+    """Return the even times that rounded stamps stand for, or the stamps where there are none.
+
+    Sixty frames a second with two decimals come as 0.02, 0.03, 0.05: no stamp is off by more than
+    half of its last digit.
+    """
+    intervals = np.diff(time_s)
+    low, high = float(intervals.min()), float(intervals.max())
+    if high - low < _EVEN * high or (digit := decimal_step(time_s)) is None:
+        return time_s
+    usual = float(np.median(intervals))
+    single = float(np.mean(intervals[intervals < 1.5 * usual + digit]))
+    number = np.concatenate([[0.0], np.cumsum(np.rint(intervals / single))])
+    line = np.polynomial.Polynomial.fit(number, time_s, 1)
+    # Of few stamps the line may lie beside the best one.
+    even = line(number)
+    fits = digit < single and float(np.max(np.abs(time_s - even))) < _ROUNDED * digit
+    return even if fits and number[-1] < 2 * len(time_s) else time_s
 
 
 def _range(values: FloatArray) -> tuple[float, float]:
