@@ -343,7 +343,8 @@ def diagnose(
     Returns
     -------
     Outcome, or JointOutcome of several recordings
-        Prints as one paragraph; ``.verdict``, ``.effects``, ``.plot()``, ``.to_dict()``,
+        Prints as a dozen lines; ``.summary``, ``.verdict``, ``.effects``, ``.plot()``,
+        ``.to_dict()``,
         ``.save(folder)``.
 
     Raises

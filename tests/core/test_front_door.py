@@ -21,7 +21,7 @@ def test_the_lines_of_the_readme_answer(capsys: pytest.CaptureFixture[str], tmp_
     exec(lines, names)
     printed = capsys.readouterr().out
     assert "period" in printed
-    assert "Eq. 8 describes this recording" in printed
+    assert "nothing is missing" in printed
 
     fit = names["fit"]
     assert fit["b"].value == pytest.approx(0.01, abs=4.0 * fit["b"].sd)

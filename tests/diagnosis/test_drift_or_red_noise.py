@@ -85,8 +85,8 @@ def test_what_wanders_more_slowly_than_the_motion_is_told_beside_what_is_faster(
     angle_rad = other_engine(TRUTH, time_s) + wander + white(3)
     found = diagnose_recording(Recording(time_s, angle_rad, "angle_rad")).diagnosis
     assert not found.effects
-    assert found.statement.startswith("Eq. 8 describes the motion of this recording, whose zero")
-    assert "the zero wanders by 1.4" in found.statement
+    assert found.details.startswith("Eq. 8 describes the motion of this recording, whose zero")
+    assert "the zero wanders by 1.4" in found.details
 
 
 def test_noise_about_the_motion_is_no_wander_of_the_zero() -> None:

@@ -1,4 +1,4 @@
-"""The paragraph that a diagnosis prints: its order, words, names, units and digits."""
+"""The details of a diagnosis: their order, words, names, units and digits."""
 
 from __future__ import annotations
 
@@ -133,14 +133,6 @@ def test_a_pure_number_has_no_unit() -> None:
     assert "s = 0.0100 ± 0.0010)" in paragraph(
         named("amplitude-step", s=Estimate(0.01, 0.001, unit))
     )
-
-
-def test_a_diagnosis_prints_as_its_paragraph() -> None:
-    outcome = diagnosed("circular-error")
-    assert str(outcome) == repr(outcome) == outcome.diagnosis.statement
-    assert outcome.to_dict()["statement"] in str(outcome)
-    assert "<p>Eq. 8 does not describe" in outcome._repr_html_()
-    assert len(repr(outcome.diagnosis)) < 100
 
 
 def test_lost_samples_are_reported_as_the_delay_of_later_readings() -> None:

@@ -2,13 +2,14 @@
 
 Eq. 8 (or Eq. 3) is fitted to a free decay. Its residual is searched for every effect of the
 catalogue, of the pendulum and of the measurement alike; those that chance does not explain are
-added to the model. The answer goes to standard output as one paragraph, and DIR gets
-diagnosis.json and the figures.
+added to the model. The answer goes to standard output, about twelve lines; DIR gets diagnosis.json
+and the figures.
 
 Several FILEs are recordings of one pendulum: physics shared, start and noise each its own
 (docs/several.md).
 """
 
+from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
 from typing import Any, Final
@@ -49,6 +50,8 @@ _EMPTY: Final = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 520 60">
 _OWN: Final[Flags] = {
     "--out": {"type": Path, "metavar": "DIR", "help": "write diagnosis.json and the figures there"}
     | OUTPUTS,
+    "--verbose": {"action": "store_true", "help": "all that was found, and harmless notes"},
+    "-v": {"dest": "verbose", "action": "store_true", "help": "the same"},
     "--level": {
         "type": number_within(0, 1),
         "default": 0.01,
@@ -152,7 +155,7 @@ def _diagnose(arguments: Arguments, fixed: dict[str, float]) -> int:
     provenance: dict[str, Any] = {"seed": arguments.seed, "fixed": list(arguments.fix)}
     provenance["restoring"] = arguments.restoring
     try:
-        recording, made = read_motion(arguments)
+        recording, made = read_motion(arguments, quiet=not arguments.verbose)
         provenance = made | provenance | {"level": arguments.level}
         outcome = _outcome(arguments, recording, fixed=fixed, provenance=provenance)
     except InputError as error:
@@ -160,10 +163,20 @@ def _diagnose(arguments: Arguments, fixed: dict[str, float]) -> int:
             raise
         return _not_analysable(arguments, within_results(error, arguments.refused), provenance)
     content = outcome.to_dict() if arguments.out is None else _write(arguments, outcome)
-    for warning in content["warnings"]:
-        tell(f"{arguments.file}: {warning}")
-    print_answer(arguments, content, content["statement"])
+    if arguments.verbose:
+        for warning in content["warnings"]:
+            tell(f"{arguments.file}: {warning}")
+    print_answer(arguments, content, _answer(arguments, content))
     return FOUND if arguments.fail_on == content["verdict"] else 0
+
+
+def _answer(arguments: Arguments, content: Mapping[str, Any]) -> str:
+    """Return the dozen lines; with ``--verbose`` all that was found behind them."""
+    if not arguments.verbose:
+        return str(content["statement"])
+    excluded = "; ".join(f"{each['id']} {each['p_value']:.2g}" for each in content["excluded"])
+    looked = [f"Looked for, with p-values: {excluded}."] if excluded else []
+    return "\n".join([content["statement"], "", content["details"], *looked])
 
 
 def _diagnose_several(arguments: Arguments) -> int:
@@ -209,7 +222,7 @@ def _diagnose_several(arguments: Arguments) -> int:
     )
     if arguments.out is not None:
         joint.save(arguments.out)
-    print_answer(arguments, content := joint.to_dict(), content["statement"])
+    print_answer(arguments, content := joint.to_dict(), _answer(arguments, content))
     return FOUND if arguments.fail_on == joint.verdict else 0
 
 

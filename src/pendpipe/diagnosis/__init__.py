@@ -8,7 +8,7 @@
 >>> outcome.to_dict()["effects"][0]["kind"]
 'dynamics'
 
-``print(outcome)`` gives one paragraph. ``outcome.diagnosis`` holds the answer, ``search`` and
+``print(outcome)`` gives a dozen lines. ``outcome.diagnosis`` holds the answer, ``search`` and
 ``beginning`` the fits and readings behind it.
 """
 

@@ -24,7 +24,7 @@ from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import TAPS, white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.remainder import remainder_of
-from pendpipe.diagnosis.result import COLOURED_NOISE, Finding, Location
+from pendpipe.diagnosis.result import Finding, Location
 from pendpipe.diagnosis.state import (
     Fault,
     State,
@@ -33,6 +33,7 @@ from pendpipe.diagnosis.state import (
     loses_phase,
     price_of_another,
 )
+from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.estimate import Estimate
 

@@ -7,18 +7,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, NamedTuple
 
+from pendpipe.analysis.fit.result import FitResult
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.cycles import SmallSwings
 from pendpipe.diagnosis.held_out import HeldOut
 from pendpipe.diagnosis.remainder import Remainder
+from pendpipe.diagnosis.summary import Summary, summarise
 from pendpipe.estimate import Estimate
 
 FILE_NAME: Final = "diagnosis.json"
 BASELINES: Final = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 """The baselines in words."""
 Verdict = Literal["consistent", "missing-physics", "not-analysable"]
-COLOURED_NOISE: Final = "coloured-noise"
-"""What is reported of the noise, and is nothing that a model lacks."""
 _DENSITIES: Final = ("log_density_before", "log_density_after", "gain", "gain_sd")
 
 
@@ -188,6 +188,8 @@ class FoundEffect:
         For an unnamed effect: the curve with its band.
     confirmed
         What a second test found that does not use the model.
+    presumed
+        Whether the baseline has it: it is fitted, and not missing.
     """
 
     identifier: str
@@ -203,6 +205,7 @@ class FoundEffect:
     location: Location
     curve: Mapping[str, Any] | None = None
     confirmed: Confirmation | None = None
+    presumed: bool = False
 
     def __repr__(self) -> str:
         return f"FoundEffect({self.identifier}, probability {self.probability:.2f})"
@@ -213,6 +216,7 @@ class FoundEffect:
             "id": self.identifier,
             "name": self.name,
             "kind": self.kind,
+            "presumed": self.presumed,
             "equation": self.equation,
             "parameters": {name: each.as_json() for name, each in self.parameters.items()},
             "delta_chi2": self.delta_chi2,
@@ -234,7 +238,7 @@ class FoundEffect:
 
 @dataclass(frozen=True, repr=False)
 class Diagnosis:
-    """Where model and recording differ, and what is missing. It prints as one paragraph.
+    """Where model and recording differ, and what is missing. It prints as a dozen lines.
 
     Parameters
     ----------
@@ -254,8 +258,14 @@ class Diagnosis:
         The same in parts: its size over the noise, and where it lies.
     small_swings
         How the frequency differs from the improved model's at the smallest amplitudes, if it does.
-    statement
-        One paragraph.
+    details
+        All that was found, one paragraph: what the summary leaves out too.
+    name
+        Of the recording.
+    fit
+        The fit that the diagnosis began with.
+    scanned
+        What was looked for, with its p-value on the baseline's residual.
     """
 
     baseline_name: str
@@ -268,12 +278,30 @@ class Diagnosis:
     held_out: HeldOut | None
     unexplained_rms_rad: float
     unexplained_p_value: float
-    statement: str
+    details: str
     warnings: tuple[str, ...] = ()
     figures: tuple[str, ...] = ()
     remainder: Remainder | None = None
     small_swings: SmallSwings | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    name: str = ""
+    fit: FitResult | None = field(default=None, repr=False, compare=False)
+    scanned: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def missing(self) -> tuple[FoundEffect, ...]:
+        """The effects that the baseline lacks."""
+        return tuple(each for each in self.effects if not each.presumed)
+
+    @property
+    def summary(self) -> Summary:
+        """The answer: what is printed, as fields."""
+        return summarise(self)
+
+    @property
+    def statement(self) -> str:
+        """The answer as it is printed: a dozen lines at most."""
+        return "\n".join(self.summary.lines(self.name))
 
     def __str__(self) -> str:
         return self.statement
@@ -307,6 +335,13 @@ class Diagnosis:
             "remainder": None if self.remainder is None else self.remainder.as_json(),
             "small_amplitudes": None if self.small_swings is None else self.small_swings.as_json(),
             "statement": self.statement,
+            "summary": self.summary.as_json(),
+            "details": self.details,
+            "excluded": [
+                {"id": identifier, "p_value": p_value}
+                for identifier, p_value in self.scanned
+                if identifier not in {each.identifier for each in self.effects}
+            ],
             "figures": list(self.figures),
             "warnings": list(self.warnings),
             "provenance": dict(self.provenance),
@@ -343,6 +378,9 @@ def not_analysable(
         "held_out": dict.fromkeys(_DENSITIES),
         "unexplained": {"residual_rms_rad": None, "p_value": None},
         "statement": f"This recording can't be analysed: {reason}.",
+        "summary": Summary(f"not analysable: {reason}").as_json(),
+        "details": "",
+        "excluded": [],
         "figures": [],
         "warnings": [],
         "provenance": dict(provenance or {}),

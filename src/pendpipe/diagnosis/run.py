@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,9 +24,10 @@ from pendpipe.diagnosis.held_out import held_out
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of
-from pendpipe.diagnosis.result import COLOURED_NOISE, FILE_NAME, Diagnosis, FittedModel, FoundEffect
+from pendpipe.diagnosis.result import FILE_NAME, Diagnosis, FittedModel, FoundEffect
 from pendpipe.diagnosis.search import Search, search
 from pendpipe.diagnosis.statement import statement
+from pendpipe.diagnosis.summary import COLOURED_NOISE, Summary, html_of
 from pendpipe.diagnosis.values import parameters_of
 from pendpipe.diagnosis.weighing import (
     Weighed,
@@ -50,7 +50,7 @@ LEVEL: Final = 0.01
 
 @dataclass(frozen=True, repr=False)
 class Answer:
-    """A diagnosis as it is shown: it prints as one paragraph."""
+    """A diagnosis as it is shown: it prints as a dozen lines."""
 
     diagnosis: Diagnosis
 
@@ -70,8 +70,13 @@ class Answer:
     def __repr__(self) -> str:
         return self.diagnosis.statement
 
+    @property
+    def summary(self) -> Summary:
+        """The answer: what is printed, as fields."""
+        return self.diagnosis.summary
+
     def _repr_html_(self) -> str:
-        return f"<p>{html.escape(self.diagnosis.statement)}</p>"
+        return html_of(self.diagnosis.summary, self.diagnosis.name)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``diagnosis.json``."""
@@ -80,7 +85,7 @@ class Answer:
 
 @dataclass(frozen=True, repr=False)
 class Outcome(Answer):
-    """A diagnosis with the fits and readings behind it. It prints as one paragraph.
+    """A diagnosis with the fits and readings behind it. It prints as a dozen lines.
 
     Parameters
     ----------
@@ -99,8 +104,8 @@ class Outcome(Answer):
     >>> found = diagnose_recording(Recording(time_s, angle_rad, "angle_rad"))
     >>> found.verdict
     'consistent'
-    >>> print(str(found)[:33])
-    Eq. 8 describes this recording: t
+    >>> print(str(found)[:18])
+    nothing is missing
     """
 
     search: Search
@@ -333,6 +338,8 @@ def diagnose_decay(
         remainder=found.remainder,
         small_swings=swings,
         provenance=dict(provenance or {}),
+        name=Path(place).name if str(place) != "recording" else "",
+        scanned=tuple((lead.effect.identifier, lead.p_value) for lead in found.detection.leads),
     )
     return Outcome(diagnosis, found, beginning)
 

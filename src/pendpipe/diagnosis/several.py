@@ -29,7 +29,6 @@ from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
 from pendpipe.diagnosis.result import (
-    COLOURED_NOISE,
     FILE_NAME,
     Diagnosis,
     FittedModel,
@@ -40,6 +39,7 @@ from pendpipe.diagnosis.run import LEVEL, Answer, Outcome, diagnose_recording
 from pendpipe.diagnosis.search import LESS_FRICTION, Search, grown
 from pendpipe.diagnosis.state import State, Step, loses_phase, price
 from pendpipe.diagnosis.statement import DOUBTFUL, listed, statement
+from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.diagnosis.task import Task
 from pendpipe.diagnosis.values import constants_of
 from pendpipe.diagnosis.weighing import (
@@ -70,7 +70,7 @@ _MOST_EFFECTS: Final = 4
 
 @dataclass(frozen=True, repr=False)
 class JointOutcome(Answer):
-    """The diagnosis of several recordings of one pendulum. It prints as one paragraph.
+    """The diagnosis of several recordings of one pendulum. It prints as a dozen lines.
 
     Parameters
     ----------
@@ -231,6 +231,7 @@ def diagnose_several(
         ),
         remainder=found.remainder,
         provenance=dict(provenance or {}),
+        name=f"{listed(names)} together",
     )
     return JointOutcome(diagnosis, told, tuple(outcomes))
 

@@ -1,4 +1,4 @@
-"""The answer as one paragraph of plain English that can be copied into a report."""
+"""Everything that was found, in a paragraph: what stands behind the dozen lines of the answer."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from pendpipe.diagnosis.cycles import SmallSwings
 from pendpipe.diagnosis.detect import printed
 from pendpipe.diagnosis.held_out import HeldOut
 from pendpipe.diagnosis.remainder import Remainder
-from pendpipe.diagnosis.result import BASELINES, COLOURED_NOISE, FittedModel, FoundEffect
-from pendpipe.effects.catalogue import CATALOGUE, by_identifier
+from pendpipe.diagnosis.result import BASELINES, FittedModel, FoundEffect
+from pendpipe.diagnosis.summary import COLOURED_NOISE, name_of
+from pendpipe.effects.catalogue import CATALOGUE
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, with_error
 
@@ -38,12 +39,6 @@ _MEANINGS = {
     "second-mode": "another part of the apparatus oscillates too",
 }
 """What the names mean that a newcomer may not know."""
-_UNNAMED = {
-    "unnamed-damping": "a loss of unknown form",
-    "unnamed-restoring": "a restoring torque of unknown form",
-    "unnamed-drive": "an unknown drive",
-    "unnamed-measurement": "an unknown error of the sensor",
-}
 _PARAMETERS = {
     "a": "quadratic damping rate a",
     "b": "linear damping rate b",
@@ -151,7 +146,7 @@ def _effect(effect: FoundEffect) -> str:
         lead = f"Instead of a missing effect, one held parameter is wrong: {effect.name}"
     elif max((p for _, p in rivals), default=0.0) > effect.probability:
         # The most probable stands first, also where another was easier to fit.
-        all_ = [(effect.probability, effect.name), *((p, _rival(name)) for name, p in rivals)]
+        all_ = [(effect.probability, effect.name), *((p, name_of(name)) for name, p in rivals)]
         of = [
             f"{name} ({_percent(p)})" for p, name in sorted(all_, reverse=True) if p > _IMPROBABLE
         ]
@@ -185,7 +180,7 @@ def _nameless(effects: Sequence[FoundEffect], *, rest: bool) -> str:
     what = "The rest of the misfit" if rest else "The misfit"
     text = f"{what} has no certain cause; it is described best by {listed(described)}"
     if len(effects) == 1 and first.indistinguishable:
-        others = [_rival(name) for name, _ in first.indistinguishable]
+        others = [name_of(name) for name, _ in first.indistinguishable]
         text += f", and almost as well by {listed(others, 'or')}"
         if max(p for _, p in first.indistinguishable) > first.probability:
             text = f"{what} has no certain cause; any of these describes it: "
@@ -203,8 +198,8 @@ def _numbers(effect: FoundEffect) -> list[str]:
 
 def _rivals(rivals: Sequence[tuple[str, float]]) -> list[str]:
     """What else the recording allows, a sentence for the probable and one for the others."""
-    probable = [f"{_rival(name)} ({_percent(p)})" for name, p in rivals if p > _IMPROBABLE]
-    others = [_rival(name) for name, p in rivals if p <= _IMPROBABLE]
+    probable = [f"{name_of(name)} ({_percent(p)})" for name, p in rivals if p > _IMPROBABLE]
+    others = [name_of(name) for name, p in rivals if p <= _IMPROBABLE]
     said = []
     if probable:
         said.append(f"This recording alone cannot distinguish it from {listed(probable, 'or')}.")
@@ -332,15 +327,6 @@ def _percent(share: float) -> str:
 def _factor(ratio: float) -> str:
     """A ratio to two digits, without a power of ten."""
     return f"{float(f'{ratio:.2g}'):,.0f}" if ratio > 9.95 else f"{ratio:.2g}"
-
-
-def _rival(identifier: str) -> str:
-    """The name behind an identifier."""
-    if identifier in _UNNAMED:
-        return _UNNAMED[identifier]
-    if identifier.startswith("parameter-"):
-        return f"another value of {identifier.removeprefix('parameter-').replace('_', ' ')}"
-    return by_identifier(identifier).name
 
 
 def listed(items: Sequence[str], last: str = "and") -> str:

@@ -236,5 +236,9 @@ def small_period(result: FitResult) -> Estimate:
         whole, *parts = result.period_check
         spread = max((abs(each.seen - whole.seen) for each in parts), default=0.0)
         return Estimate(whole.seen, math.hypot(whole.seen_sd, spread), "s")
-    frequency = result.parameters["frequency"]
+    return period_of_frequency(result.parameters["frequency"])
+
+
+def period_of_frequency(frequency: Estimate) -> Estimate:
+    """Return 1/f, s."""
     return Estimate(1.0 / frequency.value, frequency.sd / frequency.value**2, "s")

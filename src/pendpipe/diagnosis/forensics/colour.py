@@ -18,8 +18,9 @@ from pendpipe.diagnosis.forensics.local import residual_of
 from pendpipe.diagnosis.forensics.tails import tail_of_squares, upper_tail
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import COLOURED_NOISE, Finding, Location, nothing
+from pendpipe.diagnosis.result import Finding, Location, nothing
 from pendpipe.diagnosis.scores import tangent_basis
+from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, compact
 

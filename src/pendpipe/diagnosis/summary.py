@@ -1,0 +1,539 @@
+"""The answer in a dozen lines: what is missing, how much it matters, and what to quote.
+
+A name is given from a probability of one half on, its class counted together; from a fifth on
+it stands in one line of candidates. Everything below is in the details.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from pendpipe.analysis.fit.printed import short_size
+from pendpipe.analysis.fit.quality import period_of_frequency, seen_qualities
+from pendpipe.effects.catalogue import by_identifier
+from pendpipe.estimate import Estimate
+from pendpipe.quantities import compact, in_columns, with_error
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.result import Diagnosis, FoundEffect
+
+NAMED: Final = 0.5
+"""Probability from which a cause is named, its class counted together."""
+CANDIDATE: Final = 0.2
+"""Probability from which it is a candidate."""
+_MOVED: Final = 2.0
+"""Standard deviations from which a number is said to move."""
+_SURE: Final = 0.95
+"""Probability from which a name without rivals needs no further measurement."""
+_SHOWN: Final = 4
+"""Of what was looked for."""
+_KNOWN: Final = 2.0
+"""Standard deviations from which a parameter of an effect is printed."""
+COLOURED_NOISE: Final = "coloured-noise"
+"""What is reported of the noise, and is nothing that a model lacks."""
+UNNAMED: Final = {
+    "unnamed-damping": "a loss of unknown form",
+    "unnamed-restoring": "a restoring torque of unknown form",
+    "unnamed-drive": "an unknown drive",
+    "unnamed-measurement": "an unknown error of the sensor",
+}
+_WORDS: Final = {
+    "k3": "cubic stiffness",
+    "k2": "quadratic stiffness",
+    "c": "friction",
+    "a": "drag",
+    "d": "size",
+    "rate": "rate",
+    "tau": "time constant",
+    "time": "at",
+    "f_2": "frequency",
+    "f_d": "frequency",
+    "f_a": "frequency",
+    "f_h": "frequency",
+    "tau_2": "damping time",
+    "detuning": "detuning",
+    "J": "jump",
+    "s": "jump",
+    "change": "relative change",
+    "dv": "change of velocity",
+    "step": "step",
+    "number": "number",
+    "rms": "rms",
+    "dt": "step of time",
+    "sigma_t": "jitter",
+    "y_c": "critical amplitude",
+    "s2": "quadratic term",
+    "s3": "cubic term",
+    "b": "play",
+    "exponent": "exponent",
+    "gamma": "extra damping",
+    "kappa": "coefficient",
+}
+"""What the parameters of the effects are, in words; the others are in the details."""
+_WHERE: Final = {
+    "offset": "the offset",
+    "amplitude": "the amplitude",
+    "phase": "the phase",
+    "harmonics": "the higher harmonics",
+    "between": "frequencies between the harmonics",
+}
+_LOOKED_FOR: Final = (
+    *("second-mode", "plane-coupling", "frequency-drift", "damping-drift", "sensor-cubic"),
+    *("offset-drift", "clock-drift", "stribeck-friction", "impulse", "cubic-stiffness"),
+)
+"""What readers ask after first."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """One number as fitted, and with what is missing.
+
+    Parameters
+    ----------
+    quantity
+        ``"period"``, ``"a"``, ``"b"``, ``"c"``, or ``"Q"``.
+    fitted, with_missing
+        The baseline's, and that of the model with what was found; of Q what the turning points
+        show, which holds whatever is missing.
+    amplitude_rad, unit
+        Of Q.
+    """
+
+    quantity: str
+    fitted: Estimate
+    with_missing: Estimate
+    amplitude_rad: float | None = None
+    unit: str = "rad"
+
+    @property
+    def moved_sd(self) -> float:
+        """By how many standard deviations it moves."""
+        sd = math.hypot(self.fitted.sd, self.with_missing.sd)
+        off = abs(self.fitted.value - self.with_missing.value)
+        return off / sd if sd > 0.0 else (math.inf if off else 0.0)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return its form in JSON."""
+        return {
+            "quantity": self.quantity,
+            "amplitude_rad": self.amplitude_rad,
+            "fitted": self.fitted.as_json(),
+            "with_missing": self.with_missing.as_json(),
+            "moved_sd": self.moved_sd,
+        }
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The answer of a diagnosis.
+
+    Parameters
+    ----------
+    headline
+        What is missing, in a line.
+    missing
+        Names of the causes, or of classes whose members can't be told apart.
+    matters
+        How much it matters, a clause.
+    consequence
+        The same as numbers.
+    where, certainty
+        Clauses.
+    candidates, excluded
+        What may be missing, and what was looked for and is not it.
+    decide_by
+        The one measurement that decides.
+    quote
+        What can be quoted.
+    sentence
+        To copy.
+    """
+
+    headline: str
+    missing: tuple[str, ...] = ()
+    matters: str = ""
+    consequence: tuple[Change, ...] = ()
+    where: str = ""
+    certainty: str = ""
+    candidates: str = ""
+    excluded: tuple[str, ...] = ()
+    decide_by: str = ""
+    quote: str = ""
+    sentence: str = ""
+
+    def pairs(self) -> list[tuple[str, str]]:
+        """Return what is known, a title and a clause each, as it is printed."""
+        looked = ", ".join(self.excluded[:_SHOWN])
+        more = len(self.excluded) - _SHOWN
+        pairs = (
+            ("how much it matters", self.matters),
+            ("where", self.where),
+            ("sure", self.certainty),
+            ("candidates", self.candidates),
+            ("looked for and not it", looked + (f" ({more} more: -v)" if more > 0 else "")),
+            ("decide by", self.decide_by),
+            ("quote", self.quote),
+        )
+        return [(title, value) for title, value in pairs if value]
+
+    def lines(self, name: str = "") -> list[str]:
+        """Return the answer as it is printed, a dozen lines at most."""
+        return [
+            f"{name}: {self.headline}" if name else self.headline,
+            *(f"  {title:<22}{value}" for title, value in self.pairs()),
+            *(f"  {row}" for row in self.table().splitlines()),
+            *([f"Copy: {self.sentence}"] if self.sentence else []),
+        ]
+
+    def table(self) -> str:
+        """Return *as fitted* and *with what is missing* side by side."""
+        if not self.consequence:
+            return ""
+        heads, old, new = [""], ["as fitted"], ["with what is missing"]
+        for each in self.consequence:
+            unit = each.fitted.unit
+            heads.append(_title(each))
+            old.append(_short(each.fitted, unit))
+            new.append(_short(each.with_missing, unit))
+        return in_columns([heads, old, new])
+
+    def rows(self) -> list[tuple[str, str, str]]:
+        """Return the table as rows: quantity, as fitted, with what is missing."""
+        return [
+            (
+                _title(each),
+                _short(each.fitted, each.fitted.unit),
+                _short(each.with_missing, each.fitted.unit),
+            )
+            for each in self.consequence
+        ]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return ``summary`` of ``diagnosis.json``."""
+        return {
+            "headline": self.headline,
+            "missing": list(self.missing),
+            "matters": self.matters,
+            "consequence": [each.as_json() for each in self.consequence],
+            "where": self.where,
+            "certainty": self.certainty,
+            "candidates": self.candidates,
+            "excluded": list(self.excluded),
+            "decide_by": self.decide_by,
+            "quote": self.quote,
+            "sentence": self.sentence,
+        }
+
+
+def _title(change: Change) -> str:
+    if change.amplitude_rad is None:
+        return {"period": "T0"}.get(change.quantity, change.quantity)
+    return f"Q at {short_size(change.amplitude_rad, change.unit)}"
+
+
+def _short(estimate: Estimate, unit: str) -> str:
+    if estimate.value == 0.0 or (estimate.at_bound and estimate.bounds95[1] > 0.0):
+        return f"< {with_error(float(f'{estimate.bounds95[1]:.2g}'), None, unit)}"
+    if not abs(estimate.value) > estimate.sd:
+        high = max(map(abs, estimate.bounds95))
+        return f"< {with_error(float(f'{high:.2g}'), None, unit)}"
+    return with_error(estimate.value, estimate.sd, unit, short=True)
+
+
+def summarise(diagnosis: Diagnosis) -> Summary:
+    """Make the answer of a diagnosis."""
+    presumed = _presumed(diagnosis)
+    found = [each for each in diagnosis.missing if each.identifier != COLOURED_NOISE]
+    if not found:
+        beyond = f" beyond {presumed}, which is fitted" if presumed else ""
+        noise = any(each.identifier == COLOURED_NOISE for each in diagnosis.effects)
+        p = _p(diagnosis.unexplained_p_value)
+        coloured = "; its noise is coloured" if noise else ""
+        wanders = any("the zero wanders" in note for note in diagnosis.warnings)
+        zero = "; its zero wanders" if wanders else ""
+        return Summary(f"nothing is missing{beyond} ({p}){coloured}{zero}")
+    contradicting = [
+        each.name
+        for each in found
+        if each.kind == "parameter" and not each.identifier.startswith("parameter-")
+    ]
+    named = [word for each in found if (word := _named(each))]
+    candidates = [_candidate(each) for each in found if not _named(each)]
+    candidates = [each for each in candidates if each]
+    names = (*contradicting, *(word for word in named if word not in contradicting))
+    changes = _changes(diagnosis)
+    rest = diagnosis.remainder is not None and diagnosis.remainder.systematic
+    if names:
+        headline = f"missing: {'; '.join(names)}"
+        headline += ", and a rest of unknown cause" if rest or len(named) < len(found) else ""
+    else:
+        headline = "something is missing, its cause is NOT known"
+    unit = _unit(diagnosis)
+    return Summary(
+        headline,
+        names,
+        _matters(diagnosis, changes, unit),
+        changes,
+        _where(diagnosis, found),
+        _certainty(diagnosis, named, rest=rest),
+        "; ".join(candidates) or ("none above 20 %" if not names else ""),
+        _excluded(diagnosis, found),
+        _decide_by(found),
+        _quote(diagnosis, changes),
+        _sentence(diagnosis, names, presumed),
+    )
+
+
+def _unit(diagnosis: Diagnosis) -> str:
+    amplitude = diagnosis.baseline.parameters.get("amplitude")
+    return "rad" if amplitude is None else amplitude.unit
+
+
+def _presumed(diagnosis: Diagnosis) -> str:
+    words = {"circular-error": "sin x", "drag-form": "drag v|v|"}
+    names = [words.get(each.identifier, each.name) for each in diagnosis.effects if each.presumed]
+    return " and ".join(names)
+
+
+def _class(effect: FoundEffect) -> list[tuple[float, str]]:
+    """The members of an effect's class with their names, the most probable first."""
+    rivals = [(p, name_of(identifier)) for identifier, p in effect.indistinguishable]
+    own = effect.name if effect.kind != "unnamed" else name_of(effect.identifier)
+    return sorted([(effect.probability, own), *rivals], reverse=True)
+
+
+def _named(effect: FoundEffect) -> str:
+    """Name a cause, or its class, that is more likely than not; nothing otherwise."""
+    members = _class(effect)
+    if effect.kind == "unnamed" and effect.probability >= NAMED:
+        return ""
+    if members[0][0] >= NAMED:
+        text = members[0][1]
+        return f"{text} ({numbers})" if (numbers := numbers_of(effect)) else text
+    total = sum(p for p, _ in members)
+    if total < NAMED:
+        return ""
+    likely = [name for p, name in members if p >= 0.05]
+    return f"{' or '.join(likely)} ({_percent(min(total, 1.0))} together)"
+
+
+def _candidate(effect: FoundEffect) -> str:
+    members = _class(effect)
+    if effect.kind == "unnamed" and effect.probability >= NAMED:
+        return f"described by {effect.name}"
+    likely = [f"{name} ({_percent(p)})" for p, name in members if p >= CANDIDATE]
+    return " or ".join(likely)
+
+
+def numbers_of(effect: FoundEffect) -> str:
+    """Print the parameters of an effect in words, with units, where they differ from zero."""
+    found = dict(effect.parameters)
+    said = []
+    for name in list(found):
+        if name.endswith("_cosine") and (other := name.replace("_cosine", "_sine")) in found:
+            cosine, sine = found.pop(name), found.pop(other)
+            value = math.hypot(cosine.value, sine.value)
+            sd = (
+                math.hypot(cosine.sd * cosine.value, sine.sd * sine.value) / value if value else 0.0
+            )
+            found["_amplitude"] = Estimate(value, sd, cosine.unit)
+    for name, each in found.items():
+        word = "amplitude" if name == "_amplitude" else _WORDS.get(name)
+        if word and each.sd > 0.0 and abs(each.value) > _KNOWN * each.sd:
+            said.append(f"{word} {with_error(each.value, each.sd, each.unit, short=True)}")
+    return ", ".join(said[:3])
+
+
+def name_of(identifier: str) -> str:
+    """Return the name behind an identifier."""
+    if identifier in UNNAMED:
+        return UNNAMED[identifier]
+    if identifier.startswith("parameter-"):
+        return f"another value of {identifier.removeprefix('parameter-').replace('_', ' ')}"
+    return by_identifier(identifier).name
+
+
+def _changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
+    """Compare the numbers of both models, and Q with that of the turning points."""
+    before, after = diagnosis.baseline.parameters, diagnosis.improved.parameters
+    found = []
+    if "frequency" in before and "frequency" in after:
+        found.append(
+            Change(
+                "period",
+                period_of_frequency(before["frequency"]),
+                period_of_frequency(after["frequency"]),
+            )
+        )
+    found += [
+        Change(name, before[name], after[name])
+        for name in "abc"
+        if name in before and name in after
+    ]
+    fit = diagnosis.fit
+    if fit is not None and fit.light != "red":
+        seen = {each.amplitude_rad: each.quality_factor for each in seen_qualities(fit)}
+        found += [
+            Change(
+                "Q",
+                each.quality_factor,
+                seen[each.amplitude_rad],
+                each.amplitude_rad,
+                _unit(diagnosis),
+            )
+            for each in fit.quality_factors
+            if each.amplitude_rad in seen
+        ]
+    return tuple(found)
+
+
+def _matters(diagnosis: Diagnosis, changes: Sequence[Change], unit: str) -> str:
+    """Say how large the misfit is, and which numbers it moves."""
+    left = compact(diagnosis.baseline.residual_rms_rad, unit)
+    noise = compact(diagnosis.noise_rms_rad, unit)
+    moved = [each for each in changes if each.quantity != "Q" and each.moved_sd > _MOVED]
+    words = [
+        f"{_title(each)} {_like(each.fitted, each.with_missing)} →"
+        f" {_short(each.with_missing, each.fitted.unit)}"
+        for each in moved
+    ]
+    what = ", ".join(words) if words else "it moves no number by two standard deviations"
+    return f"the fit misses the readings by {left} (noise {noise}): {what}"
+
+
+def _like(old: Estimate, new: Estimate) -> str:
+    """A value with the digits of another's error."""
+    if old.value == 0.0:
+        return "0"
+    value = with_error(old.value, new.sd or old.sd).strip("(")
+    return value.partition(" ± ")[0]
+
+
+def _where(diagnosis: Diagnosis, found: Sequence[FoundEffect]) -> str:
+    """Say where the most probable effect shows, and where the rest lies."""
+    first = max(found, key=lambda each: each.probability)
+    text = first.location.summary.removeprefix("it shows ").removeprefix("It shows ")
+    remainder = diagnosis.remainder
+    if remainder is not None and remainder.systematic and remainder.shares:
+        name, share = max(remainder.shares.items(), key=lambda item: item[1])
+        text += f"; what is left lies in {_WHERE[name]} ({_percent(share)})"
+    return text
+
+
+def _certainty(diagnosis: Diagnosis, named: Sequence[str], *, rest: bool) -> str:
+    sure = [
+        f"{_class(each)[0][1]} {_percent(_class(each)[0][0])}"
+        for each in diagnosis.missing
+        if _class(each)[0][0] >= NAMED and each.kind != "unnamed"
+    ]
+    text = ", ".join(sure) if sure else "nothing above 50 %" if not named else ""
+    held = diagnosis.held_out
+    if held is not None and math.isfinite(held.gain):
+        well = held.better if held.gain >= 0.0 else held.blocks - held.better
+        word = "better" if held.gain >= 0.0 else "WORSE"
+        predicted = (
+            f"cycles left out of the fit are predicted {word} in {well} of {held.blocks} parts"
+        )
+        text = f"{text}; {predicted}" if text else predicted
+    if rest and diagnosis.remainder is not None:
+        text += f"; what is left is {_factor(diagnosis.remainder.over_noise)} times the noise"
+    return text or "see candidates"
+
+
+def _excluded(diagnosis: Diagnosis, found: Sequence[FoundEffect]) -> tuple[str, ...]:
+    """Names of what was looked for and not added, those that readers ask after first."""
+    suspected = {each.identifier for each in found}
+    suspected |= {rival for each in found for rival, _ in each.indistinguishable}
+    suspected |= {each.identifier for each in diagnosis.effects}
+    left = [identifier for identifier, _ in diagnosis.scanned if identifier not in suspected]
+    first = [each for each in _LOOKED_FOR if each in left]
+    return tuple(name_of(each) for each in (*first, *(x for x in left if x not in first)))
+
+
+def _decide_by(found: Sequence[FoundEffect]) -> str:
+    """The test of what is least sure among the named, or of the first candidate."""
+    doubted = [
+        each
+        for each in found
+        if each.probability < _SURE or any(p > 1.0 - _SURE for _, p in each.indistinguishable)
+    ]
+    if not doubted:
+        return ""
+    open_to_doubt = max(doubted, key=lambda each: (each.kind != "unnamed", each.probability))
+    return open_to_doubt.discriminating_test
+
+
+def _quote(diagnosis: Diagnosis, changes: Sequence[Change]) -> str:
+    """What can be quoted: Q of the turning points, T0 of the better model, a, b, c that stay."""
+    fit, said = diagnosis.fit, []
+    unit = _unit(diagnosis)
+    period = next((each for each in changes if each.quantity == "period"), None)
+    if period is not None:
+        better = period.with_missing
+        said.append(f"T0 {with_error(better.value, better.sd, 's', short=True)}")
+    if fit is not None:
+        seen = [
+            each
+            for each in seen_qualities(fit)
+            if each.quality_factor.sd < 0.1 * each.quality_factor.value
+        ]
+        if seen:
+            ends = seen if len(seen) < 3 else [seen[0], seen[-1]]
+            values = ", ".join(
+                f"{with_error(e.quality_factor.value, e.quality_factor.sd, short=True)} at"
+                f" {short_size(e.amplitude_rad, unit)}"
+                for e in ends
+            )
+            said.append(f"Q {values} (they need no law)")
+    moved = [each.quantity for each in changes if each.quantity in "abc" and each.moved_sd > _MOVED]
+    if moved:
+        said.append(f"not {', '.join(moved)}")
+    return "; ".join(said)
+
+
+def _sentence(diagnosis: Diagnosis, names: Sequence[str], presumed: str) -> str:
+    model = {"eq8": "Eq. 8", "viscous": "Eq. 3"}.get(
+        diagnosis.baseline_name, diagnosis.baseline_name
+    )
+    model += f" with {presumed}" if presumed else ""
+    p = _p(diagnosis.p_value)
+    if not names:
+        return f"“{model} does not describe this recording ({p}); the cause was not identified.”"
+    return f"“{model} does not describe this recording ({p}): it lacks {' and '.join(names)}.”"
+
+
+def _p(p_value: float) -> str:
+    return "p < 1e-12" if p_value < 1e-12 else f"p = {p_value:.2g}"
+
+
+def _percent(share: float) -> str:
+    if share > 0.995:
+        return "> 99 %"
+    return f"{100.0 * share:.0f} %" if share >= 0.01 else "< 1 %"
+
+
+def _factor(ratio: float) -> str:
+    return f"{float(f'{ratio:.2g}'):,.0f}" if ratio > 9.95 else f"{ratio:.2g}"
+
+
+def html_of(summary: Summary, name: str = "") -> str:
+    """Return the answer for a notebook or a page: a list of what is known, and a table."""
+    from html import escape
+
+    title = f"{name}: {summary.headline}" if name else summary.headline
+    parts = [f"<p><strong>{escape(title)}</strong></p>"]
+    if pairs := summary.pairs():
+        cells = (f"<dt>{escape(key)}</dt><dd>{escape(value)}</dd>" for key, value in pairs)
+        parts.append(f"<dl>{''.join(cells)}</dl>")
+    if rows := summary.rows():
+        body = "".join(
+            "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+        )
+        heads = "<th></th><th>as fitted</th><th>with what is missing</th>"
+        parts.append(f"<table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>")
+    if summary.sentence:
+        parts.append(f"<p>{escape(summary.sentence)}</p>")
+    return "".join(parts)
