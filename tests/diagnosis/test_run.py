@@ -43,6 +43,12 @@ def test_eq_8_by_the_other_engine_is_consistent_but_for_one_in_a_hundred() -> No
     assert alarms <= binom.ppf(0.999, len(seeds), 0.01)
 
 
+def test_what_lacks_nothing_is_scanned_once() -> None:
+    said: list[str] = []
+    diagnose_recording(recording("null", 1), progress=said.append)
+    assert sum(line.startswith("scanning") for line in said) == 1
+
+
 @pytest.mark.parametrize("seed", range(1, 5))
 def test_the_verdict_is_that_of_the_p_value_and_the_noise_is_that_put_in(seed: int) -> None:
     found = diagnosed("null", seed).diagnosis

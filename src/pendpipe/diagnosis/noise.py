@@ -160,19 +160,27 @@ class Noise:
         mean = math.sqrt(float(np.mean(self.variance)))
         return np.full(len(self.variance), mean) if self.level is None else mean * self.level
 
-    def log_scale_variance(self, rows: FloatArray) -> FloatArray:
+    def log_scale_variance(self, rows: FloatArray, chosen: IntArray | None = None) -> FloatArray:
         """Return the variance of the logarithm of the noise that unit columns meet.
 
         Parameters
         ----------
         rows
             Whitened columns of unit length, shape (k, n or more).
+        chosen
+            The cosines that stand in the columns, where these are cosines and not all of them.
         """
         if not len(self.starts):
             return np.zeros(len(rows))
-        rows = rows[:, : len(self.variance)]
-        rows = rows if self.coloured else dct(rows, norm="ortho")
-        energy = np.add.reduceat(rows**2, self.starts, axis=1)
+        if chosen is not None:
+            power = rows[:, : len(chosen)] ** 2
+            sums = np.cumsum(np.pad(power, ((0, 0), (1, 0))), axis=1, dtype=np.float64)
+            edges = np.searchsorted(chosen, [*self.starts, len(self.variance)])
+            energy = np.diff(sums[:, edges], axis=1)
+        else:
+            rows = rows[:, : len(self.variance)]
+            rows = rows if self.coloured else dct(rows, norm="ortho")
+            energy = np.add.reduceat(rows**2, self.starts, axis=1)
         return np.asarray(np.einsum("km,mn,kn->k", energy, self.uncertainty, energy, optimize=True))
 
     def misfit(self, residual: FloatArray) -> float:

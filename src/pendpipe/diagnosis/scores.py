@@ -8,13 +8,14 @@ effect's shape is many such columns.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import dct
 from scipy.special import betainc, chdtrc
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, pulled
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
@@ -31,6 +32,12 @@ _RESOLVED_SD = 4.0
 
 
 _COLUMNS_AT_ONCE = 32
+_NUMBERS_AT_ONCE = 1 << 22
+_MANY = 16_000
+"""Readings from which on the cosines about the harmonics are asked alone."""
+_HARMONICS = 12
+_BESIDE_HARMONIC = 1.0 / 16.0
+"""Half width of their bands, over the motion's frequency: in so many readings 40 cosines."""
 _KNOWN = 1e-6
 """Variance of ln S below which it is known."""
 
@@ -45,6 +52,54 @@ class Candidate(NamedTuple):
 
 
 @dataclass(frozen=True)
+class Bands:
+    """What of a long record is compared: its cosines about the harmonics of the motion.
+
+    What an effect changes varies slowly from cycle to cycle, and so lies there. The cosines of
+    white noise are independent, so that any part of them makes a test as exact as all; and of a
+    thousand cycles an eighth holds all but a hundredth of the fall of chi^2.
+
+    Parameters
+    ----------
+    chosen
+        Which cosines; None for all numbers as they are.
+    cosines
+        Whether whitened readings are cosines already.
+    """
+
+    chosen: IntArray | None
+    cosines: bool
+
+    def of(self, rows: FloatArray) -> FloatArray:
+        """Take them from whitened readings, with the prior's entry behind; (..., n + 1)."""
+        if self.chosen is None:
+            return rows
+        white = rows if self.cosines else dct(rows[..., :-1], norm="ortho")
+        return np.concatenate([white[..., self.chosen], rows[..., -1:]], axis=-1)
+
+
+WHOLE: Final = Bands(None, cosines=False)
+"""Of a record that is not long: all readings."""
+
+
+def bands_of(fit: Fit, noise: Noise) -> Bands:
+    """Choose the cosines of a long record that its effects change."""
+    time, phase = fit.at.sampled.time_s, fit.at.sampled.phase
+    count = len(time)
+    interval = (time[-1] - time[0]) / (count - 1)
+    even = np.abs(time - time[0] - interval * np.arange(count)) < 0.5 * interval
+    if fit.at.parts or count < _MANY or not np.all(even):
+        return WHOLE
+    # Of each frequency that the motion has: over a hundredth of the record each.
+    some = np.linspace(0, count - 1, 101).astype(np.int64)
+    pace = np.abs(np.diff(phase[some]) / np.diff(some)) / np.pi
+    cosine, beside = np.arange(count) / count, _BESIDE_HARMONIC * pace.max()
+    order = np.arange(_HARMONICS + 1)[:, None]
+    near = (cosine > order * pace.min() - beside) & (cosine < order * pace.max() + beside)
+    return Bands(np.flatnonzero(near.any(axis=0)), noise.coloured)
+
+
+@dataclass(frozen=True)
 class Bank:
     """Unit columns of all candidates, orthogonal to the model's tangent space.
 
@@ -53,24 +108,27 @@ class Bank:
     basis
         Orthonormal, of the model's tangent space, shape (n + 1, p).
     columns
-        Shape (n + 1, k), float32: a candidate's columns are orthonormal among themselves.
+        Shape (m, k), float32: a candidate's columns are orthonormal among themselves.
     candidates
         The effects and shapes to which the columns belong.
     log_scale_variance
         Variance of the logarithm of the noise that each candidate meets, shape (candidates,).
+    bands
+        The m of the n + 1 whitened numbers that are compared.
     """
 
     basis: FloatArray
     columns: NDArray[np.float32]
     candidates: tuple[Candidate, ...]
     log_scale_variance: FloatArray
+    bands: Bands = WHOLE
 
     def scores(self, residual: FloatArray) -> FloatArray:
         """Return the sum of squares of each candidate's inner products; shape (candidates, ...).
 
         A size that can't be negative (a friction) scores with a positive sign only.
         """
-        products = self.columns.T @ residual.astype(np.float32)
+        products = self.columns.T @ self.bands.of(residual.T).T.astype(np.float32)
         signed = [c.first for c in self.candidates if c.effect.one_sided]
         products[signed] = np.maximum(products[signed], 0.0)
         squares = products.astype(np.float64) ** 2
@@ -100,7 +158,11 @@ def tangent_basis(fit: Fit) -> FloatArray:
     Values at a bound are included, unless the readings pull them far beyond it.
     """
     known = pulled(fit)
-    part = fit.jacobian[:, [index for index in fit.free if index not in known]]
+    return _span(fit.jacobian[:, [index for index in fit.free if index not in known]])
+
+
+def _span(part: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of the space that columns span."""
     scale = np.linalg.norm(part, axis=0)
     scale[scale == 0.0] = 1.0
     left, small = np.linalg.qr(part / scale)
@@ -111,28 +173,35 @@ def tangent_basis(fit: Fit) -> FloatArray:
 def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
     """Compute the columns of all effects along a fitted motion.
 
-    A few shapes at a time, stored in single precision: in double precision a long record would
-    take hundreds of megabytes.
+    A few shapes at a time, stored in single precision, and of a long record the bands that they
+    change: in double precision and whole it would take gigabytes.
     """
     shapes = [_shapes(effect, fit.at.span) for effect in effects]
     most = sum(max(e.sizes, 1) * len(rows) for e, rows in zip(effects, shapes, strict=True))
-    basis, filled = tangent_basis(fit), 0
-    columns = np.empty((most, len(basis)), dtype=np.float32)
+    basis, bands, filled = tangent_basis(fit), bands_of(fit, noise), 0
+    known = basis if bands.chosen is None else _span(bands.of(basis.T).T)
+    columns = np.empty((most, len(known)), dtype=np.float32)
     candidates, unsure = [], [np.zeros(0)]
+    at_once = max(min(_COLUMNS_AT_ONCE, _NUMBERS_AT_ONCE // len(basis)), 1)
     for effect, rows in zip(effects, shapes, strict=True):
-        some = max(_COLUMNS_AT_ONCE // max(effect.sizes, 1), 1)
+        some = max(at_once // max(effect.sizes, 1), 1)
+        if isinstance(effect, Curve):
+            some = len(rows)
         for first in range(0, len(rows), some):
             part = rows[first : first + some]
-            seen, own, units = _beside(basis, effect, part, whitened(fit, noise, effect, part))
+            seen, own, units = _beside(
+                known, effect, part, whitened(fit, noise, effect, part, bands)
+            )
             if not own:
                 continue
-            flat = units.reshape(-1, len(basis))
+            flat = units.reshape(-1, len(known))
             columns[filled : filled + len(flat)] = flat
-            unsure.append(noise.log_scale_variance(flat).reshape(units.shape[:2]).mean(axis=1))
+            each = noise.log_scale_variance(flat, bands.chosen)
+            unsure.append(each.reshape(units.shape[:2]).mean(axis=1))
             for shape in own:
                 candidates.append(Candidate(seen, shape, filled, units.shape[1]))
                 filled += units.shape[1]
-    return Bank(basis, columns[:filled].T, tuple(candidates), np.concatenate(unsure))
+    return Bank(basis, columns[:filled].T, tuple(candidates), np.concatenate(unsure), bands)
 
 
 def _beside(
@@ -152,16 +221,35 @@ def _beside(
         Those of which something is seen, and their orthonormal columns, shape (shapes, width,
         n + 1).
     """
-    left = columns - (columns @ basis) @ basis.T
     least = _VISIBLE * np.linalg.norm(columns, axis=1)
+    left = columns
+    left -= (columns @ basis) @ basis.T
     if isinstance(effect, Curve):
         effect, left = _visible(effect, left)
         least = np.zeros(len(left))
-    unit, mixing = np.linalg.qr(left.reshape(len(shapes), -1, len(basis)).transpose(0, 2, 1))
-    lengths = np.diagonal(mixing, axis1=1, axis2=2)
-    rows = np.swapaxes(unit * np.sign(lengths)[:, None], 1, 2).astype(np.float32)
-    seen = np.all(np.abs(lengths) > least.reshape(lengths.shape), axis=1) & (lengths.size > 0)
+    rows, lengths = _orthonormal(left.reshape(len(shapes), -1, len(basis)))
+    seen = np.all(lengths > least.reshape(lengths.shape), axis=1) & (lengths.size > 0)
     return effect, [shapes[k] for k in np.flatnonzero(seen).tolist()], rows[seen]
+
+
+def _orthonormal(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Make each shape's columns orthonormal in their order (Gram and Schmidt), in place.
+
+    Returns
+    -------
+    units, lengths
+        Shape (shapes, width, n + 1), and what of each column is left beside those before it,
+        shape (shapes, width).
+    """
+    lengths = np.zeros(columns.shape[:2])
+    for place in range(columns.shape[1]):
+        own, before = columns[:, place], columns[:, :place]
+        # Twice is enough (Kahan).
+        for _ in range(2 if place else 0):
+            own -= np.matmul(np.matmul(before, own[..., None])[:, None, :, 0], before)[:, 0]
+        lengths[:, place] = np.linalg.norm(own, axis=1)
+        own /= np.where(lengths[:, place] > 0.0, lengths[:, place], 1.0)[:, None]
+    return columns, lengths
 
 
 def _shapes(effect: Effect, span: Span) -> list[tuple[float, ...]]:
@@ -171,11 +259,15 @@ def _shapes(effect: Effect, span: Span) -> list[tuple[float, ...]]:
 
 
 def whitened(
-    fit: Fit, noise: Noise, effect: Effect, shapes: Sequence[Sequence[float]]
+    fit: Fit,
+    noise: Noise,
+    effect: Effect,
+    shapes: Sequence[Sequence[float]],
+    bands: Bands = WHOLE,
 ) -> FloatArray:
-    """Derivatives of the whitened readings by each size of each shape, shape (columns, n + 1)."""
+    """Derivatives of the whitened readings (in bands) by each size of each shape, (columns, m)."""
     if isinstance(effect, ReleasedParameter):
-        return effect.sensitivity(fit)[None]
+        return bands.of(effect.sensitivity(fit)[None])
     small = effect.small(fit.at.span)
     changes = [_sizes(effect, shape, k, small) for shape in shapes for k in range(effect.sizes)]
     raw = responses(effect, changes, fit.at, fit.model.pendulum(fit.value))
@@ -183,7 +275,7 @@ def whitened(
     raw[~np.isfinite(raw.sum(axis=1))] = 0.0
     rows = np.zeros((len(raw), len(fit.jacobian)))
     rows[:, :-1] = noise.whiten(raw.T).T
-    return rows
+    return bands.of(rows)
 
 
 def _sizes(

@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from pendpipe.analysis.fit.result import Baseline, units
-from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data
@@ -352,7 +352,11 @@ class StackedNoise(Noise):
         """Standard deviation of each reading."""
         return np.concatenate([noise.sd for noise in self.alone])
 
-    def log_scale_variance(self, rows: FloatArray) -> FloatArray:
+    def log_scale_variance(
+        self,
+        rows: FloatArray,
+        chosen: IntArray | None = None,  # noqa: ARG002
+    ) -> FloatArray:
         """Return the variance of the logarithm of the noise that unit columns meet."""
         parts = split(rows[:, : len(self.variance)].T, self.alone)
         pairs = zip(self.alone, parts, strict=True)

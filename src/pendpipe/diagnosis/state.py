@@ -17,6 +17,7 @@ from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import INCOMPLETE
 from pendpipe.diagnosis.result import Finding
+from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
 
 CHOICE: Final = 7.4
@@ -101,6 +102,8 @@ class State:
         Indices of values that are not fitted.
     bare
         The values of the baseline fitted alone.
+    scanned
+        Fit, data and noise of the last scan (`now`), and the effects that it asked.
     """
 
     fit: Fit
@@ -112,6 +115,7 @@ class State:
     faults: list[Fault] = field(default_factory=list)
     first: Detection | None = None
     now: Detection | None = None
+    scanned: tuple[Fit, Data, Noise, list[Effect]] | None = None
 
     def settle(self, fit: Fit, data: Data | None = None, noise: Noise | None = None) -> None:
         """Accept a new fit, and estimate the noise from it."""

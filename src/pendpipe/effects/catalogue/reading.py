@@ -53,7 +53,7 @@ def sensor_quadratic(sampled: Sampled, pendulum: Pendulum, s2: float) -> FloatAr
 )
 def sensor_cubic(sampled: Sampled, pendulum: Pendulum, s3: float) -> FloatArray:
     """y = x + s_3 x^3: third harmonic s_3 y^3/4 in phase, and no change of the frequency."""
-    return np.asarray(s3 * sampled.angle**3)
+    return np.asarray(s3 * sampled.angle**2 * sampled.angle)
 
 
 @enters(
