@@ -45,7 +45,7 @@ def test_eq_8_by_the_other_engine_is_consistent_but_for_one_in_a_hundred() -> No
 
 def test_what_lacks_nothing_is_scanned_once() -> None:
     said: list[str] = []
-    diagnose_recording(recording("null", 1), progress=said.append)
+    diagnose_recording(recording(other_engine(TRUTH), 1), progress=said.append)
     assert sum(line.startswith("scanning") for line in said) == 1
 
 
