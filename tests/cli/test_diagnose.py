@@ -14,6 +14,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pendpipe import cli
+from pendpipe.files import write_json
 from pendpipe.recording import Recording, write_plain
 
 FREQUENCY_HZ, LINEAR = 0.9, 0.012
@@ -80,6 +81,7 @@ EFFECT = {
     "id",
     "name",
     "kind",
+    "presumed",
     "equation",
     "parameters",
     "delta_chi2",
@@ -142,7 +144,7 @@ def test_a_recording_that_equation_8_describes_is_consistent(
     found = content["baseline"]["parameters"]
     assert abs(found["frequency"]["value"] - FREQUENCY_HZ) < 5 * found["frequency"]["sd"]
     assert set(found) == {"a", "b", "c", "frequency", "amplitude", "phase", "offset"}
-    assert said.out.strip() == content["statement"]
+    assert said.out.strip() == f"{linear.name}: {content['statement']}"
     assert "fitting" in said.err
     assert "scanning" in said.err
 
@@ -254,7 +256,7 @@ def test_a_parameter_that_cannot_be_held_is_a_usage_fault(
 def test_a_refused_record_of_a_campaign_gets_all_its_files(tmp_path: Path) -> None:
     """Snakemake waits for every declared figure, whatever became of the record."""
     refused = tmp_path / "refused.json"
-    refused.write_text(json.dumps({"record": "r", "stage": "acquire", "reason": "no decay"}))
+    write_json(refused, {"record": "r", "stage": "acquire", "reason": "no decay"})
     words = ["--out", str(tmp_path), "--record", "r", "--refused", str(refused)]
     assert cli.main(["diagnose", str(tmp_path / "none.csv"), *words]) == 0
     content = diagnosis(tmp_path)
@@ -273,7 +275,7 @@ def test_what_snakemake_deletes_after_a_kill_is_no_damage(tmp_path: Path) -> Non
     from pendpipe.manifest import read_manifest
 
     refused = tmp_path / "refused.json"
-    refused.write_text(json.dumps({"record": "r", "stage": "acquire", "reason": "no decay"}))
+    write_json(refused, {"record": "r", "stage": "acquire", "reason": "no decay"})
     words = ["--out", str(tmp_path / "diagnosis"), "--record", "r", "--refused", str(refused)]
     assert cli.main(["diagnose", str(tmp_path / "none.csv"), *words]) == 0
     for name in ("diagnosis.json", *(f"{name}.svg" for name in OF_EVERY_DIAGNOSIS)):

@@ -30,6 +30,7 @@ from pendpipe.arguments import (
 )
 from pendpipe.diagnosis.result import FILE_NAME, not_analysable
 from pendpipe.diagnosis.run import Outcome, diagnose_decay, diagnose_recording
+from pendpipe.diagnosis.statement import listed
 from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
 from pendpipe.files import check_output, distinct_names, make_folder, write_json, write_whole
@@ -166,17 +167,19 @@ def _diagnose(arguments: Arguments, fixed: dict[str, float]) -> int:
     if arguments.verbose:
         for warning in content["warnings"]:
             tell(f"{arguments.file}: {warning}")
-    print_answer(arguments, content, _answer(arguments, content))
+    name = "standard input" if arguments.file == "-" else Path(arguments.file).name
+    print_answer(arguments, content, _answer(arguments, content, name))
     return FOUND if arguments.fail_on == content["verdict"] else 0
 
 
-def _answer(arguments: Arguments, content: Mapping[str, Any]) -> str:
+def _answer(arguments: Arguments, content: Mapping[str, Any], name: str) -> str:
     """Return the dozen lines; with ``--verbose`` all that was found behind them."""
+    statement = f"{name}: {content['statement']}"
     if not arguments.verbose:
-        return str(content["statement"])
+        return statement
     excluded = "; ".join(f"{each['id']} {each['p_value']:.2g}" for each in content["excluded"])
     looked = [f"Looked for, with p-values: {excluded}."] if excluded else []
-    return "\n".join([content["statement"], "", content["details"], *looked])
+    return "\n".join([statement, "", content["details"], *looked])
 
 
 def _diagnose_several(arguments: Arguments) -> int:
@@ -222,7 +225,8 @@ def _diagnose_several(arguments: Arguments) -> int:
     )
     if arguments.out is not None:
         joint.save(arguments.out)
-    print_answer(arguments, content := joint.to_dict(), _answer(arguments, content))
+    content, name = joint.to_dict(), f"{listed(list(recordings))} together"
+    print_answer(arguments, content, _answer(arguments, content, name))
     return FOUND if arguments.fail_on == joint.verdict else 0
 
 

@@ -301,10 +301,10 @@ class Diagnosis:
     @property
     def statement(self) -> str:
         """The answer as it is printed: a dozen lines at most."""
-        return "\n".join(self.summary.lines(self.name))
+        return "\n".join(self.summary.lines())
 
     def __str__(self) -> str:
-        return self.statement
+        return "\n".join(self.summary.lines(self.name))
 
     def __repr__(self) -> str:
         names = ", ".join(effect.identifier for effect in self.effects)

@@ -65,10 +65,10 @@ class Answer:
         return self.diagnosis.effects
 
     def __str__(self) -> str:
-        return self.diagnosis.statement
+        return str(self.diagnosis)
 
     def __repr__(self) -> str:
-        return self.diagnosis.statement
+        return str(self.diagnosis)
 
     @property
     def summary(self) -> Summary:
