@@ -441,3 +441,14 @@ def test_a_decay_that_dry_friction_ends_after_four_half_cycles_is_found(amplitud
     )
     assert decay.half_cycles >= 3
     assert decay.half_period_s == pytest.approx(PERIOD / 2, rel=0.01)
+
+
+def test_a_decay_on_a_zero_that_relaxes_by_more_than_the_swing_is_found() -> None:
+    """Four and a half cycles, whose zero falls by 1.2 while they swing by 1."""
+    time = np.arange(700) * 0.002
+    zero = 1.6 + 0.9 * np.exp(-time / 0.8)
+    swing = 0.55 * np.exp(-time / 1.2) * np.cos(2.0 * np.pi * time / 0.31)
+    noise = 5e-3 * np.random.default_rng(2).standard_normal(len(time))
+    found = find_free_decay(Recording(time, zero + swing + noise, "angle_rad"))
+    assert found.half_cycles >= 7
+    assert found.half_period_s == pytest.approx(0.155, rel=0.03)

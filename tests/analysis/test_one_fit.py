@@ -37,6 +37,18 @@ def test_few_readings_in_a_cycle_tell_the_noise() -> None:
     assert 0.8 < result.chi2_per_dof < 1.2
 
 
+@pytest.mark.parametrize("per_cycle", [4.2, 5.3, 7.5, 11.0])
+@pytest.mark.parametrize("amplitude", [0.3, 1.5])
+def test_four_readings_in_a_cycle_are_enough(per_cycle: float, amplitude: float) -> None:
+    law = Eq8(OMEGA, viscous=0.02, restoring="sine")
+    result = pp.fit(clean(law, amplitude, np.arange(0.0, 40.0, 1.0 / per_cycle), 5e-6))
+    assert result.light != "red"
+    assert result.noise_rms_rad == pytest.approx(5e-6, rel=0.15)
+    assert abs(pull(result, "frequency", 1.0)) < 4.0
+    low, high = result["b"].bounds95
+    assert low - result["b"].sd <= 0.02 <= high + result["b"].sd
+
+
 def test_the_minimum_is_that_of_the_noise_that_was_found() -> None:
     """Hysteretic loss from 2 rad: the half cycles' first noise is 27 times too large."""
     law = Eq8(OMEGA, hysteretic=OMEGA / 200.0, restoring="sine")
@@ -139,3 +151,27 @@ def test_a_rate_that_is_known_to_sixty_deviations_is_told() -> None:
     result = pp.fit(clean(law, 0.3, np.arange(0.0, 100.0, 0.02), 1e-4))
     assert result["a"].value > 60.0 * result["a"].sd
     assert not any("can't be told" in warning for warning in result.warnings)
+
+
+@pytest.mark.parametrize("count", [5000, 50_000])
+def test_a_zero_that_drifts_by_a_line_is_followed(count: int) -> None:
+    """1 V on -0.03 V/s: the zero moves by three swings."""
+    time = np.arange(count) * (100.0 / count)
+    motion = sample(Eq8(OMEGA, viscous=OMEGA / 386.0), Release(-0.1, 1.0), time)
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(count)
+    result = pp.fit(pp.Recording(time, volts=motion - 0.03 * time + noise))
+    assert result.light == "green"
+    assert result.zero_drift is not None
+    assert result.zero_drift.unit == "V/s"
+    assert abs(result.zero_drift.value + 0.03) < 4.0 * result.zero_drift.sd
+    assert abs(pull(result, "b", OMEGA / 386.0)) < 4.0
+
+
+def test_bursts_are_a_refusal_in_words() -> None:
+    """Wild readings two and three together, a twentieth of them as large as the swing."""
+    random, time = np.random.default_rng(3), np.arange(6000) / 60.0
+    values = 0.5 * np.exp(-0.03 * time) * np.cos(8.44 * time)
+    for start in np.flatnonzero(random.random(len(time)) < 0.02).tolist():
+        values[start : start + 3] += 0.6 * random.standard_normal() * abs(values[start])
+    with pytest.raises(pp.InputError, match=r"no law follows it|no free decay|did not settle"):
+        pp.fit(pp.Recording(time, displacement_m=values))

@@ -125,12 +125,16 @@ def test_half_periods_that_waver_by_an_eighth_are_no_pendulum_s(
     assert ends(half_cycles(decay(), HALF * (1.0 + waver * side(29)))) == [(0, 29)]
 
 
-@pytest.mark.parametrize(("kink", "regular"), [(0.028, True), (0.032, False)])
+@pytest.mark.parametrize(("kink", "regular"), [(0.05, True), (0.07, False)])
 def test_amplitudes_that_waver_by_an_eighth_are_no_pendulum_s(kink: float, regular: bool) -> None:
-    # Up and down by `kink` bends the logarithm by four times as much.
-    swing = decay() * np.exp(kink * side(30))
+    # Two up and two down by `kink` bend the logarithm by twice as much.
+    swing = decay() * np.exp(kink * np.where(np.arange(30) // 2 % 2 == 0, 1.0, -1.0))
     assert bool(ends(half_cycles(swing))) == regular
     assert ends(half_cycles(swing, step=0.5 * swing[15]))
+
+
+def test_swings_that_alternate_are_those_of_a_drifting_zero() -> None:
+    assert ends(half_cycles(decay() * np.exp(0.1 * side(30)))) == [(0, 29)]
 
 
 @pytest.mark.parametrize(("ending", "fades"), [(1.25, True), (1.35, False)])

@@ -327,12 +327,12 @@ def test_a_torsion_pendulum_and_what_is_no_angle_swing_beyond_pi(quantity: Quant
     assert points.amplitude_rad[0] == pytest.approx(40.0 * math.exp(-0.02 * points.time_s[0]), 1e-3)
 
 
-@pytest.mark.parametrize("in_a_cycle", [4.3, 6.0, 8.0])
+@pytest.mark.parametrize("in_a_cycle", [2.2, 3.0])
 def test_too_few_readings_in_a_cycle_are_refused_in_a_line(in_a_cycle: float) -> None:
     time = np.arange(400) / in_a_cycle
     angle = 0.2 * np.exp(-np.pi / 200.0 * time) * np.cos(2.0 * np.pi * time + 0.3)
     noise = 1e-4 * np.random.default_rng(5).standard_normal(len(time))
-    with pytest.raises(NotAnalysableError, match=r"nine readings|three half cycles"):
+    with pytest.raises(NotAnalysableError, match=r"too few readings|three half cycles|no motion"):
         find_turning_points(Recording(time, angle + noise, "angle_rad"))
 
 

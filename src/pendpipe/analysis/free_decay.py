@@ -17,6 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from pendpipe.analysis.coarse import HARDLY, between
 from pendpipe.analysis.half_cycles import SEEN, HalfCycles, half_cycles, usual_half_period
 from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.find import find_turning_points
@@ -32,6 +33,8 @@ _FALL: Final = 0.3
 _TAIL: Final = 0.05
 _PERIOD: Final = 0.3
 _WAVER: Final = 0.12
+_SMOOTH: Final = 0.03
+"""Of means of neighbours, which chance makes smooth as well."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,9 +168,17 @@ def _regular(run: Run) -> bool:
     waver = float(np.median(np.abs(half[apart:] - half[:-apart]))) / float(np.median(half))
     # Viscous loss takes the same share of each half cycle, Coulomb friction the same amount: a
     # strong one of either bends what is even under the other.
-    shares, amounts = np.diff(np.log(run.swing), 2), np.diff(run.swing, 2) / usual
-    kinks = min(float(np.median(np.abs(bends))) for bends in (shares, amounts))
+    kinks = float(np.min(np.median(_bends(run.swing, usual), axis=1)))
+    if kinks >= _WAVER and run.legs > 6:
+        # A zero that drifts shortens and lengthens swings in turn, and not the means of neighbours.
+        means = 0.5 * (run.swing[1:] + run.swing[:-1])
+        kinks = _WAVER / _SMOOTH * float(np.min(np.mean(_bends(means, usual), axis=1)))
     return waver < _WAVER + 0.5 * blur and kinks < _WAVER + 2.0 * blur
+
+
+def _bends(swing: FloatArray, usual: float) -> FloatArray:
+    """Bends of the swings' logarithms, and of the swings over the usual one."""
+    return np.asarray(np.abs([np.diff(np.log(swing), 2), np.diff(swing, 2) / usual]))
 
 
 def _continues(before: Run, after: Run) -> bool:
@@ -356,7 +367,10 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
         why = "the reading never changes" if len(values) >= 8 else f"{len(values)} samples only"
         raise NotAnalysableError(place, why, "is this the right channel?")
     step = recording.resolution
-    least = max(SEEN * noise_rms(values, step, quieter=0.1), 1.6 * (step or 0.0))
+    noise = noise_rms(values, step, quieter=0.1)
+    if (fine := between(time, values, HARDLY)) is not None:
+        time, values, noise = fine.time_s, fine.values, fine.noise_rms
+    least = max(SEEN * noise, 1.6 * (step or 0.0))
     half_period = usual_half_period(time, values)
     # Noise alone spans about `least`. What hardly exceeds it many half cycles can prove.
     if half_period is None or span < 1.5 * least:

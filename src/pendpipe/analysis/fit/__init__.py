@@ -23,12 +23,12 @@ from pendpipe.analysis.fit.by_waveform import (
     fitted_waveform,
     waveform_result,
 )
-from pendpipe.analysis.fit.goodness import Goodness
+from pendpipe.analysis.fit.goodness import LEVEL, Goodness
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring, read_fit
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.find import turning_points_of
 from pendpipe.analysis.turning_points.measure import Samples, prepare
-from pendpipe.errors import NotAnalysableError
+from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, pretty_unit, with_error
 from pendpipe.recording import Recording
@@ -39,6 +39,8 @@ Forms = tuple[tuple[Fitted, Goodness], ...]
 
 _STEP: Final = 1.25
 """By which the least amplitude grows, where the smaller ones contradict every law tried."""
+_MISSED: Final = 0.3
+"""Of the first amplitude: a misfit beyond is that of another motion."""
 _LEAST: Final = 0.6
 """Of the first amplitude: so much of the decay is kept at least."""
 _CERTAIN: Final = 100.0
@@ -101,6 +103,15 @@ def fit_recording(
         # What its turning points lose is no mode's loss.
         why = f"{beats[0]}; Eq. 8 has one"
         return replace(result, light="red", light_reason=why, decrement_check=())
+    missed = result.residual_rms_rad / abs(result["amplitude"].value)
+    lost = (result.fit_p_value or 0.0) < LEVEL and missed > _MISSED and result.light != "red"
+    refuse_if(
+        lost,
+        place,
+        f"no law follows it: the best misses the swings by {100.0 * missed:.0f} %",
+        "cut bursts and jumps out with --start and --stop, or see pendpipe diagnose",
+        NotAnalysableError,
+    )
     if result.settled:
         return result
     raise NotAnalysableError(

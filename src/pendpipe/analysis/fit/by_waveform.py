@@ -807,7 +807,10 @@ def waveform_result(
         residual_rms_rad=math.sqrt(float(residual @ residual) / len(residual)),
         samples=len(residual),
         turning_points=len(points),
-        settled=fitted.minimum.converged,
+        # A motion that has lost its phase has no frequency of its own, or none that moves.
+        settled=fitted.minimum.converged
+        and value[4] > 0.0
+        and (OMEGA in fitted.held or matrix[3, 3] > 0.0),
         drag_form=form,
         zero_drift=drift,
     )

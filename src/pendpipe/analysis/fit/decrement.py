@@ -193,6 +193,8 @@ def loss_of(law: Eq8, amplitude: float) -> float:
         if abs(missed) < _MISSED * amplitude:
             break
         start += missed
+        if not start > 0.0:
+            return _slow_loss(law, amplitude)
     return loss
 
 

@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.coarse import Between, between
 from pendpipe.analysis.half_cycles import half_cycles, usual_half_period
 from pendpipe.analysis.noise import quantisation_rms, undithered_rms
 from pendpipe.analysis.turning_points.harmonics import far_points, odd_harmonics, own_square
@@ -379,9 +380,30 @@ def turning_points_of(
 ) -> TurningPoints:
     """As `find_turning_points`, of readings that are prepared already; of `long` ones in a pass."""
     points = None
+    if (fine := between(samples.time_s, samples.values)) is not None:
+        return _of_few(samples, fine, place)
     if len(samples) > long:
         points = follow(samples, lambda head: _measured(head, place), long // 128)
     return far_points(samples, _measured(samples, place) if points is None else points)
+
+
+def _of_few(samples: Samples, fine: Between, place: str | Path) -> TurningPoints:
+    """Measure the half cycles of a coarse record, with the errors that its readings have."""
+    dense = replace(samples, time_s=fine.time_s, values=fine.values, step=None, noise_rms=0.0)
+    least = 1e-4 * float(np.ptp(fine.values))
+    points = _measured(replace(dense, noise_rms=max(fine.noise_rms, least)), place)
+    noise = max(fine.noise_rms, quantisation_rms(samples.step))
+    sd = np.hypot(points.angle_sd_rad, 2.0 * noise / math.sqrt(fine.window))
+    pace = math.pi / float(np.median(np.diff(points.time_s) / np.diff(points.half_cycle)))
+    clear = np.maximum(np.abs(points.angle_rad), sd)
+    return replace(
+        points,
+        angle_sd_rad=sd,
+        time_sd_s=np.hypot(points.time_sd_s, sd / clear / pace),
+        noise_rms_rad=noise,
+        step_rad=samples.step or 0.0,
+        samples=len(samples),
+    )
 
 
 def _measured(samples: Samples, place: str | Path) -> TurningPoints:
@@ -394,7 +416,8 @@ def _measured(samples: Samples, place: str | Path) -> TurningPoints:
     refuse_if(bursts, place, problem, remedy, NotAnalysableError)
     places, first = _locate(samples, rough, stride)
     few, remedy = not np.any(_known(first)), "sample faster"
-    refuse_if(few, place, "fewer than nine readings in a cycle", remedy, NotAnalysableError)
+    problem = "too few readings in a cycle (four at least, twelve where they are uneven)"
+    refuse_if(few, place, problem, remedy, NotAnalysableError)
     amplitude, rates, level = _losses(places, first, samples.noise_rms, rough.level)
     places, measured, shape = _shaped(samples, places, amplitude, rates, level, stride)
     samples = replace(samples, noise_rms=_noise(samples, measured))

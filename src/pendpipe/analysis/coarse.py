@@ -1,0 +1,96 @@
+"""Few readings in a cycle: the swing between them, by which its half cycles can be followed.
+
+Extremes are found among readings, and 4 to 12 in a cycle rarely lie at one. So a wave of the
+motion's frequency, its amplitude and phase as straight lines, is fitted to two and a half cycles
+about each moment. That shows where the half cycles are; the fit of the motion takes the readings
+themselves.
+"""
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+
+DENSE: Final = 12.0
+"""Readings in a cycle from which half cycles are followed as they are."""
+HARDLY: Final = 7.0
+"""Readings in a cycle below which extremes are not even told from other motion."""
+_SPARSE: Final = 3.6
+"""Readings in a cycle below which a second harmonic can't be told from a wander."""
+_WANTED: Final = 32.0
+_WINDOW: Final = 2.5
+"""Cycles that a wave is fitted to."""
+_EVEN: Final = 0.2
+_MOST: Final = 1 << 16
+"""Readings whose spectrum tells the frequency."""
+
+
+class Between(NamedTuple):
+    """Readings between those of a coarse record."""
+
+    time_s: FloatArray
+    values: FloatArray
+    noise_rms: float
+    """Of a reading of the record."""
+    window: int
+    """Readings that each is from."""
+
+
+def between(time_s: FloatArray, values: FloatArray, dense: float = DENSE) -> Between | None:
+    """Read a coarse record, evenly sampled, between its readings; None where it is not coarse.
+
+    Parameters
+    ----------
+    time_s, values
+        The readings, shape (n,).
+    dense
+        Readings in a cycle from which it is not coarse.
+    """
+    count = len(values)
+    above = values > float(np.mean(values))
+    passages = np.count_nonzero(above[1:] != above[:-1])
+    if count < 16 or 2.0 * count > 1.2 * dense * passages:
+        return None
+    intervals = np.diff(time_s)
+    step = float(np.mean(intervals))
+    if np.max(np.abs(intervals - step)) > _EVEN * step:
+        return None
+    per_cycle = 1.0 / max(_frequency(values[:_MOST]), 1e-9)
+    if not _SPARSE < per_cycle < dense:
+        return None
+    omega = 2.0 * math.pi / per_cycle
+    window = min(2 * (round(_WINDOW * per_cycle) // 2) + 1, count - 1 + count % 2)
+    reach = window // 2
+    inside = np.arange(-reach, reach + 1.0)
+    inverse = np.linalg.pinv(_wave(inside, omega), rcond=1e-9)
+    windows = np.lib.stride_tricks.sliding_window_view(values, window)
+    left = windows - windows @ (_wave(inside, omega) @ inverse).T
+    freedom = window - inverse.shape[0]
+    noise = math.sqrt(float(np.mean(left**2)) * window / max(freedom, 1))
+    fine = math.ceil(_WANTED / per_cycle)
+    place = np.arange((count - 1) * fine + 1) / fine
+    # Near the ends the first and the last window reach further.
+    middle = np.clip(np.rint(place), reach, count - 1 - reach)
+    waves = _wave(place - middle, omega)
+    found = np.einsum("np,np->n", waves, (windows @ inverse.T)[middle.astype(np.int64) - reach])
+    return Between(np.interp(place, np.arange(count), time_s), found, noise, window)
+
+
+def _wave(at: FloatArray, omega: float) -> FloatArray:
+    """A level, and a wave whose cosine and sine grow evenly, shape (n, 5)."""
+    cosine, sine = np.cos(omega * at), np.sin(omega * at)
+    return np.stack([np.ones_like(at), cosine, sine, at * cosine, at * sine], axis=1)
+
+
+def _frequency(values: FloatArray) -> float:
+    """Of the largest peak of the spectrum, in cycles a reading."""
+    count = len(values)
+    trend = np.polynomial.Polynomial.fit(np.arange(count), values, 1)(np.arange(count))
+    power = np.abs(np.fft.rfft((values - trend) * np.hanning(count), 4 * count)) ** 2
+    power[:4] = 0.0
+    peak = min(int(np.argmax(power)), len(power) - 2)
+    before, top, after = np.log(np.maximum(power[peak - 1 : peak + 2], 1e-300))
+    bend = before - 2.0 * top + after
+    return float(peak + (0.5 * (before - after) / bend if bend < 0.0 else 0.0)) / (4 * count)
