@@ -220,8 +220,27 @@ class Recording:
         Raises
         ------
         InputError
-            If the recording's own constant is no number, or 0.
+            If the recording's own constant is no number, or 0; or if the numbers are such as
+            no pendulum gives, and their squares or their differences no computer holds.
         """
+        motion = self._in_radians(volts_per_radian, place)
+        motion._check_scale(place)
+        return motion
+
+    def _check_scale(self, place: str | Path) -> None:
+        """Refuse a span of time or of readings that is beyond any pendulum."""
+        values = self.values[np.isfinite(self.values)]
+        if len(values) < 2:
+            return
+        span, span_s = float(np.ptp(values)), float(self.time_s[-1] - self.time_s[0])
+        for wrong, problem in (
+            (not _SHORTEST_S < span_s < _LONGEST_S, f"the times span {span_s:.3g} s"),
+            (not 0 <= float(np.abs(values).max()) < _LARGEST, "the readings are too large"),
+            (0 < span < 1 / _LARGEST, f"the readings move by {span:.3g} {self.unit}"),
+        ):
+            refuse_if(wrong, place, problem, "check their unit")
+
+    def _in_radians(self, volts_per_radian: float | None, place: str | Path) -> Self:
         if self.quantity == "angle_rad":
             values, notes = from_below(self.values)
             return replace(self, values=values, notes=self.notes + notes) if notes else self
@@ -244,6 +263,12 @@ class Recording:
             resolution=None if self.resolution is None else self.resolution / abs(constant),
             metadata={**self.metadata, "volts_per_radian": repr(float(constant))},
         )
+
+
+_LARGEST: Final = 1e60
+"""Of readings, whose squares and fourth powers must be numbers as well; its inverse is the smallest."""
+_SHORTEST_S, _LONGEST_S = 1e-60, 1e14
+"""Of a recording. Beyond three million years the search for the period counts false cycles."""
 
 
 def jumps_of_a_turn(values: FloatArray) -> bool:
