@@ -360,6 +360,7 @@ def diagnose(
     """
     known, problem = restoring in (None, "auto", "linear"), f"{restoring!r} is no choice"
     refuse_if(not known, "restoring", problem, "give 'linear', or leave it out")
+    refuse_if(seed < 0, "seed", f"{seed} is negative", "give 0 or more")
     if not isinstance(recording, Recording | str | Path):
         from pendpipe.diagnosis.several import diagnose_several
         from pendpipe.files import distinct_names
@@ -418,6 +419,7 @@ def simulate(model: str | Path | Mapping[str, Any], *, seed: int | None = None) 
     """
     from pendpipe.simulation import model as models
 
+    refuse_if(seed is not None and seed < 0, "seed", f"{seed} is negative", "give 0 or more")
     described = models.read_model(model)
     if seed is not None:
         described = described.model_copy(update={"seed": seed})

@@ -155,6 +155,17 @@ def measured_number(text: str) -> Estimate:
         raise argparse.ArgumentTypeError(str(problem)) from None
 
 
+def natural(text: str) -> int:
+    """Be a type of argparse: a whole number that is not negative."""
+    try:
+        value = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text:.40}' is no whole number") from None
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"it must not be negative (it is {text:.40})")
+    return value
+
+
 def declare(parser: argparse.ArgumentParser, arguments: Flags) -> None:
     """Declare a command's arguments, each by its name and the options of argparse.
 

@@ -17,7 +17,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any, Final, NoReturn
 
-from pendpipe.errors import InputError
+from pendpipe.errors import NO_ROOM, InputError
 from pendpipe.process import one_thread
 from pendpipe.version import __version__
 
@@ -168,7 +168,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     one_thread()
     try:
         arguments = _parse(sys.argv[1:] if argv is None else argv)
-        return _run(arguments)
+        status = _run(arguments)
+        sys.stdout.flush()
+        return status
     except InputError as fault:
         print(f"pendpipe: {fault}", file=sys.stderr)
         return fault.status
@@ -177,6 +179,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as fault:
+        if fault.errno in NO_ROOM and fault.filename is None:
+            # What is left in the buffer would fail once more when Python ends.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            problem = f"it can't be written ({fault.strerror}); make room, or name a file"
+            print(f"pendpipe: standard output: {problem}", file=sys.stderr)
+            return 2
         if fault.filename is None:
             raise
         reason = fault.strerror or str(fault)

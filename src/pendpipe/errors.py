@@ -6,7 +6,12 @@ and ends with status 2; a Snakemake stage writes it into ``refused.json`` instea
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
+from typing import Final
+
+NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG)
+"""Of errors of the system: those of a full disk, or of one that is only read."""
 
 
 class InputError(Exception):

@@ -5,7 +5,6 @@ replaced, nor an instrument's raw file; what pendpipe did not make, only with ``
 it makes says so inside (`MADE_BY`), and that is how it is known again.
 """
 
-import errno
 import hashlib
 import json
 import math
@@ -21,10 +20,9 @@ from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import IO, Any, Final
 
-from pendpipe.errors import DamagedError, InputError, UnwritableError, refuse_if
+from pendpipe.errors import NO_ROOM, DamagedError, InputError, UnwritableError, refuse_if
 from pendpipe.version import __version__
 
-_NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG)
 MADE_BY: Final = f"pendpipe {__version__}"
 """What stands in every file that can be made again."""
 MARK: Final = "made_by"
@@ -160,7 +158,8 @@ def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
         return
     target = Path(path)
     make_folder(target.parent)
-    text = {} if "b" in mode else {"encoding": "utf-8", "newline": "\n"}
+    # A name of a file may be no UTF-8; where it is quoted, the bytes that are none become "?".
+    text = {} if "b" in mode else {"encoding": "utf-8", "errors": "replace", "newline": "\n"}
     try:
         refuse_if(target.is_dir(), target, "this is a folder", "name a file in it")
         check_output(target)
@@ -179,7 +178,7 @@ def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
         temporary.replace(target)
     except BaseException as fault:
         temporary.unlink(missing_ok=True)
-        if isinstance(fault, OSError) and fault.errno in _NO_ROOM:
+        if isinstance(fault, OSError) and fault.errno in NO_ROOM:
             raise _cannot_write(target, fault) from None
         raise
 

@@ -266,7 +266,7 @@ class Recording:
 
 
 _LARGEST: Final = 1e60
-"""Of readings, whose squares and fourth powers must be numbers as well; its inverse is the smallest."""
+"""Of readings, whose fourth powers must be numbers as well; they move by its inverse at least."""
 _SHORTEST_S, _LONGEST_S = 1e-60, 1e14
 """Of a recording. Beyond three million years the search for the period counts false cycles."""
 

@@ -1,4 +1,5 @@
 # What the rules share: the checked configuration, and names. No rule, no physics.
+import os
 import re
 import shlex
 from pathlib import Path
@@ -7,7 +8,7 @@ from snakemake.exceptions import WorkflowError
 
 from pendpipe import manifest
 from pendpipe.configuration import jobs
-from pendpipe.configuration.load import load_campaign
+from pendpipe.configuration.load import load_campaign, read_configuration
 from pendpipe.errors import InputError
 from pendpipe.figures import OF_EVERY_DIAGNOSIS
 from pendpipe.files import check_writable
@@ -25,6 +26,9 @@ def checked(call, *arguments):
         raise WorkflowError(str(error)) from None
 
 
+# Snakemake itself takes the last of two keys of one name.
+for path in filter(os.path.isfile, workflow.configfiles):
+    checked(read_configuration, path)
 CAMPAIGN = checked(
     load_campaign, config, ", ".join(map(str, workflow.configfiles)) or "--config"
 )

@@ -25,6 +25,7 @@ from pendpipe.arguments import (
     Arguments,
     Flags,
     load,
+    natural,
     number_within,
     shared,
     tell_written,
@@ -75,7 +76,7 @@ _OWN: Final[Flags] = {
         "help": "take what was kept when the line was lost for the recording",
     },
     "--volts-per-radian": {"type": float, "help": "sensor constant, for the metadata"},
-    "--seed": {"type": int, "default": 0, "help": "of the simulated noise (0)"},
+    "--seed": {"type": natural, "default": 0, "help": "of the simulated noise (0)"},
     "--clock-scale": {
         "type": number_within(0),
         "default": 1.0,

@@ -21,6 +21,7 @@ from pendpipe.arguments import (
     OUTPUTS,
     Arguments,
     Flags,
+    natural,
     number_within,
     print_answer,
     print_json,
@@ -59,7 +60,12 @@ _OWN: Final[Flags] = {
         "metavar": "P",
         "help": "false-alarm probability for a recording that lacks nothing (%(default)s)",
     },
-    "--seed": {"type": int, "default": 0, "metavar": "N", "help": "of the draws that count trials"},
+    "--seed": {
+        "type": natural,
+        "default": 0,
+        "metavar": "N",
+        "help": "of the random draws",
+    },
     "--fail-on": {
         "choices": ("missing-physics",),
         "help": f"end with status {FOUND} on that verdict",

@@ -27,6 +27,7 @@ from pendpipe.arguments import (
     Arguments,
     Flags,
     measured_number,
+    natural,
     number_within,
     print_answer,
     print_json,
@@ -76,7 +77,7 @@ _OWN: Final[Flags] = {
         "action": "store_true",
         "help": "tell how it was read, and harmless notes",
     },
-    "--seed": {"type": int, "metavar": "N", "help": "recorded only"},
+    "--seed": {"type": natural, "metavar": "N", "help": "recorded only"},
 }
 ARGUMENTS: Final = (
     FILES

@@ -8,12 +8,12 @@ with every key.
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import INPUT, OUTPUT, Arguments, Flags, tell_written
+from pendpipe.arguments import INPUT, OUTPUT, Arguments, Flags, natural, tell_written
 
 ARGUMENTS: Final[Flags] = {
     "model": {"metavar": "MODEL.toml", "help": "what to simulate"} | INPUT,
     "out": {"metavar": "OUT.csv", "type": Path, "help": "the recording, plain form"} | OUTPUT,
-    "--seed": {"type": int, "help": "seed of the noise, instead of the model's"},
+    "--seed": {"type": natural, "help": "seed of the noise, instead of the model's"},
 }
 
 

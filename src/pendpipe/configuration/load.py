@@ -18,7 +18,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.dataclasses import dataclass as checked
 
-from pendpipe.configuration.models import Configuration, Geometry, Section
+from pendpipe.configuration.models import Celsius, Configuration, Geometry, Section
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import is_file, names_in, read_json, read_text
 
@@ -95,7 +95,7 @@ class Record:
     start_s: float | None = None
     stop_s: float | None = None
     volts_per_radian: float | None = None
-    temperature_c: float | None = None
+    temperature_c: Celsius | None = None
     restoring: Literal["", "linear", "sine"] = ""
     order: float | None = None
     pendulum: str = ""
@@ -260,12 +260,24 @@ def _yaml(place: Path, text: str) -> Any:
     """Parse YAML; an error names its line."""
     import yaml
 
+    class Loader(yaml.SafeLoader):
+        """Refuses a key that stands twice, where YAML takes the last."""
+
+        def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:
+            keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
+            for key, _ in reversed(node.value):
+                again = isinstance(key, yaml.ScalarNode) and keys.count(key.value) > 1
+                if again and key.value != "<<":
+                    twice = f"the key '{key.value:.60}' stands twice"
+                    raise yaml.MarkedYAMLError(problem=twice, problem_mark=key.start_mark)
+            return super().construct_mapping(node, deep)
+
     try:
-        return yaml.safe_load(text)
+        return yaml.load(text, Loader)
     except yaml.MarkedYAMLError as fault:
         line = fault.problem_mark.line + 1 if fault.problem_mark else 1
         raise InputError(f"{place}, line {line}", fault.problem or "no YAML", "fix it") from None
-    except (yaml.YAMLError, RecursionError) as fault:
+    except (yaml.YAMLError, RecursionError, ValueError) as fault:  # a number of 5000 digits
         raise InputError(place, f"this is no YAML ({fault})", "fix it") from None
 
 

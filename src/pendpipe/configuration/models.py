@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
+Celsius = Annotated[float, Field(gt=-273.15)]
 
 
 class Section(BaseModel):
@@ -156,7 +157,7 @@ class Fluid(Section):
     boundary_layer: bool = Field(
         True, description="whether Stokes' drag with its history term acts (Eq. 2)"
     )
-    temperature_c: float | None = Field(
+    temperature_c: Celsius | None = Field(
         None,
         description="water only: where density and viscosity hold; a record's own temperature"
         " then scales them; blank: they hold for every record",
