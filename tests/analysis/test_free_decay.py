@@ -452,3 +452,32 @@ def test_a_decay_on_a_zero_that_relaxes_by_more_than_the_swing_is_found() -> Non
     found = find_free_decay(Recording(time, zero + swing + noise, "angle_rad"))
     assert found.half_cycles >= 7
     assert found.half_period_s == pytest.approx(0.155, rel=0.03)
+
+
+def test_swings_that_a_sensor_cuts_on_one_side_are_left_out() -> None:
+    """The dead zone of a sonic ranger: no reading below -0.08 m."""
+    time = np.arange(2400) / 30.0
+    values = 0.12 * np.exp(-time / 42.0) * np.cos(2.0 * np.pi * time / 0.83)
+    values = np.maximum(values, -0.08) + 1e-3 * np.random.default_rng(4).standard_normal(2400)
+    found = find_free_decay(Recording(time, values, "displacement_m"))
+    clear = 42.0 * np.log(0.12 / 0.08)
+    assert clear - 1.0 < found.start_s < clear + 6.0
+    assert "no further on one side" in found.cuts[0].reason
+
+
+@pytest.mark.parametrize("factor", [1.0, 180.0 / np.pi, 0.5 / np.pi])
+def test_a_period_that_lengthens_as_a_pendulum_s_tells_the_unit(factor: float) -> None:
+    from pendpipe import fit
+    from pendpipe.dynamics import Eq8, Release, sample
+
+    time = np.arange(3000) * 0.01
+    law = Eq8(8.0, viscous=0.03, restoring="sine")
+    angle = sample(law, Release(-0.2, 2.0), time)
+    angle += 1e-3 * np.random.default_rng(1).standard_normal(len(time))
+    result = fit(Recording(time, factor * angle, "reading"))
+    assert (result.restoring, result["amplitude"].unit) == ("sine", "rad")
+    assert result["frequency"].value == pytest.approx(4.0 / np.pi, rel=1e-4)
+    # What has the same period at any amplitude has no known unit.
+    spring = 2.0 * np.exp(-0.03 * time) * np.cos(8.0 * time)
+    spring += 1e-3 * np.random.default_rng(1).standard_normal(len(time))
+    assert fit(Recording(time, factor * spring, "reading"))["amplitude"].unit == "1"

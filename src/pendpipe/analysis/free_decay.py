@@ -33,6 +33,13 @@ _FALL: Final = 0.3
 _TAIL: Final = 0.05
 _PERIOD: Final = 0.3
 _WAVER: Final = 0.12
+_TELLS: Final = 0.2
+"""Error of the share of sin x up to which a period tells the unit."""
+_FLAT: Final = 0.025
+"""Of a swing, within which turning points are the same."""
+_FEW_FLAT: Final = 4
+_LONG: Final = 1.6
+"""By which a flat side holds more readings than a crest has there."""
 _SMOOTH: Final = 0.03
 """Of means of neighbours, which chance makes smooth as well."""
 
@@ -418,6 +425,9 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
         used = _chained(found, told)
     _refuse_without_fall(place, time[told.piece], values[told.piece], told, least)
     run = used[0]
+    flat = _flat_turns(time[run.piece], values[run.piece], run)
+    if flat is not None and run.legs - flat > _MANY:
+        run = used[0] = replace(run, first=run.first + flat)
     start, stop = _start(time[run.piece], values[run.piece], run), _stop(time, used[-1])
     notes = [
         f"nothing was recorded from {time[end - 1]:.6g} to {time[end]:.6g} s; the decay goes on"
@@ -428,6 +438,8 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     before = "driven: the amplitude is held up" if run.driven else _BY_HAND
     centre = float(np.mean(run.cycles.turn[run.first : run.first + 2]))
     wide = np.abs(values[time < start] - centre).max(initial=0.0)
+    if flat is not None:
+        before = "the sensor reads no further on one side: larger swings are left out"
     if recording.quantity == "angle_rad" and wide > np.pi > 0.5 * swing:
         before = "it went over the top before it settled"
     cuts = stretches(time, values, start, stop, quiet=quiet, window_s=half, before=before)
@@ -440,6 +452,28 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     if bridged:
         notes.append(f"{bridged} disturbed half cycle(s) inside the decay are kept")
     return FreeDecay(start, stop, cuts, half, sum(part.legs for part in used), notes)
+
+
+def _flat_turns(time: FloatArray, values: FloatArray, run: Run) -> int | None:
+    """Count the half cycles at the front that end flat on one side, while the other side falls.
+
+    A sonic ranger has a dead zone, an optical sensor an edge: there the readings stay.
+    """
+    turns = run.cycles.turn[run.first : run.last + 2]
+    when = run.cycles.turn_time_s[run.first : run.last + 2]
+    near = max(_FLAT * abs(float(turns[1] - turns[0])), run.cycles.step)
+    for side in (0, 1):
+        own, other = turns[side::2], turns[1 - side :: 2]
+        floor = float(np.median(own[:_FEW_FLAT]))
+        count = int(np.argmax(np.append(np.abs(own - floor) > near, True)))
+        if count < _FEW_FLAT or count >= len(other) or abs(other[0] - other[count]) < 3.0 * near:
+            continue
+        inside = (time >= when[0]) & (time <= when[2 * count - 2 + side])
+        swing = abs(float(np.median(other[:count])) - floor)
+        expected = math.acos(1.0 - 2.0 * near / swing) / math.pi
+        if np.mean(np.abs(values[inside] - floor) < near) > _LONG * expected:
+            return 2 * count + side
+    return None
 
 
 def _pieces(time: FloatArray, longest_s: float) -> list[slice]:
@@ -645,6 +679,44 @@ def _start(time: FloatArray, values: FloatArray, run: Run) -> float:
     return begin if abs(float(values[0]) - expected) < 0.15 * abs(amplitude) else start
 
 
+_ANGLES: Final = {"radians": 1.0, "degrees": math.pi / 180.0, "turns": 2.0 * math.pi}
+
+
+def _as_pendulum(recording: Recording, points: TurningPoints) -> Recording | None:
+    """Take readings of an unknown unit as the angle whose period lengthens so with its swing.
+
+    A step, or a size, tells no unit: only one of them makes the period that of sin x.
+    """
+    from pendpipe.analysis.fit.by_points import may_be_sine, sine_coefficient
+
+    if recording.unit != "1" or recording.quantity != "reading":
+        return None
+    agreeing = []
+    for name, factor in _ANGLES.items():
+        angles = replace(
+            points,
+            angle_rad=factor * points.angle_rad,
+            angle_sd_rad=factor * points.angle_sd_rad,
+            unit="rad",
+        )
+        coefficient = sine_coefficient(angles) if may_be_sine(angles) else None
+        if coefficient is not None and coefficient.agrees and coefficient.sd < _TELLS:
+            agreeing.append((name, factor))
+    if len(agreeing) != 1:
+        return None
+    name, factor = agreeing[0]
+    note = f"the period lengthens with the swing as a pendulum's does in {name}: taken to be {name}"
+    step = None if recording.resolution is None else factor * recording.resolution
+    angle = replace(
+        recording,
+        values=factor * recording.values,
+        quantity="angle_rad",
+        resolution=step,
+        notes=(*recording.notes, note),
+    )
+    return angle.as_motion()
+
+
 def measure_recording(
     recording: Recording, place: str | Path, provenance: Mapping[str, Any] | None = None
 ) -> tuple[TurningPoints, Recording]:
@@ -667,6 +739,8 @@ def measure_recording(
     decay = find_free_decay(recording, place)
     part = decay.of(recording)
     points = find_turning_points(part, place)
+    if (told := _as_pendulum(recording, points)) is not None:
+        return measure_recording(told, place, provenance)
     notes = (*decay.notes, *points.notes)
     metadata = {key: str(value) for key, value in (provenance or {}).items() if value is not None}
     metadata = {**points.metadata, **metadata}
