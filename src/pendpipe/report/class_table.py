@@ -30,6 +30,8 @@ COLUMNS: Final = (
 FORMS: Final = (".json", ".csv", ".xlsx", ".html", ".tex")
 _AGREES: Final = 5.0
 """Standard deviations, or robust ones of the class, within which a file agrees with its median."""
+_CHANCE: Final = 0.001
+"""Probability of a larger chi^2 below which the values differ by more than their errors."""
 
 
 class Fitted(NamedTuple):
@@ -59,10 +61,12 @@ class Together(NamedTuple):
 
     def __str__(self) -> str:
         mean, unit = self.mean, self.mean.unit
+        agree = "they agree" if self.p_value >= _CHANCE else "they differ by more than their errors"
+        left = f" ({self.of - self.files} far from them left out)" if self.files < self.of else ""
         return (
-            f"{self.name}: {self.files} of {self.of} files agree: mean"
+            f"{self.name}: mean of {self.files} files{left}"
             f" {with_error(mean.value, mean.sd, unit, short=True)}, scatter"
-            f" {with_error(self.scatter, None, unit)}, chi² {self.chi2:.3g} for"
+            f" {with_error(self.scatter, None, unit)}; {agree}: chi² {self.chi2:.3g} for"
             f" {self.files - 1} (p = {self.p_value:.2g})"
         )
 
