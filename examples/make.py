@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pendpipe.files import writing
 from pendpipe.recording import Recording, write_plain
 from pendpipe.simulation.model import read_model, simulate
 
@@ -26,7 +27,8 @@ def main() -> None:
     rows = zip(string.time_s, np.degrees(string.values), strict=True)
     lines = ["time (s),angle (deg)", *(f"{time:.4f},{angle:.3f}" for time, angle in rows)]
     (HERE / "string-pendulum.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    write_plain(HERE / "rod-pendulum.csv", simulated("rod-pendulum"))
+    with writing(force=True):
+        write_plain(HERE / "rod-pendulum.csv", simulated("rod-pendulum"))
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@
 >>> recording = pp.read("examples/rod-pendulum.csv")
 >>> fit = pp.fit(recording)
 >>> round(fit["b"].value, 4), fit.light
-(0.0107, 'green')
+(0.0104, 'green')
 
 Nothing is imported before it is used: a job's cost is its imports.
 """

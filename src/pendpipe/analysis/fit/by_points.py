@@ -530,7 +530,7 @@ def start_of(points: TurningPoints, *, stated: bool = True) -> Starts:
     >>> points = turning_points("examples/rod-pendulum.csv")
     >>> start = start_of(points)
     >>> start.favoured, round(start.linear.angular_frequency, 3)
-    ('linear', 5.485)
+    ('sine', 5.484)
     """
     coefficient = sine_coefficient(points)
     sine = _law_start(points, "sine") if may_be_sine(points) else None
