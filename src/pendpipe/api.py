@@ -214,12 +214,14 @@ def fit(
     fixed: Mapping[str, float] | None = None,
     volts_per_radian: float | None = None,
     points: TurningPoints | None = None,
+    length_m: float | None = None,
     name: str | None = None,
 ) -> FitResult:
     """Fit a, b, c, frequency and amplitude to the free decay of a recording.
 
-    Eq. 8, with sin x where the recording asks for it, is fitted to all readings of the decay. Where
-    its law contradicts the decrement of the turning points, these are fitted instead, or the larger
+    Eq. 8 is fitted to all readings of the decay: angles and their rates swing by sin x, unless x
+    alone fits better by a likelihood ratio of 1000, and the drag has the likelier form. Where the
+    law contradicts the decrement of the turning points, these are fitted instead, or the larger
     amplitudes alone. ``fit.light`` is green, amber or red, and
     ``fit.light_reason`` explains it (docs/fit.md).
 
@@ -230,8 +232,7 @@ def fit(
     method
         ``"waveform"`` or ``"turning-points"`` to have only that one.
     restoring
-        ``"linear"`` or ``"sine"``, the restoring torque; by default sin x where the recording
-        asks for it.
+        ``"linear"`` or ``"sine"``, the restoring torque; by default see above.
     baseline
         ``"eq8"``, or ``"viscous"`` for Eq. 3 (a = c = 0).
     fixed
@@ -240,6 +241,8 @@ def fit(
         The sensor's constant, where the readings are volts and do not carry it.
     points
         Turning points measured before (`turning_points`): they name the decay.
+    length_m
+        Length of the pendulum whose displacement is read as L sin x (with ``restoring="sine"``).
     name
         What to call the recording in messages; by default its path.
 
@@ -285,13 +288,13 @@ def fit(
         restoring=restoring,
         baseline=baseline,
         fixed=fixed,
+        length_m=length_m,
         place=place,
     )
     return replace(
         result,
         cuts=(*(cut._asdict() for cut in points.cuts), *result.cuts),
         name="" if isinstance(recording, Recording) else Path(recording).name,
-        points=points,
         decay=decay,
     )
 

@@ -153,6 +153,7 @@ def _fit(arguments: Arguments, say: Callable[[str], None] = tell) -> FitResult:
         restoring=None if arguments.restoring == "auto" else arguments.restoring,
         baseline=arguments.baseline,
         fixed=fixed,
+        length_m=arguments.length.value if arguments.length else None,
         name=arguments.file,
     )
     return replace(

@@ -79,7 +79,8 @@ def fit_recording(
     points
         Turning points found before; they are found here when they are not given.
     length_m
-        Length of the pendulum whose displacement is read, L sin x; by default g/omega^2.
+        Length of the pendulum whose displacement is read, L sin x; by default g/omega^2, which is
+        then among the warnings.
     place
         Named in messages.
 
@@ -97,13 +98,24 @@ def fit_recording(
         or the search did not come to its end.
     """
     check_fixed(fixed or {}, baseline)
-    result = _fit(recording, method, restoring, baseline, fixed, points, length_m, place)
-    beats = [note for note in points.notes if note.startswith(BEAT)] if points else []
+    samples = prepare(recording, place)
+    points = turning_points_of(samples, place) if points is None else points
+    position, given = restoring == "sine" and samples.unit == "m", length_m
+    points, length_m = as_angles(points, length_m, position=position)
+    if position and given is None:
+        said = f"read as L sin x: L = g/ω² = {length_m:.3f} m (--length)"
+        points = replace(points, notes=(*points.notes, said))
+    stated = recording.unit_is_stated
+    result = _fit(samples, method, restoring, baseline, fixed, points, length_m, place, stated)
+    result = replace(result, points=points)
+    beats = [note for note in points.notes if note.startswith(BEAT)]
     if beats:
         # What its turning points lose is no mode's loss.
         why = f"{beats[0]}; Eq. 8 has one"
         return replace(result, light="red", light_reason=why, decrement_check=())
-    missed = result.residual_rms_rad / abs(result["amplitude"].value)
+    by_points = result.method == "turning-points"
+    swing = result["amplitude"].value if by_points else 0.5 * float(np.ptp(samples.values))
+    missed = result.residual_rms_rad / abs(swing)
     lost = (result.fit_p_value or 0.0) < LEVEL and missed > _MISSED and result.light != "red"
     refuse_if(
         lost,
@@ -122,20 +134,16 @@ def fit_recording(
 
 
 def _fit(
-    recording: Recording,
+    samples: Samples,
     method: Method | None,
     restoring: Restoring | None,
     baseline: Baseline,
     fixed: Mapping[str, float] | None,
-    points: TurningPoints | None,
+    points: TurningPoints,
     length_m: float | None,
     place: str | Path,
+    stated: bool,
 ) -> FitResult:
-    samples = prepare(recording, place)
-    if points is None:
-        points = turning_points_of(samples, place)
-    position = restoring == "sine" and samples.unit == "m"
-    points, length_m = as_angles(points, length_m, position=position)
     if restoring == "sine" and not may_be_sine(points):
         largest = float(np.max(points.amplitude_rad))
         raise NotAnalysableError(
@@ -145,11 +153,9 @@ def _fit(
             "use --restoring linear",
         )
     if method == "turning-points":
-        torque = restoring or restoring_of(points, stated=recording.unit_is_stated)
+        torque = restoring or restoring_of(points, stated=stated)
         return fit_points(points, baseline=baseline, fixed=fixed, restoring=torque)
-    result = _waveform(
-        samples, points, baseline, fixed, restoring, length_m, stated=recording.unit_is_stated
-    )
+    result = _waveform(samples, points, baseline, fixed, restoring, length_m, stated=stated)
     restoring = result.restoring
     if method == "waveform" or _stands(result):
         return result

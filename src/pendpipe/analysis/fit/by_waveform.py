@@ -51,6 +51,7 @@ from pendpipe.dynamics.eq8 import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.dynamics.kernel import kernel
 from pendpipe.estimate import Estimate
 from pendpipe.physics.decay import amplitude, time_at
+from pendpipe.quantities import with_error
 
 Drag = Literal["energy", "speed"]
 Seen = Literal["angle", "rate", "position"]
@@ -792,6 +793,10 @@ def waveform_result(
         shared = _over_shares(fitted, goodness.noise_rms, goodness.enlarged)
         sd = math.sqrt(shared.covariance[DRIFT, DRIFT])
         drift = Estimate(float(fitted.value[DRIFT]), sd, f"{samples.unit}/s")
+    said = [*fitted.start.warnings]
+    if drift is not None:
+        per = with_error(drift.value, drift.sd, drift.unit, short=True)
+        said.append(f"the zero drifts by {per}; it is followed by a line")
     return result_of(
         value,
         matrix,
@@ -800,7 +805,7 @@ def waveform_result(
         points.chosen(inside),
         problem.model(fitted.value)[0],
         goodness=goodness,
-        said=fitted.start.warnings,
+        said=said,
         fixed=fixed,
         method="waveform",
         baseline=baseline,

@@ -11,6 +11,7 @@ import numpy as np
 from pendpipe.analysis.fit.quality import LOSSES, Quality
 from pendpipe.analysis.turning_points import BEAT
 from pendpipe.dynamics import Eq8, Release, turning_points
+from pendpipe.errors import refuse_if
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, pretty_unit, stretch, with_error
 
@@ -264,7 +265,7 @@ def gravity_line(
     corrected = ""
     if result.restoring == "linear":
         squares = [quality.amplitude_rad**2 for quality in result.quality_factors]
-        amplitude = math.sqrt(sum(squares) / len(squares))
+        amplitude = math.sqrt(sum(squares) / len(squares)) / _arm(result, omega, length, gravity)
         release = Release(0.0, min(amplitude, _TOP))
         swing = turning_points(Eq8(1.0, restoring="sine"), release, count=2)
         factor = float(swing.time_s[1]) / math.pi
@@ -280,6 +281,20 @@ def gravity_line(
         assert gravity is not None
         value, name, unit = gravity / omega**2, "length", "m"
     return _line(name, with_error(value, relative * value, unit, short=True) + corrected)
+
+
+def _arm(result: FitResult, omega: float, length: Estimate | None, gravity: float | None) -> float:
+    """What an amplitude is divided by to be an angle: 1 of angles, the length of positions."""
+    unit = result["amplitude"].unit
+    refuse_if(
+        unit not in ("rad", "m"),
+        "--length" if length else "--gravity",
+        f"the amplitude is no angle (its unit is {unit})",
+        "give --unit, so that the correction for its size is known",
+    )
+    if unit == "rad":
+        return 1.0
+    return length.value if length else (gravity or 1.0) / omega**2
 
 
 def _line(title: str, value: str) -> str:
