@@ -275,6 +275,7 @@ def fit(
     from dataclasses import replace
 
     from pendpipe.analysis.fit import fit_recording
+    from pendpipe.analysis.fit.by_points import as_angles
     from pendpipe.analysis.free_decay import measure_recording
 
     if points is None:
@@ -291,6 +292,9 @@ def fit(
         length_m=length_m,
         place=place,
     )
+    if points.unit != result["amplitude"].unit:
+        # Of its rate, or of a position, the angle was fitted.
+        points, _ = as_angles(points, position=points.unit == "m")
     return replace(
         result,
         cuts=(*(cut._asdict() for cut in points.cuts), *result.cuts),

@@ -65,7 +65,7 @@ def fit_many(
         processes is not None and processes < 1, "processes", f"{processes} is none", "give 1"
     )
     work = partial(_fit, options)
-    return _with_bar(work, recordings, processes or _cores(), progress)
+    return _with_bar(work, recordings, processes or cores(), progress)
 
 
 def _with_bar(
@@ -108,7 +108,7 @@ def _in_order(work: Any, jobs: Iterator[Any], number: int) -> Iterator[Any]:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _cores() -> int:
+def cores() -> int:
     """How many cores this process may use: a cluster's job has fewer than its node."""
     try:
         return len(os.sched_getaffinity(0))

@@ -39,4 +39,20 @@ def test_a_name_in_the_page_is_text_and_no_markup(
 def test_a_diagnosis_stands_on_the_page_unless_it_is_not_wanted(tmp_path: Path) -> None:
     page = tmp_path / "rod.html"
     assert cli.main(["page", str(ROD), "--out", str(page)]) == 0
-    assert "What physics is missing" in page.read_text(encoding="utf-8")
+    text = page.read_text(encoding="utf-8")
+    assert "Nothing is missing" in text
+    assert text.count("How to read it.") >= 3
+
+
+def test_several_recordings_get_a_page_each_and_a_table_that_links_to_them(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.csv"
+    bad.write_text("time_s,angle_rad\n0,0\n1,0\n", encoding="utf-8")
+    out = tmp_path / "class.html"
+    asked = ["page", str(ROD), str(ROD.with_name("string-pendulum.csv")), str(bad)]
+    assert cli.main([*asked, "--no-diagnosis", "--out", str(out)]) == 0
+    text = out.read_text(encoding="utf-8")
+    links = re.findall(r'href="([^"]+)"', text)
+    assert len(links) == 2
+    assert all((tmp_path / link).is_file() for link in links)
+    assert "refused" in text
+    assert cli.main(["page", str(ROD), "--out", str(tmp_path / "rod.pdf")]) == 2

@@ -1,41 +1,130 @@
-"""Write one page about one recording: its fit, its figures, and what physics is missing.
+"""Write a page about a recording: a sheet to print with its fit, and the rest below a fold.
 
-The page is a single HTML file that needs no network.
+The page is a single HTML file that needs no network. Several FILEs get a sheet each, and a table of
+all that links to them.
 """
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, NamedTuple
 
-from pendpipe.arguments import FILE, OUTPUT, Arguments, read_motion, shared, tell
+from pendpipe.arguments import FILES, OUTPUT, Arguments, read_motion, shared, tell
+from pendpipe.errors import InputError, refuse_if
 
 ARGUMENTS: Final = (
-    FILE
+    FILES
     | {
-        "--out": {"metavar": "HTML", "help": "the page (FILE.html); - is standard output"} | OUTPUT,
+        "--out": {
+            "metavar": "HTML",
+            "help": "the page (FILE.html), or the table of several; - is standard output",
+        }
+        | OUTPUT,
         "--no-diagnosis": {"action": "store_true", "help": "the fit alone, in a second"},
     }
     | shared("--calibration")
 )
 
 
-def run(arguments: Arguments) -> None:
-    """Fit, diagnose, and write the page."""
-    from dataclasses import replace
+class Sheet(NamedTuple):
+    """A page, or why there is none."""
 
-    from pendpipe import api
+    fitted: Any
+    page: str
+    notes: tuple[str, ...] = ()
+
+
+def run(arguments: Arguments) -> int:
+    """Fit, diagnose, and write the page, or a page each."""
     from pendpipe.files import check_output, write_whole
+
+    out = arguments.out
+    refuse_if(
+        out and out != "-" and Path(out).suffix.lower() not in (".html", ".htm"),
+        f"--out {out}",
+        "its form is unknown",
+        "end its name in .html",
+    )
+    if len(arguments.files) > 1:
+        return _class(arguments)
+    file = arguments.files[0]
+    name = "standard input" if file == "-" else Path(file).name
+    out = out or Path(name).with_suffix(".html")
+    check_output(out)
+    sheet = _sheet(arguments, file)
+    for note in sheet.notes:
+        tell(note)
+    write_whole(out, sheet.page)
+    tell(f"{out}: written")
+    return 0
+
+
+def _sheet(arguments: Arguments, file: str) -> Sheet:
+    """Make the page of one recording."""
+    from pendpipe import api
+    from pendpipe.report.class_table import Fitted
     from pendpipe.report.page import render_recording
 
-    name = "standard input" if arguments.file == "-" else Path(arguments.file).name
-    out = arguments.out or Path(name).with_suffix(".html")
-    check_output(out)
-    recording, provenance = read_motion(arguments)
-    result = replace(api.fit(recording, name=arguments.file), provenance=provenance)
-    statement = None
+    notes: list[str] = []
+    arguments.file = file
+    name = "standard input" if file == "-" else Path(file).name
+    recording, provenance = read_motion(arguments, quiet=True, say=notes.append)
+    result = replace(api.fit(recording, name=file), provenance=provenance, name=name)
+    outcome = None
     if not arguments.no_diagnosis:
         from pendpipe.diagnosis.run import diagnose_recording
 
-        statement = diagnose_recording(recording, place=arguments.file).diagnosis.statement
-    page = render_recording(name, recording, result, statement)
-    write_whole(out, page)
-    tell(f"{out}: written")
+        outcome = diagnose_recording(recording, place=file)
+    page = render_recording(name, recording, result, outcome)
+    return Sheet(Fitted(file, replace(result, points=None, decay=None)), page, tuple(notes))
+
+
+def _of_file(arguments: Arguments, file: str) -> Sheet:
+    from pendpipe.report.class_table import Fitted
+
+    try:
+        return _sheet(arguments, file)
+    except InputError as problem:
+        return Sheet(Fitted(file, None, str(problem).removeprefix(f"{file}: ")), "")
+
+
+def _class(arguments: Arguments) -> int:
+    """Write a page a recording, and the table of all."""
+    from pendpipe.files import check_output, distinct_names, make_folder, write_whole
+    from pendpipe.report.class_table import class_page
+
+    refuse_if(arguments.out == "-", "--out -", "there are several pages", "name a file")
+    out = Path(arguments.out or "class.html")
+    check_output(out)
+    folder = out.with_name(f"{out.stem}_pages")
+    names = [f"{name}.html" for name in distinct_names(arguments.files)]
+    fits, links = [], []
+    for name, sheet in zip(names, _sheets(arguments), strict=True):
+        fits.append(sheet.fitted)
+        links.append(f"{folder.name}/{name}" if sheet.page else None)
+        for note in sheet.notes:
+            tell(note)
+        if sheet.page:
+            make_folder(folder)
+            write_whole(folder / name, sheet.page)
+    write_whole(out, class_page(fits, links))
+    made = sum(link is not None for link in links)
+    tell(f"{out}: written, with {made} pages in {folder}")
+    return 0 if made else 2
+
+
+def _sheets(arguments: Arguments) -> Iterator[Sheet]:
+    """Make the pages side by side, in the order of the files."""
+    from concurrent.futures import ProcessPoolExecutor
+
+    from pendpipe.batch import cores
+
+    if (number := cores()) == 1:
+        yield from (_of_file(arguments, file) for file in arguments.files)
+        return
+    with ProcessPoolExecutor(min(number, len(arguments.files))) as pool:
+        waiting = [pool.submit(_of_file, arguments, file) for file in arguments.files]
+        try:
+            yield from (each.result() for each in waiting)
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)

@@ -40,6 +40,7 @@ from pendpipe.figures.style import (
     measured,
     plain_text,
     quantity_of,
+    stretch_of,
     styled,
     words,
 )
@@ -397,14 +398,15 @@ def draw_fit(decay: Decay, recording: Recording) -> Figure:
     """
     unit = decay.points.unit
     factor, shown_unit = axis_unit(decay.amplitude_rad, unit)
+    own, own_unit = axis_unit(recording.values[recording.usable], recording.unit)
     time, look = recording.time_s, {"alpha": 0.6, "rasterized": True, "label": "readings"}
-    readings = curve(time, factor * recording.values, BLUE, width=0.5, **look)
+    readings = curve(time, own * recording.values, BLUE, width=0.5, **look)
     about = {"xlabel": "Time (s)", "xlim": (float(time[0]), float(time[-1]))}
     return figure_of(
         6.6,
         Panel(
-            [readings, *_fitted(decay, factor)],
-            about | {"ylabel": f"{quantity_of(unit)} ({shown_unit})"},
+            [readings, *(_fitted(decay, own) if recording.unit == unit else ())],
+            about | {"ylabel": f"{quantity_of(recording.unit)} ({own_unit})"},
             key=2,
         ),
         _residual(decay, about),
@@ -418,9 +420,61 @@ def draw_fit(decay: Decay, recording: Recording) -> Figure:
     )
 
 
+@styled
+def draw_sheet(decay: Decay, recording: Recording) -> Figure:
+    """Draw the whole recording with its cuts shaded, and Q against amplitude.
+
+    Parameters
+    ----------
+    decay
+        The turning points and the fit.
+    recording
+        All of it.
+
+    Returns
+    -------
+    Figure
+        Two panels for one printed sheet.
+    """
+    unit = decay.points.unit
+    factor, shown_unit = axis_unit(decay.amplitude_rad, unit)
+    own, own_unit = axis_unit(recording.values[recording.usable], recording.unit)
+    time, look = recording.time_s, {"alpha": 0.6, "rasterized": True, "label": "readings"}
+    marks = [curve(time, own * recording.values, BLUE, width=0.5, **look)]
+    marks += [stretch_of(cut["start_s"], cut["stop_s"]) for cut in decay.fit.cuts]
+    if recording.unit == unit and decay.fit.light != "red":
+        marks += _fitted(decay, own)
+    return figure_of(
+        4.9,
+        Panel(
+            marks,
+            {
+                "xlabel": "Time (s)",
+                "xlim": (float(time[0]), float(time[-1])),
+                "ylabel": f"{quantity_of(recording.unit)} ({own_unit})",
+            },
+            key=2,
+        ),
+        Panel(
+            _quality_by_amplitude(decay, factor),
+            {"xlabel": f"Amplitude ({shown_unit})", "ylabel": "Q", "ylim": (0.0, None)},
+            key=2,
+        ),
+        shares=(1.2, 1.0),
+        sharex=False,
+    )
+
+
+@styled
+def draw_residual(decay: Decay) -> Figure:
+    """Draw what the fitted law leaves of the turning points."""
+    return figure_of(2.2, _residual(decay, {"xlabel": "Time (s)"}))
+
+
 def _quality_by_amplitude(decay: Decay, factor: float) -> Iterator[Mark]:
     amplitude, quality = decay.along(np.linspace(0.0, float(decay.elapsed_s[-1]), 400))
-    yield curve(factor * amplitude, quality, label="fitted law")
+    if decay.fit.light != "red":
+        yield curve(factor * amplitude, quality, label="fitted law")
     seen = [
         (factor * each.amplitude_rad, each.quality_factor.value, each.quality_factor.sd)
         for each in seen_qualities(decay.fit)

@@ -513,16 +513,20 @@ DRAWINGS: Final[dict[str, Callable[[Shown], Figure]]] = {
 """By name, in the order in which they are read."""
 
 
+def draw_each(outcome: Outcome) -> Iterator[tuple[str, Figure]]:
+    """Draw what there is to show, each by its name."""
+    content = shown(outcome)
+    for name, draw in DRAWINGS.items():
+        with suppress(NothingToDrawError):
+            yield name, draw(content)
+
+
 def draw_diagnosis(outcome: Outcome, folder: Path) -> list[Path]:
-    """Draw what there is to show.
+    """Draw what there is to show into a folder.
 
     Returns
     -------
     list of Path
         The SVG files; a PNG stands beside each.
     """
-    content, drawn = shown(outcome), []
-    for name, draw in DRAWINGS.items():
-        with suppress(NothingToDrawError):
-            drawn.append(save(draw(content), folder / name, dpi=150)[0])
-    return drawn
+    return [save(figure, folder / name, dpi=150)[0] for name, figure in draw_each(outcome)]

@@ -125,6 +125,11 @@ def strip(low: float, high: float) -> Mark:
     return methodcaller("axhspan", low, high, color=GREY, alpha=0.18, linewidth=0.0)
 
 
+def stretch_of(start_s: float, stop_s: float) -> Mark:
+    """A stretch of time that was left out."""
+    return methodcaller("axvspan", start_s, stop_s, color=GREY, alpha=0.25, linewidth=0.0)
+
+
 def words(text: str, at: tuple[Any, Any], off: tuple[float, float], **look: Any) -> Mark:
     """Words, some points off a place."""
     look = {"fontsize": 8.5, "textcoords": "offset points"} | look

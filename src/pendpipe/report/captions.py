@@ -97,6 +97,45 @@ CAPTIONS: Final = {
     ),
 }
 
+OF_A_RECORDING: Final = {
+    "residual": Caption(
+        "What the fitted law leaves",
+        "The turning points less the amplitude of the fitted law, bars of one standard deviation.",
+        "Points that scatter about zero mean that the law loses what the decay loses; a course"
+        " is physics that it does not have.",
+    ),
+    "residual_map": CAPTIONS["residual_map"],
+    "residual_spectrum": Caption(
+        "Spectrum of the residual",
+        "What each model leaves, by frequency, with the noise and the harmonics of the motion.",
+        "A peak at a harmonic is a torque or a sensor that is not linear; a peak between them is"
+        " something else that swings or hums; what lies on the noise is explained.",
+    ),
+    "damping": Caption(
+        "Loss against amplitude",
+        "Relative loss of amplitude of a few cycles at a time, of the readings and of both models.",
+        "A line that the points leave to one side has another law of loss: a slope upwards is"
+        " drag, a rise towards small amplitudes friction that does not vanish.",
+    ),
+    "frequency": Caption(
+        "Frequency against amplitude",
+        "Frequency of a few cycles at a time, of the readings and of both models.",
+        "sin x lowers it with the square of the amplitude. Points off the line at small amplitudes"
+        " are a stiffer bearing, at random a clock.",
+    ),
+    "decay": Caption(
+        "The end of the decay, with both models",
+        "Amplitude of each cycle, and what the baseline and the extended model leave.",
+        "What was left out is the difference of the two residuals.",
+    ),
+    "curve": Caption(
+        "The unknown part",
+        "The curve that describes what no name explains, with its 95 % band.",
+        "Its shape is the hint: where it leaves zero, something acts.",
+    ),
+}
+"""Words for the figures of one recording's page."""
+
 PROOF_CAPTIONS: Final = {
     "power": Caption(
         "Power",

@@ -98,7 +98,7 @@ def write_fits(out: str | Path, fits: Sequence[Fitted], content: Mapping[str, An
     makers: dict[str, Callable[[Sequence[Fitted]], str | bytes]] = {
         ".csv": _csv,
         ".xlsx": _excel,
-        ".html": _html,
+        ".html": class_page,
         ".tex": _latex,
     }
     write_whole(out, makers[form](fits))
@@ -232,17 +232,23 @@ def _cells(fits: Sequence[Fitted]) -> list[tuple[str, ...]]:
     return [_row(each, wide=True) for each in fits]
 
 
-def _html(fits: Sequence[Fitted]) -> str:
+def class_page(fits: Sequence[Fitted], links: Sequence[str | None] | None = None) -> str:
+    """Return the table as a page; each name is a link where there is one."""
+    from urllib.parse import quote
+
     from pendpipe.report.page import own_files
     from pendpipe.templates import render
 
-    head = (*HEAD[:-1], *WIDE, HEAD[-1])
+    rows = [(Path(cells[0]).name, *cells[1:]) for cells in _cells(fits)]
     return render(
         "pendpipe.report",
         "class.html",
         style=own_files()["style"],
-        head=head,
-        rows=[(cells, None) for cells in _cells(fits)],
+        head=(*HEAD[:-1], *WIDE, HEAD[-1]),
+        rows=[
+            (cells, link and quote(link))
+            for cells, link in zip(rows, links or [None] * len(rows), strict=True)
+        ],
         together=[str(each) for each in together(fits)],
     )
 

@@ -1,5 +1,7 @@
 """The pages themselves: everything prepared, handed to the templates."""
 
+from __future__ import annotations
+
 import base64
 import hashlib
 import io
@@ -9,18 +11,23 @@ from collections import Counter
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from markupsafe import Markup
 
-from pendpipe.analysis.fit.printed import cause, rate_with_error, sentence
-from pendpipe.analysis.fit.quality import qualities
+from pendpipe.analysis.fit.printed import cause, facts, heading, sentence, size
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.figures.data import error, number, used
 from pendpipe.files import read_json, without_folders
 from pendpipe.quantities import compact, with_error
 from pendpipe.recording import Recording
-from pendpipe.report.captions import CAPTIONS, GLOSSARY, PROOF_CAPTIONS
+from pendpipe.report.captions import (
+    CAPTIONS,
+    GLOSSARY,
+    OF_A_RECORDING,
+    PROOF_CAPTIONS,
+    Caption,
+)
 from pendpipe.report.tables import (
     CHI2_RANGE,
     STATES,
@@ -31,6 +38,11 @@ from pendpipe.report.tables import (
     table_of_records,
 )
 from pendpipe.templates import render as fill_template
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from pendpipe.diagnosis.run import Outcome
 
 TEMPLATES: Final = Path(__file__).parent / "templates"
 BUDGET_BYTES: Final = 5_000_000
@@ -317,9 +329,9 @@ def render_recording(
     name: str,
     recording: Recording,
     result: FitResult,
-    statement: str | None = None,
+    outcome: Outcome | None = None,
 ) -> str:
-    """Make the page of one recording.
+    """Make the page of one recording: a sheet to print, and the rest below a fold.
 
     Parameters
     ----------
@@ -329,26 +341,31 @@ def render_recording(
         The whole of it, with its notes.
     result
         The fit, with its readings.
-    statement
-        The diagnosis in a paragraph; None where none was asked for.
+    outcome
+        The diagnosis; None where none was asked for.
 
     Returns
     -------
     str
         One HTML document that refers to nothing outside itself.
     """
-    unit, has_law = result["amplitude"].unit, result.light != "red"
-    period = result.period
-    titles = {"a": "quadratic", "b": "linear", "c": "Coulomb"} if has_law else {}
-    numbers = [
-        ("Period", with_error(period.value, period.sd, "s")),
-        *(
-            (f"{letter} ({title})", rate_with_error(result[letter], short=False))
-            for letter, title in titles.items()
-        ),
+    from pendpipe.figures.decays import Decay, draw_residual, draw_sheet
+
+    assert result.points is not None
+    decay = Decay(name, result.points, result)
+    drawings: list[tuple[str, Figure]] = [("residual", draw_residual(decay))]
+    if outcome is not None:
+        from pendpipe.figures.diagnosis import draw_each
+
+        drawings += list(draw_each(outcome))
+    figures = [
+        {
+            "svg": _inlined(figure, f"figure-{key}", OF_A_RECORDING[key]),
+            "caption": OF_A_RECORDING[key],
+        }
+        for key, figure in drawings
     ]
-    drawn, title = io.StringIO(), "The decay with its fit"
-    result.plot().savefig(drawn, format="svg", metadata={"Date": None, "Creator": "pendpipe"})
+    unit = result["amplitude"].unit
     return fill_template(
         "pendpipe.report",
         "recording.html",
@@ -356,21 +373,38 @@ def render_recording(
         style=own_files()["style"],
         light=(result.light, *LIGHTS[result.light]),
         reason=result.light_reason,
-        numbers=numbers,
-        qualities=[
+        heading=heading(result, name).partition(": ")[2],
+        advice=sentence(result),
+        facts=list(facts(result)),
+        table=[
             (
-                compact(each.amplitude_rad, unit),
+                size(each.amplitude_rad, unit),
                 with_error(each.quality_factor.value, each.quality_factor.sd),
+                f"{each.period_s:.5g} s",
                 cause(each),
             )
-            for each in qualities(result)
+            for each in result.quality_factors
         ],
-        advice=sentence(result),
-        checks=[check.sentence(unit) for check in result.decrement_check],
-        figures=[(title, inline_svg(drawn.getvalue(), "figure0", title, title))],
-        statement=statement,
+        sheet=_inlined(draw_sheet(decay, recording), "sheet", _SHEET),
+        diagnosis=None if outcome is None else outcome.diagnosis.summary,
+        details="" if outcome is None else outcome.diagnosis.details,
+        numbers=[(title, str(each)) for title, each in result.numbers().items()],
+        figures=figures,
         cuts=result.cuts,
         guesses=(*recording.weak_guesses, *recording.notes),
         warnings=result.warnings,
         provenance=result.provenance,
     )
+
+
+_SHEET: Final = Caption(
+    "The decay, and its quality factor",
+    "Readings and fitted amplitude against time, what was left out shaded; Q against amplitude.",
+    "The line is the fitted law; the circles are the turning points alone and need no law.",
+)
+
+
+def _inlined(figure: Figure, prefix: str, caption: Caption) -> Markup:
+    drawn = io.StringIO()
+    figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": "pendpipe"})
+    return inline_svg(drawn.getvalue(), prefix, caption.title, caption.shows)

@@ -164,8 +164,8 @@ def _fit(
         # What all readings deny is not quoted.
         kept = tuple(name for name in by_points.quotable if name in ("period", "Q"))
         why = result.light_reason if result.settled else "their fit did not settle"
-        reason = "don't quote a, b, c, from the turning points alone; of all readings"
-        return replace(_amber(by_points, f"{reason} {why}"), quotable=kept)
+        reason = f"don't quote a, b, c: of all readings {why}; period and Q are the turning points'"
+        return replace(_amber(by_points, reason), quotable=kept)
     for part in _larger_amplitudes(points):
         larger = fit_waveform(
             samples, part, baseline=baseline, fixed=fixed, restoring=restoring, length_m=length_m
