@@ -373,7 +373,7 @@ class FitResult:
         limit = content["quality_factor_limit"]
         covariance = content["covariance"]
         held: dict[str, Any] = {
-            name: content[name] and Estimate.from_json(content[name])
+            name: content.get(name) and Estimate.from_json(content[name])
             for name in (*PARTS, *OPTIONAL)
         }
         return cls(
@@ -394,15 +394,15 @@ class FitResult:
             provenance=content["provenance"],
             warnings=tuple(content["warnings"]),
             restoring=content["restoring"],
-            drag_form=content["drag_form"],
-            drag=content["drag"],
-            fit_p_value=content["fit_p_value"],
-            torque_odds=content["torque_log_odds"],
+            drag_form=content.get("drag_form", "energy"),
+            drag=content.get("drag", "energy"),
+            fit_p_value=content.get("fit_p_value"),
+            torque_odds=content.get("torque_log_odds"),
             light=content["light"],
             light_reason=content["light_reason"],
-            quotable=tuple(content["quotable"]),
-            widening=Widening(**content["widening"]),
-            period_check=tuple(PeriodCheck(**check) for check in content["period_check"]),
+            quotable=tuple(content.get("quotable", ())),
+            widening=Widening(**content.get("widening", {})),
+            period_check=tuple(PeriodCheck(**check) for check in content.get("period_check", ())),
             decrement_check=tuple(Decrement(**check) for check in content["decrement_check"]),
             **held,
         )
