@@ -315,6 +315,7 @@ def diagnose(
     name: str | None = None,
     own: Sequence[str] = (),
     same_sensor: bool = False,
+    together: bool = False,
 ) -> Outcome | JointOutcome:
     """Find what physics a fit of Eq. 8 leaves out of a recording.
 
@@ -346,6 +347,8 @@ def diagnose(
         ``"frequency"``).
     same_sensor
         Of several recordings: whether they share the sensor's errors as well.
+    together
+        That several recordings are of one pendulum.
 
     Returns
     -------
@@ -372,6 +375,12 @@ def diagnose(
         from pendpipe.diagnosis.several import diagnose_several
         from pendpipe.files import distinct_names
 
+        refuse_if(
+            not together,
+            "diagnose",
+            f"{len(recording)} recordings are given",
+            "say together=True if they are of one pendulum; else diagnose them one by one",
+        )
         refuse_if(fixed, "fixed", "nothing is held in several recordings", "leave it out")
         one = restoring == "linear"
         refuse_if(one, "restoring", "it is for one recording", "leave it out")

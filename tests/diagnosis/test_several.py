@@ -56,7 +56,7 @@ def together(kind: str) -> JointOutcome:
         odd = {"quality_factor_viscous": 500.0} if kind == "odd" and number == 1 else {}
         name = f"{1e3 * amplitude:.0f} mrad"
         releases[name] = swing(amplitude, 40 + number, *effects.get(kind, []), **odd)
-    found = pp.diagnose(releases, volts_per_radian=1.0)
+    found = pp.diagnose(releases, volts_per_radian=1.0, together=True)
     assert isinstance(found, JointOutcome)
     return found
 
@@ -158,7 +158,7 @@ def test_cubic_damping_of_three_amplitudes_is_in_the_class_and_no_value_differs(
             start, state = end, np.array([part.y[0, -1], 0.0])
         noisy = angle + 1e-4 * rng.standard_normal(time.size)
         releases[f"{1e3 * amplitude:.0f} mrad"] = Recording(time, noisy, "angle_rad")
-    found = pp.diagnose(releases)
+    found = pp.diagnose(releases, together=True)
     assert isinstance(found, JointOutcome)
     (effect,) = found.effects
     assert "cubic-damping" in {effect.identifier, *(mate for mate, _ in effect.indistinguishable)}
@@ -184,7 +184,7 @@ def test_knock_in_one_recording_is_its_own_and_the_shared_values_stand() -> None
         name: swing(amplitude, 60 + number, *([knock] if number == 1 else []))
         for number, (name, amplitude) in enumerate({"first": 0.2, "second": 0.3}.items())
     }
-    found = pp.diagnose(releases, volts_per_radian=1.0)
+    found = pp.diagnose(releases, volts_per_radian=1.0, together=True)
     assert isinstance(found, JointOutcome)
     (effect,) = found.effects
     assert effect.location.summary == "in second alone"
@@ -204,7 +204,12 @@ def test_command_writes_the_keys_of_a_diagnosis_and_the_recordings(tmp_path: Pat
             for t, x in zip(recording.time_s.tolist(), recording.values.tolist(), strict=True)
         ]
         Path(files[-1]).write_text("\n".join(["time_s,angle_rad", *lines]))
-    assert main(["diagnose", *files, "--out", str(tmp_path / "out"), "--own", "frequency"]) == 0
+    assert (
+        main(
+            ["diagnose", "--together", *files, "--out", str(tmp_path / "out"), "--own", "frequency"]
+        )
+        == 0
+    )
     found = json.loads((tmp_path / "out/diagnosis.json").read_text())
     one = pp.diagnose(files[0]).to_dict()
     assert one.keys() - found.keys() <= {"remainder", "small_amplitudes", "prediction"}
@@ -217,4 +222,24 @@ def test_what_is_for_one_recording_is_refused(capsys: pytest.CaptureFixture[str]
     assert main(["diagnose", "a.csv", "b.csv", "--fix", "c=0"]) == 2
     assert "--fix" in capsys.readouterr().err
     with pytest.raises(pp.InputError, match="at least two"):
-        pp.diagnose([swing(0.1, 1)], volts_per_radian=1.0)
+        pp.diagnose([swing(0.1, 1)], volts_per_radian=1.0, together=True)
+
+
+def test_two_pendulums_are_not_taken_for_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """1.27 and 1.42 s: no amplitude lengthens the one to the other."""
+    time_s, files = np.arange(0.0, 40.0, 0.02), []
+    for period in (1.27, 1.42):
+        angle = 0.2 * np.exp(-0.02 * time_s) * np.cos(2.0 * np.pi * time_s / period)
+        files.append(str(tmp_path / f"{period}.csv"))
+        rows = "".join(f"{t:.2f},{x:.6f}\n" for t, x in zip(time_s, angle, strict=True))
+        Path(files[-1]).write_text("time_s,angle_rad\n" + rows)
+    assert main(["diagnose", *files]) == 2
+    assert "add --together if they are recordings of one pendulum" in capsys.readouterr().err
+    assert main(["diagnose", "--together", *files]) == 2
+    assert "1.42.csv swings at 0.70" in capsys.readouterr().err
+    with pytest.raises(pp.InputError, match="say together=True"):
+        pp.diagnose(files)
+    with pytest.raises(pp.InputError, match="no amplitude of one pendulum"):
+        pp.diagnose(files, together=True)

@@ -5,8 +5,8 @@ catalogue, of the pendulum and of the measurement alike; those that chance does 
 added to the model. The answer goes to standard output, about twelve lines; DIR gets diagnosis.json
 and the figures.
 
-Several FILEs are recordings of one pendulum: physics shared, start and noise each its own
-(docs/several.md).
+With --together several FILEs are recordings of one pendulum: physics shared, start and noise each
+its own (docs/several.md).
 """
 
 from collections.abc import Mapping
@@ -85,6 +85,10 @@ _OWN: Final[Flags] = {
         "choices": ("auto", "linear"),
         "default": "auto",
         "help": "linear: a torsion wheel or a spring, for which sin x is no candidate",
+    },
+    "--together": {
+        "action": "store_true",
+        "help": "several FILEs are recordings of one pendulum",
     },
     "--own": {
         "action": "append",
@@ -200,6 +204,12 @@ def _diagnose_several(arguments: Arguments) -> int:
             "it is for one recording",
             "give one FILE, or leave it out",
         )
+    refuse_if(
+        arguments.record is None and not arguments.together,
+        "diagnose",
+        f"{len(arguments.files)} files are given",
+        "add --together if they are recordings of one pendulum; else diagnose them one by one",
+    )
     recordings, made, given = {}, [], arguments.calibration
     refuse_if(
         len(given) not in (0, 1, len(arguments.files)),

@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
+from pendpipe.analysis.fit.period import TOP, swing_phase
 from pendpipe.analysis.fit.result import Baseline, units
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis import Progress, silent
@@ -136,6 +137,8 @@ def diagnose_several(
     if unknown := [name for name in own if name not in MAY_DIFFER]:
         remedy = f"known are {', '.join(MAY_DIFFER)}"
         raise InputError("--own", f"'{unknown[0]}' is no parameter that can be shared", remedy)
+    if "frequency" not in own:
+        _check_one_pendulum(recordings, names)
     outcomes = []
     for recording, name in zip(recordings, names, strict=True):
         progress(f"{name} alone")
@@ -699,6 +702,36 @@ class _Answer:
                 f" the 95 % band holds {listed(parts)}."
             )
         return text
+
+
+_MARGIN: Final = 0.03
+"""Part of the frequency by which releases of one pendulum may differ beyond what sin x allows."""
+
+
+def _check_one_pendulum(recordings: Sequence[Recording], names: Sequence[str]) -> None:
+    """Refuse frequencies that no amplitude explains.
+
+    Raises
+    ------
+    InputError
+        If the slowest swings slower than the fastest by more than sin x makes of its amplitude.
+    """
+    from pendpipe.analysis.free_decay import measure_recording
+
+    found = []
+    for recording, name in zip(recordings, names, strict=True):
+        points, _ = measure_recording(recording.as_motion(place=name), name)
+        largest = min(float(np.max(points.amplitude_rad)), TOP) if points.unit == "rad" else 0.0
+        half_swing = float(swing_phase(np.full(2, largest), "sine")[0])
+        found.append((points.apparent_frequency_hz, half_swing / math.pi, name))
+    slow, fast = min(found), max(found)
+    if fast[0] > slow[0] * slow[1] * (1.0 + _MARGIN):
+        raise InputError(
+            "--together",
+            f"{slow[2]} swings at {slow[0]:.4g} Hz and {fast[2]} at {fast[0]:.4g} Hz: no amplitude"
+            " of one pendulum explains that",
+            "diagnose them one by one, or say --own frequency where you changed it",
+        )
 
 
 def _rms(values: FloatArray | Sequence[float]) -> float:
