@@ -166,6 +166,20 @@ def test_a_recording_cut_short_says_so() -> None:
     assert any("cut short" in note for note in recording.notes)
 
 
+def test_a_damaged_first_frame_moves_nothing() -> None:
+    """Its scans are rows without a reading, and the others stay where they are."""
+    whole = written(*(bytes([2 * code, 0x81]) for code in range(1, 9)))
+    sound = decode_recording(whole)
+    damaged = bytearray(whole)
+    damaged[whole.index(b"\x02\x81")] ^= 8
+    recording = decode_recording(bytes(damaged))
+    assert recording.time_s.tolist() == sound.time_s.tolist()
+    assert recording.quality is not None
+    assert recording.quality.tolist() == [MISSING] + [0] * 7
+    assert recording.values[1:].tolist() == sound.values[1:].tolist()
+    assert any("1 scans are lost" in note for note in recording.notes)
+
+
 def test_nothing_recorded_is_refused() -> None:
     with pytest.raises(InputError, match="no scan was recorded"):
         decode_recording(written())
@@ -188,7 +202,7 @@ def test_frames_need_not_hold_whole_scans(model: str) -> None:
         writer.data(0.0175 * number, data[begin : begin + 7])
     whole = stream.getvalue()
     sound = decode_recording(whole, channel=2)
-    for begin in range(21, len(data) - 14, 7):
+    for begin in range(0, len(data) - 14, 7):
         damaged = bytearray(whole)
         damaged[whole.index(data[begin : begin + 7])] ^= 8
         recording = decode_recording(bytes(damaged), channel=2)

@@ -234,7 +234,8 @@ def _join(
     parts: list[tuple[FloatArray, FloatArray, ByteArray]] = []
     for segment, begin_s in zip(segments, offsets_s(segments, rate_hz), strict=True):
         length = len(segment.counts)
-        inside = [loss for loss in segment.losses if 0 < loss.after_scan < length]
+        # What came before the first scan was never one, unless its frame was damaged.
+        inside = [loss for loss in segment.losses if loss.after_scan < length and loss.is_gap]
         number, index, quality = _place(length, inside)
         if parts:
             last_s = float(parts[-1][0][-1])
@@ -491,7 +492,7 @@ def _scans_by(
         later = arrived_bytes >= loss.after_scan * bytes_per_scan + discarded
         good[later] -= loss.discarded_bytes / bytes_per_scan
         made[later] -= loss.discarded_bytes / bytes_per_scan
-        made[later] += loss.lost_scans if loss.after_scan else 0
+        made[later] += loss.lost_scans if loss.is_gap else 0
     return made, good
 
 

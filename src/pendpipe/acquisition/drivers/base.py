@@ -58,6 +58,11 @@ class Loss:
     suspect_before: bool = False
     reason: str = ""
 
+    @property
+    def is_gap(self) -> bool:
+        """Whether scans are missing: bytes before the first scan are none, unless recorded."""
+        return self.after_scan > 0 or self.reason == "damage"
+
 
 class Scans(NamedTuple):
     """What a decoder made of some bytes.
