@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 from types import SimpleNamespace
@@ -165,25 +166,54 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_the_recording(
     assert not raw_files(tmp_path)
 
 
+LISTENING = """
+import signal, sys
+from pendpipe.cli import main
+# Whoever runs the tests in the background, or under nohup, lets their children ignore these.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+for name in ("SIGTERM", "SIGHUP"):
+    signal.signal(getattr(signal, name), signal.SIG_DFL)
+sys.exit(main())
+"""
+
+
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_a_signal_ends_a_recording_and_what_was_recorded_is_written(
     name: str, tmp_path: Path
 ) -> None:
+    """A closing terminal sends several: those that come while it is written change nothing."""
     number = getattr(signal, name, None)
-    if number is None or sys.platform == "win32":
+    if number is None or not hasattr(os, "mkfifo"):
         pytest.skip("this system has no such signal")
     out, raw = tmp_path / "decay.csv", tmp_path / "decay.raw"
-    command = "acquire --device simulated:di2108 --rate 100 --duration 600 --out"
-    process = subprocess.Popen([sys.executable, "-m", "pendpipe.cli", *command.split(), str(out)])
-    while not raw.exists() or raw.stat().st_size < 2000:
-        time.sleep(0.01)
+    os.mkfifo(out)  # nothing is written to it before it is read
+    command = "acquire --device simulated:di2108 --rate 100 --duration 600 --raw"
+    process = subprocess.Popen(
+        [sys.executable, "-c", LISTENING, *command.split(), str(raw), "--out", str(out)]
+    )
+    until(process, lambda: raw.exists() and len(read_raw(raw).data) > 200)
     os.kill(process.pid, number)
-    os.kill(process.pid, number if name != "SIGINT" else 0)
-    assert process.wait() == 0
+    until(process, lambda: bool(read_raw(raw).event("stopped")))
+    if name != "SIGINT":
+        os.kill(process.pid, number)
+    written = b""
+    with os.fdopen(os.open(out, os.O_RDONLY | os.O_NONBLOCK), "rb", buffering=0) as pipe:
+        while process.poll() is None:
+            written += pipe.read() or b""
+            time.sleep(0.01)
+        written += pipe.read() or b""
+    assert process.returncode == 0
     assert read_raw(raw).event("stopped")["reason"] == "interrupted by the user"
-    recording = read_plain(out)
+    recording = read_plain(out, written)
     assert len(recording) > 10
     assert "interrupted by the user" in recording.metadata["notes"]
+
+
+def until(process: subprocess.Popen[bytes], met: Callable[[], bool]) -> None:
+    """Wait for what a process does; if it ends before, that is the answer."""
+    while not met():
+        assert process.poll() is None
+        time.sleep(0.01)
 
 
 def test_make_clean_spares_what_an_instrument_has_recorded(tmp_path: Path) -> None:

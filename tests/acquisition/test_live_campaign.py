@@ -33,6 +33,8 @@ LINKS = [
     "socket",
 ]
 DURATION_S = 4.0
+LONG_S = 8.0
+"""Of a recording that is broken off, so that a busy machine does not end it before."""
 
 
 @pytest.fixture(params=LINKS)
@@ -69,14 +71,14 @@ def test_neither_changed_code_nor_force_records_again(link: str, tmp_path: Path)
 
 def test_a_killed_campaign_uses_what_was_recorded(link: str, tmp_path: Path) -> None:
     with served_device(tmp_path, link) as port:
-        campaign = LiveCampaign(tmp_path, port, DURATION_S, "turning_points.csv")
+        campaign = LiveCampaign(tmp_path, port, 600.0, "turning_points.csv")
         campaign.kill_at(0.7 * DURATION_S)
         raw = campaign.raw_files
         done = campaign.run()
     assert done.returncode == 0, done.stderr
     assert campaign.raw_files == raw
     recording = read_plain(campaign.recording)
-    assert 0.7 * DURATION_S - 0.1 < recording.time_s[-1] < DURATION_S - 0.3
+    assert recording.time_s[-1] > 0.7 * DURATION_S - 0.1
     assert "cut short" in recording.metadata["notes"]
     lines = [line for line in done.stdout.splitlines() if line.startswith("live: ")]
     assert len(lines) == 1
@@ -105,11 +107,11 @@ def test_a_dead_line_fails_its_job_alone_and_the_next_run_tries_again(
 
 
 def lost_in_the_midst(campaign: LiveCampaign, device: subprocess.Popen[str]) -> str:
-    """Run the campaign, end the device at a third of the recording; return the job's log."""
+    """Run the campaign, end the device after a second of the recording; return the job's log."""
     running = subprocess.Popen(
         campaign.command(), cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
-    while running.poll() is None and campaign.recorded_s() < 0.3 * DURATION_S:
+    while running.poll() is None and campaign.recorded_s() < 1.2:
         time.sleep(0.02)
     device.kill()
     assert running.wait() == 1
@@ -120,9 +122,9 @@ def test_a_line_that_is_lost_fails_its_job_and_the_next_run_records_anew(
     link: str, tmp_path: Path
 ) -> None:
     with served_process(tmp_path, link) as (device, port):
-        campaign = LiveCampaign(tmp_path, port, DURATION_S)
+        campaign = LiveCampaign(tmp_path, port, LONG_S)
         log = lost_in_the_midst(campaign, device)
-    assert f"s of {DURATION_S:g} s are kept in" in log.splitlines()[-1]
+    assert f"s of {LONG_S:g} s are kept in" in log.splitlines()[-1]
     assert "Traceback" not in log
     assert (campaign.results / "file/recording.csv").exists()
     assert not campaign.recording.exists()
@@ -138,7 +140,7 @@ def test_a_line_that_is_lost_fails_its_job_and_the_next_run_records_anew(
 
 def test_what_a_lost_line_has_left_is_the_record_once_it_is_accepted(tmp_path: Path) -> None:
     with served_process(tmp_path, "socket") as (device, port):
-        campaign = LiveCampaign(tmp_path, port, DURATION_S, "calibration.json")
+        campaign = LiveCampaign(tmp_path, port, LONG_S, "calibration.json")
         lost_in_the_midst(campaign, device)
     call = ["acquire", "--campaign", str(tmp_path / "config.yaml"), "--record", "live"]
     assert main([*call, "--accept-short"]) == 0
@@ -149,12 +151,12 @@ def test_what_a_lost_line_has_left_is_the_record_once_it_is_accepted(tmp_path: P
     assert campaign.recording.read_bytes() == recording
     assert len(campaign.raw_files) == 1
     kept_s = read_plain(campaign.recording).time_s[-1]
-    assert 0.2 * DURATION_S < kept_s < 0.9 * DURATION_S
+    assert 1.0 < kept_s < LONG_S
     # The report prints the calibration's warnings.
     calibration = json.loads((campaign.results / "live/calibration.json").read_text())
     warning = calibration["warnings"][-1]
     assert warning.startswith("the recording is incomplete: ended early: the line was lost")
-    assert f"{kept_s:.6g} s of {DURATION_S:g} s kept" in warning
+    assert f"{kept_s:.6g} s of {LONG_S:g} s kept" in warning
 
 
 def test_only_an_explicit_request_records_anew(
