@@ -38,6 +38,7 @@ COMMANDS: Final = {
     "doctor": "what is wrong with a campaign's results, and what is safe to do",
     "config": "check a configuration, or print its schema",
     "effects": "the catalogue of what may have been left out",
+    "stage": "one stage of a chunk of a campaign's records, as a job of the workflow",
 }
 """The commands with the line that ``--help`` shows for each."""
 STAGES: Final = {

@@ -20,7 +20,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from pendpipe.errors import DamagedError, InputError
 from pendpipe.files import digest, is_file, read_json, sha256, write_json, writing
@@ -72,6 +72,8 @@ class Manifest:
         Files of the user, by name alone.
     repaired
         Marks of the damages that made the stage run again.
+    key
+        Digest of what the stage of a record was done with; empty while it is not done.
     own_damage
         Where the manifest's own file can't be believed; it then lists nothing.
     """
@@ -83,6 +85,7 @@ class Manifest:
     inputs: dict[str, str] = field(default_factory=dict)
     sources: dict[str, Sum] = field(default_factory=dict)
     repaired: tuple[str, ...] = ()
+    key: str = ""
     own_damage: Damage | None = None
 
     @property
@@ -92,34 +95,44 @@ class Manifest:
 
     def write(self) -> None:
         """Write it; two runs of the same campaign write the same bytes."""
-        content = {
-            "schema_version": 1,
-            "stage": self.stage,
-            "version": __version__,
+        head = {"schema_version": 1, "stage": self.stage, "version": __version__}
+        content = head | self.content()
+        write_json(self.path, content | {"check": digest(content)})
+
+    def content(self) -> dict[str, Any]:
+        """What it lists."""
+        return {
             **{
                 name: {key: entry._asdict() for key, entry in getattr(self, name).items()}
                 for name in ("outputs", "extras", "sources")
             },
             "inputs": self.inputs,
             "repaired": list(self.repaired),
+            "key": self.key,
         }
-        write_json(self.path, content | {"check": digest(content)})
 
-    def damages(self, *, hash_all: bool = False) -> list[Damage]:
+    def damages(self, *, hash_all: bool = False, missing: bool = False) -> list[Damage]:
         """Compare the results with what was written.
 
-        A missing output is none: Snakemake sees it by itself. Only files whose length or
-        time of change differs are hashed, unless `hash_all`.
+        A missing output is none unless `missing`: Snakemake sees those of the campaign's own
+        stages by itself. Only files whose length or time of change differs are hashed, unless
+        `hash_all`.
         """
-        if self.own_damage or not self.path.is_file():
-            return [self.own_damage] if self.own_damage else []
-        since = None if hash_all else _written_ns(self.path)
-        return [
-            damage
-            for name, made in (self.outputs | self.extras).items()
-            if (damage := _compare(self.home / name, made, since)) is not None
-            and (name in self.extras or damage.found != "missing")
-        ]
+        if self.own_damage:
+            return [self.own_damage]
+        home, listed = str(self.home), self.outputs | self.extras
+        try:
+            since = None if hash_all else _written_ns(self.path)
+        except OSError:
+            return [Damage(self.path, "it is missing", "missing")] if listed else []
+        found = []
+        for name, made in listed.items():
+            if since is None or not _unchanged(f"{home}/{name}", made, since):
+                damage = _compare(self.home / name, made)
+                lost = damage is not None and damage.found == "missing"
+                if damage is not None and (missing or name in self.extras or not lost):
+                    found.append(damage)
+        return found
 
 
 def read_manifest(home: Path, stage: str) -> Manifest:
@@ -131,14 +144,43 @@ def read_manifest(home: Path, stage: str) -> Manifest:
         content = read_json(manifest.path)
         if content.pop("check") != digest(content):
             raise ValueError
-        for name in ("outputs", "extras", "sources"):
-            setattr(manifest, name, {key: Sum(**entry) for key, entry in content[name].items()})
-        manifest.inputs, manifest.repaired = dict(content["inputs"]), tuple(content["repaired"])
+        return of_content(home, stage, content)
     except (InputError, AttributeError, KeyError, TypeError, ValueError):
         found = sha256(manifest.path)[:8]
         damage = Damage(manifest.path, "this manifest is torn or altered", found)
         return Manifest(home, stage, own_damage=damage)
-    return manifest
+
+
+def of_content(home: Path, stage: str, content: dict[str, Any]) -> Manifest:
+    """Make a manifest of what was written of it (`Manifest.content`)."""
+    files: dict[str, Any] = {
+        name: {key: Sum(**entry) for key, entry in content[name].items()}
+        for name in ("outputs", "extras", "sources")
+    }
+    return Manifest(
+        home,
+        stage,
+        **files,
+        inputs=dict(content["inputs"]),
+        repaired=tuple(content["repaired"]),
+        key=str(content.get("key", "")),
+        own_damage=None,
+    )
+
+
+def noticed(damage: Damage) -> str:
+    """The line about a damaged file when a run is planned."""
+    return f"{damage.path}: {damage.problem}; a run sets it aside and makes it again"
+
+
+def recorded(paths: Iterable[Path]) -> dict[str, str]:
+    """The hashes of results as their stages recorded them; of a file in no manifest, its own."""
+    index, hashes = Index(), {}
+    for path in paths:
+        found = index.find(path)
+        if found is not None or path.is_file():
+            hashes[path.name] = sha256(path) if found is None else found[1].sha256
+    return hashes
 
 
 def manifests(home: Path) -> Iterator[Manifest]:
@@ -160,15 +202,19 @@ def histories(home: Path) -> tuple[dict[str, str], list[str]]:
     for manifest in manifests(home):
         damages = manifest.damages()
         found[manifest.stage] = " ".join((*manifest.repaired, *(one.mark for one in damages)))
-        lines += [
-            f"{damage.path}: {damage.problem}; a run sets it aside and makes it again"
-            for damage in damages
-        ]
+        lines += [noticed(damage) for damage in damages]
     return found, lines
 
 
-def set_aside_damaged(home: Path) -> list[str]:
+def set_aside_damaged(home: Path, *, missing: bool = False) -> list[str]:
     """Before the jobs run: set aside what is damaged in a folder of results.
+
+    Parameters
+    ----------
+    home
+        The folder.
+    missing
+        Whether a missing output is damage, as in a record's folder.
 
     Returns
     -------
@@ -177,14 +223,14 @@ def set_aside_damaged(home: Path) -> list[str]:
     """
     lines = []
     for manifest in manifests(home):
-        found = manifest.damages()
+        found = manifest.damages(missing=missing)
         lines += [f"{damage.path}: {damage.problem}; {set_aside(damage)}" for damage in found]
         if found:
             damaged = {damage.path for damage in found}
             manifest.outputs = {
                 name: made for name, made in manifest.outputs.items() if home / name not in damaged
             }
-            manifest.extras = {}
+            manifest.extras, manifest.key = {}, ""
             manifest.repaired += tuple(damage.mark for damage in found)
             manifest.write()
         else:
@@ -285,7 +331,7 @@ def check(paths: Iterable[Path]) -> dict[Path, str]:
             hashes[path] = sha256(path)
             continue
         owner, made = found
-        damage = _compare(path, made, None) or index.made_from_others(path, owner)
+        damage = _compare(path, made) or index.made_from_others(path, owner)
         if damage is not None:
             raise DamagedError(
                 path,
@@ -338,11 +384,10 @@ def _sum_of_source(path: Path) -> Sum | None:
         return None
 
 
-def source_sha256(home: Path, stage: str, source: Path) -> str | None:
+def source_sha256(manifest: Manifest, source: Path) -> str | None:
     """Hash a file of the user; from the manifest if it has not changed since."""
     if not is_file(source):
         return None
-    manifest = read_manifest(home, stage)
     made = manifest.sources.get(source.name)
     since = _written_ns(manifest.path) if made is not None else None
     kept = made is not None and since is not None and _unchanged(source, made, since)
@@ -368,20 +413,21 @@ def _name(path: Path, home: Path) -> str:
     return Path(os.path.relpath(path.absolute(), home.absolute())).as_posix()
 
 
-def _unchanged(path: Path, made: Sum, since_ns: int) -> bool:
+def _unchanged(path: str | Path, made: Sum, since_ns: int) -> bool:
     """Whether a file has its length, and nobody has changed it since a moment."""
-    status = path.stat()
+    try:
+        status = os.stat(path)  # noqa: PTH116 (a Path takes longer, and files are many)
+    except OSError:
+        return False
     # On Windows st_ctime is the time of creation, and st_mtime all there is.
     changed_ns = max(status.st_ctime_ns, status.st_mtime_ns)
     return status.st_size == made.length and changed_ns < since_ns
 
 
-def _compare(path: Path, made: Sum, since_ns: int | None) -> Damage | None:
-    """Compare a file with what was written; hash it if it has changed since."""
+def _compare(path: Path, made: Sum) -> Damage | None:
+    """Compare a file with what was written: hash it."""
     if not path.is_file():
         return Damage(path, "it is missing", "missing")
-    if since_ns is not None and _unchanged(path, made, since_ns):
-        return None
     length, found = sum_of(path)
     torn = f"it is torn or altered ({length} bytes of {made.length})"
     problem = torn if length < made.length else "it was altered"

@@ -171,11 +171,11 @@ def test_a_source_is_recorded_and_never_touched(home: Path, tmp_path: Path) -> N
     source.write_text("mine\n")
     with manifest.job(home, "acquire", sources=[source]):
         pass
-    before = manifest.source_sha256(home, "acquire", source)
+    before = manifest.source_sha256(manifest.read_manifest(home, "acquire"), source)
     with_its_old_time(source, bytes)  # written again as it was
-    assert manifest.source_sha256(home, "acquire", source) == before
+    assert manifest.source_sha256(manifest.read_manifest(home, "acquire"), source) == before
     with_its_old_time(source, cut)
-    assert manifest.source_sha256(home, "acquire", source) != before
+    assert manifest.source_sha256(manifest.read_manifest(home, "acquire"), source) != before
     assert noticed(home) == []
     assert source.exists()
 

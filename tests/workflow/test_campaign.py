@@ -16,8 +16,10 @@ import pytest
 import yaml
 
 from pendpipe.cli import main
+from pendpipe.configuration.load import read_records
 from pendpipe.files import check_output
 from pendpipe.manifest import FOLDER, manifests
+from pendpipe.stages.chunks import split
 
 ROOT = Path(__file__).parents[2]
 SMALL = ROOT / "tests/workflow/small"
@@ -31,7 +33,11 @@ class Campaign:
         self.records = folder / "records.tsv"
         shutil.copy(SMALL / "records.tsv", self.records)
         content = yaml.safe_load((SMALL / "config.yaml").read_text(encoding="utf-8"))
-        content |= {"results": self.results.as_posix(), "records": self.records.as_posix()}
+        content |= {
+            "results": self.results.as_posix(),
+            "records": self.records.as_posix(),
+            "batch": 4,
+        }
         self.configuration = folder / "config.yaml"
         self.configuration.write_text(yaml.safe_dump(content), encoding="utf-8")
 
@@ -57,6 +63,11 @@ class Campaign:
             name: int(count)
             for name, count in re.findall(r"^(\w+) +(\d+)$", said, flags=re.MULTILINE)
         }
+
+    @property
+    def chunks(self) -> int:
+        """In how many jobs a stage does the records."""
+        return len(split({each.record: each for each in read_records(self.records)}, 4))
 
     def summary(self) -> dict[str, Any]:
         """Read campaign.json."""
@@ -238,7 +249,7 @@ def test_a_finished_campaign_has_nothing_to_do(campaign: Campaign) -> None:
     [("calibration.json", "calibrate"), ("diagnosis/damping.svg", "diagnose")],
 )
 def test_a_lost_result_is_made_again(campaign: Campaign, name: str, stage: str) -> None:
-    """Even one that no job to be run declares: Snakemake alone would not miss it."""
+    """Snakemake knows what the job of a chunk leaves, and no record's files."""
     path = campaign.results / "air-07" / name
     path.rename(path.with_name("lost"))
     try:
@@ -249,22 +260,22 @@ def test_a_lost_result_is_made_again(campaign: Campaign, name: str, stage: str) 
 
 def test_forcing_the_fit_reruns_it_and_what_follows(campaign: Campaign) -> None:
     planned = campaign.planned("--forcerun", "fit")
-    records = len(campaign.records.read_text(encoding="utf-8").splitlines()) - 1
-    assert planned["fit"] == records
+    assert planned["fit"] == campaign.chunks
     assert planned["separate"] == planned["compare"] == planned["report"] == 1
     assert not {"acquire", "calibrate", "turning_points", "diagnose"} & set(planned)
 
 
-def test_an_added_row_runs_its_own_jobs_and_the_campaigns(campaign: Campaign) -> None:
+def test_an_added_row_runs_the_jobs_of_its_chunk_and_the_campaigns(campaign: Campaign) -> None:
     before = campaign.records.read_text(encoding="utf-8")
     row = "water-high-3\tsimulated\twater\thigh\thigh-3\t\t\t\t\t20.0\n"
+    unsplit = campaign.chunks
     campaign.records.write_text(before + row, encoding="utf-8")
     try:
-        planned = campaign.planned()
+        planned, split_in = campaign.planned(), 1 + campaign.chunks - unsplit
     finally:
         campaign.records.write_text(before, encoding="utf-8")
     for stage in ("acquire", "calibrate", "turning_points", "fit", "diagnose"):
-        assert planned[stage] == 1
+        assert planned[stage] == split_in < campaign.chunks
     for stage in ("separate", "compare", "figures", "report"):
         assert planned[stage] == 1
 
@@ -279,8 +290,7 @@ def test_a_change_in_the_library_reruns_what_depends_on_it(
     with (library / "pendpipe/analysis/fit/by_waveform.py").open("a") as source:
         source.write("# changed\n")
     planned = campaign.planned(library=library)
-    records = len(campaign.records.read_text(encoding="utf-8").splitlines()) - 1
-    assert planned["fit"] == records
+    assert planned["fit"] == campaign.chunks
     assert planned["separate"] == planned["compare"] == planned["report"] == 1
     assert not {"acquire", "caliper", "calibrate", "turning_points"} & set(planned)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from pendpipe.configuration.load import read_records
+from pendpipe.stages.chunks import batch_for, split
 
 ROOT = Path(__file__).parents[2]
 
@@ -33,19 +34,24 @@ def jobs(output: str) -> dict[str, int]:
     return {name: int(n) for name, n in re.findall(r"^(\w+) +(\d+)$", output, flags=re.MULTILINE)}
 
 
-def test_the_default_campaign_has_a_job_a_record_in_each_of_its_stages(
-    tmp_path: Path,
-) -> None:
+def chunks(table: Path) -> int:
+    """In how many jobs a stage does the records of a table."""
+    records = read_records(table)
+    return len(split({each.record: each for each in records}, batch_for(len(records))))
+
+
+def test_the_default_campaign_has_a_job_a_chunk_in_each_of_its_stages(tmp_path: Path) -> None:
     done = dry_run(tmp_path / "results")
     assert done.returncode == 0, done.stdout + done.stderr
     counted = jobs(done.stdout + done.stderr)
     total = counted.pop("total")
-    records = len(read_records(ROOT / "config/records.tsv"))
+    jobs_of_stage = chunks(ROOT / "config/records.tsv")
+    assert jobs_of_stage >= 2, "a job a core"
     for stage in ("acquire", "calibrate", "turning_points", "fit", "diagnose"):
-        assert counted.pop(stage) == records
+        assert counted.pop(stage) == jobs_of_stage
     assert set(counted.values()) == {1}, "the other stages are the campaign's"
     assert {"separate", "compare", "figures", "report"} <= set(counted)
-    assert total == 5 * records + len(counted)
+    assert total == 5 * jobs_of_stage + len(counted)
 
 
 def test_records_of_one_pendulum_have_a_job_together(tmp_path: Path) -> None:
@@ -83,16 +89,15 @@ def test_a_source_of_any_name_stops_no_other_record(tmp_path: Path) -> None:
     )
     done = dry_run(tmp_path / "results", "--configfile", str(configuration))
     assert done.returncode == 0, done.stdout + done.stderr
-    assert jobs(done.stdout + done.stderr)["acquire"] == len(names)
+    assert jobs(done.stdout + done.stderr)["acquire"] == chunks(table)
 
 
 def test_recordings_of_others_need_no_file_for_a_dry_run(tmp_path: Path) -> None:
     """On a clean checkout there is no ../shared; the records are then refused, one by one."""
     done = dry_run(tmp_path / "results", "--configfile", "benchmarks/shared_recordings.yaml")
     assert done.returncode == 0, done.stdout + done.stderr
-    rows = (ROOT / "benchmarks/shared_recordings.tsv").read_text(encoding="utf-8").splitlines()
-    records = [row for row in rows[1:] if not row.startswith(("#", "record\t"))]
-    assert jobs(done.stdout + done.stderr)["acquire"] == len(records)
+    table = ROOT / "benchmarks/shared_recordings.tsv"
+    assert jobs(done.stdout + done.stderr)["acquire"] == chunks(table)
 
 
 @pytest.mark.parametrize(

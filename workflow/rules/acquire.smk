@@ -1,24 +1,31 @@
 rule acquire:
-    input:
-        lambda wildcards: jobs.source_files(CAMPAIGN, wildcards.record),
     output:
-        # Not deleted before the job, nor after its failure. An instrument's raw files, in the
-        # folder beside it, are no output at all: the job decodes what they keep, and records
-        # only where there is nothing.
-        update(f"{RESULTS}/{{record}}/recording.csv"),
+        chunk_of("acquire"),
     log:
-        f"{RESULTS}/{{record}}/logs/acquire.log",
+        f"{RESULTS}/logs/acquire-{{chunk}}.log",
     conda:
         "../envs/pendpipe.yaml"
     resources:
         configuration=CONFIGURATION,
     params:
-        refusal=refusal,
-        depends=lambda wildcards: jobs.acquisition(CAMPAIGN, wildcards.record),
-        repaired=repaired("{record}", "acquire"),
+        settings=planned("acquire", "settings"),
+        repaired=planned("acquire", "repaired"),
         code=code_version("pendpipe.commands.acquire"),
     message:
-        "{wildcards.record}: acquire"
+        "acquire, chunk {wildcards.chunk}"
     shell:
-        "pendpipe acquire --campaign {resources.configuration:q} --record {wildcards.record:q}"
-        " --out {output:q} {params.refusal} 2> {log:q}"
+        "pendpipe stage acquire --campaign {resources.configuration:q} --chunk {wildcards.chunk:q}"
+        " --out {output:q} 2> {log:q}"
+
+
+if LIVE:
+
+    # On the machine with the instrument, a job each; what an instrument has recorded is kept.
+    localrules:
+        acquire_live,
+
+    ruleorder: acquire_live > acquire
+
+    use rule acquire as acquire_live with:
+        wildcard_constraints:
+            chunk="|".join(map(re.escape, LIVE)),

@@ -27,24 +27,22 @@ rule caliper:
 
 rule calibrate:
     input:
-        recording=f"{RESULTS}/{{record}}/recording.csv",
+        recordings=chunk_of("acquire"),
         sensor=rules.caliper.output.sensor if CAMPAIGN.configuration.calibration else [],
     output:
-        f"{RESULTS}/{{record}}/calibration.json",
+        chunk_of("calibrate"),
     log:
-        f"{RESULTS}/{{record}}/logs/calibrate.log",
+        f"{RESULTS}/logs/calibrate-{{chunk}}.log",
     conda:
         "../envs/pendpipe.yaml"
+    resources:
+        configuration=CONFIGURATION,
     params:
-        refusal=refusal,
-        sensor=lambda wildcards, input: option("sensor", input.sensor or None),
-        given=lambda wildcards: option(
-            "volts-per-radian", CAMPAIGN.record(wildcards.record).volts_per_radian
-        ),
-        repaired=repaired("{record}", "calibrate"),
+        settings=planned("calibrate", "settings"),
+        repaired=planned("calibrate", "repaired"),
         code=code_version("pendpipe.commands.calibrate"),
     message:
-        "{wildcards.record}: calibrate"
+        "calibrate, chunk {wildcards.chunk}"
     shell:
-        "pendpipe calibrate {input.recording:q} --record {wildcards.record:q} {params.sensor}"
-        " {params.given} --out {output:q} {params.refusal} 2> {log:q}"
+        "pendpipe stage calibrate --campaign {resources.configuration:q} --chunk {wildcards.chunk:q}"
+        " --out {output:q} 2> {log:q}"

@@ -10,10 +10,10 @@ from pendpipe import manifest
 from pendpipe.configuration import jobs
 from pendpipe.configuration.load import load_campaign, read_configuration
 from pendpipe.errors import InputError
-from pendpipe.figures import OF_EVERY_DIAGNOSIS
 from pendpipe.files import check_writable
 from pendpipe.provenance import code_version
 from pendpipe.report.captions import CAPTIONS
+from pendpipe.stages import chunks
 
 jobs.prepare_environment()
 
@@ -48,15 +48,62 @@ FORMS = ["svg", "png"]
 STRICT = CAMPAIGN.configuration.strict
 
 
-def in_every_folder(look):
-    """What `look` finds in the campaign's folders of results, by folder."""
-    pendulums = (f"pendulums/{name}" for name in PENDULUMS)
-    folders = ("", "calibration", *RECORDS, *pendulums)
-    return {folder: checked(look, Path(RESULTS, folder)) for folder in folders}
+# A job does a stage for a chunk of records. Live recordings are a chunk each, and stay on this
+# machine.
+CHUNKS = chunks.chunks_of(CAMPAIGN)
+LIVE = [chunk for chunk, rows in CHUNKS.items() if rows[0].source.startswith("dataq:")]
+STAGES = [
+    stage
+    for name, stage in chunks.STAGES.items()
+    if name != "diagnose" or CAMPAIGN.configuration.diagnose.enabled
+]
+if workflow.is_main_process:
+    # Of a stage that is forced, what is done is done again. The jobs inherit it, on a cluster too.
+    forced = workflow.dag_settings.forcerun if workflow.dag_settings else ()
+    every = workflow.dag_settings.forceall if workflow.dag_settings else False
+    os.environ[chunks.ANEW] = " ".join(
+        name for name in chunks.STAGES if every or name.replace("-", "_") in forced
+    )
 
 
 # Before any job has begun: while they run, results come and go.
-FOUND = in_every_folder(manifest.histories)
+PLANS = {
+    (stage.name, chunk): checked(chunks.plan, CAMPAIGN, stage, chunk, records)
+    for stage in STAGES
+    for chunk, records in CHUNKS.items()
+}
+OWN = ("", "calibration", *(f"pendulums/{name}" for name in PENDULUMS))
+FOUND = {folder: checked(manifest.histories, Path(RESULTS, folder)) for folder in OWN}
+
+
+def damage_lines():
+    """A line for each result that is not as its stage wrote it."""
+    return [line for plan in PLANS.values() for line in plan.lines] + [
+        line for _, lines in FOUND.values() for line in lines
+    ]
+
+
+def set_aside_damaged():
+    """Rename what is damaged, and return a line for each file."""
+    records = {home for plan in PLANS.values() for home in plan.damaged}
+    lines = [
+        line
+        for home in sorted(records)
+        for line in checked(lambda: manifest.set_aside_damaged(home, missing=True))
+    ]
+    own = (checked(manifest.set_aside_damaged, Path(RESULTS, folder)) for folder in OWN)
+    return lines + [line for found in own for line in found]
+
+
+def planned(name, of):
+    """What the plan of a job knows, as a parameter of its stage."""
+    return lambda wildcards: getattr(PLANS[name, wildcards.chunk], of)
+
+
+def chunk_of(name, only=None):
+    """What the jobs of a stage leave: that of the same chunk, or of all (or of `only`)."""
+    path = f"{RESULTS}/chunks/{name}-{{chunk}}.json"
+    return path if only is None else expand(path, chunk=only)
 
 
 def repaired(folder, *stages):
@@ -70,34 +117,17 @@ def repaired(folder, *stages):
 
 
 wildcard_constraints:
-    record="|".join(map(re.escape, RECORDS)),
+    chunk="|".join(map(re.escape, CHUNKS)),
+    pendulum="|".join(map(re.escape, PENDULUMS)) or "-",
 
 
-def refusal(wildcards):
-    """The option that lets a stage refuse a record instead of failing."""
-    refused = f"{RESULTS}/{wildcards.record}/refused.json"
-    return "" if STRICT else option("refused", refused)
-
-
-def of_all_records(name):
-    """One file of every record."""
-    return expand(
-        "{results}/{record}/{name}", results=RESULTS, record=RECORDS, name=name
+def of_all_chunks(name):
+    """What all jobs of a stage leave; nothing of a stage that the campaign does not ask for."""
+    return (
+        chunk_of(name, only=list(CHUNKS))
+        if any(name == stage.name for stage in STAGES)
+        else []
     )
-
-
-def diagnosis_figures():
-    """The figures that every record's diagnosis has, with `record` still to be put in."""
-    if CAMPAIGN.configuration.diagnose.figures == "none":
-        return []
-    folder = f"{RESULTS}/{{record}}/diagnosis"
-    return [f"{folder}/{name}.svg" for name in OF_EVERY_DIAGNOSIS]
-
-
-def diagnoses():
-    """Every record's diagnosis, where the campaign asks for it."""
-    asked = CAMPAIGN.configuration.diagnose.enabled
-    return of_all_records("diagnosis/diagnosis.json") if asked else []
 
 
 def campaign_diagnosis():
@@ -115,11 +145,8 @@ def pendulum_diagnoses():
 
 
 def of_every_record():
-    """All results of all records."""
-    names = ["recording.csv", "calibration.json", "turning_points.csv", "fit.json"]
-    if CAMPAIGN.configuration.diagnose.enabled:
-        names += [f"diagnosis/{Path(path).name}" for path in diagnosis_figures()]
-    return [path for name in names for path in of_all_records(name)] + diagnoses()
+    """All results of all records: what the jobs of each stage leave."""
+    return [path for stage in STAGES for path in of_all_chunks(stage.name)]
 
 
 def figure_files():
@@ -148,7 +175,7 @@ def proof_option(wildcards):
 
 
 def wanted():
-    """What `rule all` makes: everything, or of some records alone their own results."""
+    """The targets of `all`. Of some records alone: their own results."""
     if not WHOLE:
         return of_every_record()
     return [
@@ -179,15 +206,28 @@ def refusals():
     return f"{refused} of {len(RECORDS)} records were refused" if refused else ""
 
 
-def of_pendulum(name):
-    """One file of each record of a pendulum."""
+def chunks_of_pendulum(name):
+    """What a stage leaves of the chunks with a pendulum's records."""
 
     def files(wildcards):
-        return expand(
-            "{results}/{record}/{name}",
-            results=RESULTS,
-            record=PENDULUMS[wildcards.pendulum],
-            name=name,
+        own = set(PENDULUMS[wildcards.pendulum])
+        return chunk_of(
+            name,
+            only=[
+                chunk
+                for chunk, rows in CHUNKS.items()
+                if own & {row.record for row in rows}
+            ],
         )
 
     return files
+
+
+def of_pendulum(name):
+    """One file of each record of a pendulum, as words of a command."""
+
+    def words(wildcards):
+        records = PENDULUMS[wildcards.pendulum]
+        return " ".join(shlex.quote(f"{RESULTS}/{record}/{name}") for record in records)
+
+    return words

@@ -1,7 +1,6 @@
 rule diagnose_campaign:
     input:
-        of_all_records("fit.json"),
-        of_all_records("calibration.json"),
+        of_all_chunks("fit"),
     output:
         f"{RESULTS}/campaign_diagnosis.json",
     log:

@@ -1,7 +1,7 @@
 rule diagnose_pendulum:
     input:
-        recordings=of_pendulum("recording.csv"),
-        calibrations=of_pendulum("calibration.json"),
+        recordings=chunks_of_pendulum("acquire"),
+        calibrations=chunks_of_pendulum("calibrate"),
     output:
         f"{RESULTS}/pendulums/{{pendulum}}/diagnosis.json",
     log:
@@ -9,6 +9,8 @@ rule diagnose_pendulum:
     conda:
         "../envs/pendpipe.yaml"
     params:
+        recordings=of_pendulum("recording.csv"),
+        calibrations=of_pendulum("calibration.json"),
         folder=subpath(output[0], parent=True),
         refusal="" if STRICT else "--refused -",
         baseline=CAMPAIGN.configuration.diagnose.baseline,
@@ -19,6 +21,6 @@ rule diagnose_pendulum:
     message:
         "{wildcards.pendulum}: what its recordings say together"
     shell:
-        "pendpipe diagnose {input.recordings:q} --calibration {input.calibrations:q}"
+        "pendpipe diagnose {params.recordings} --calibration {params.calibrations}"
         " --baseline {params.baseline:q} --level {params.level:q} --seed {params.seed}"
         " --record {wildcards.pendulum:q} --out {params.folder:q} {params.refusal} > {log:q} 2>&1"

@@ -2,9 +2,7 @@ rule figures:
     input:
         comparison=f"{RESULTS}/comparison.json",
         together=campaign_diagnosis(),
-        turning_points=of_all_records("turning_points.csv"),
-        fits=of_all_records("fit.json"),
-        recordings=of_all_records("recording.csv"),
+        fits=of_all_chunks("fit"),
     output:
         figures=report(
             figure_files(),

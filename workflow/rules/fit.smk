@@ -1,26 +1,22 @@
 rule fit:
     input:
-        recording=f"{RESULTS}/{{record}}/recording.csv",
-        calibration=f"{RESULTS}/{{record}}/calibration.json",
-        turning_points=f"{RESULTS}/{{record}}/turning_points.csv",
+        chunk_of("acquire"),
+        chunk_of("calibrate"),
+        chunk_of("turning-points"),
     output:
-        f"{RESULTS}/{{record}}/fit.json",
+        chunk_of("fit"),
     log:
-        f"{RESULTS}/{{record}}/logs/fit.log",
+        f"{RESULTS}/logs/fit-{{chunk}}.log",
     conda:
         "../envs/pendpipe.yaml"
+    resources:
+        configuration=CONFIGURATION,
     params:
-        refusal=refusal,
-        method=CAMPAIGN.configuration.fit.method,
-        restoring=lambda wildcards: option(
-            "restoring", CAMPAIGN.record(wildcards.record).restoring or None
-        ),
-        seed=CAMPAIGN.configuration.seed,
-        repaired=repaired("{record}", "fit"),
+        settings=planned("fit", "settings"),
+        repaired=planned("fit", "repaired"),
         code=code_version("pendpipe.commands.fit"),
     message:
-        "{wildcards.record}: fit a, b, c"
+        "fit a, b, c, chunk {wildcards.chunk}"
     shell:
-        "pendpipe fit {input.recording:q} --record {wildcards.record:q}"
-        " --calibration {input.calibration:q} --turning-points {input.turning_points:q}"
-        " --method {params.method:q} {params.restoring} --seed {params.seed} --out {output:q} {params.refusal} 2> {log:q}"
+        "pendpipe stage fit --campaign {resources.configuration:q} --chunk {wildcards.chunk:q}"
+        " --out {output:q} 2> {log:q}"

@@ -1,7 +1,7 @@
 rule records:
     input:
-        fits=of_all_records("fit.json"),
-        diagnoses=diagnoses(),
+        fits=of_all_chunks("fit"),
+        diagnoses=of_all_chunks("diagnose"),
     output:
         f"{RESULTS}/records.parquet",
         f"{RESULTS}/records.csv",

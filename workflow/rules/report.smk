@@ -4,7 +4,7 @@ rule report:
         campaign=f"{RESULTS}/campaign.json",
         together=campaign_diagnosis(),
         figures=rules.figures.output.drawn,
-        diagnoses=diagnoses(),
+        diagnoses=of_all_chunks("diagnose"),
     output:
         report(
             f"{RESULTS}/report.html",

@@ -1,6 +1,6 @@
 rule separate:
     input:
-        of_all_records("fit.json"),
+        of_all_chunks("fit"),
     output:
         f"{RESULTS}/separation.json",
     log:

@@ -1,19 +1,21 @@
 rule turning_points:
     input:
-        recording=f"{RESULTS}/{{record}}/recording.csv",
-        calibration=f"{RESULTS}/{{record}}/calibration.json",
+        chunk_of("acquire"),
+        chunk_of("calibrate"),
     output:
-        f"{RESULTS}/{{record}}/turning_points.csv",
+        chunk_of("turning-points"),
     log:
-        f"{RESULTS}/{{record}}/logs/turning_points.log",
+        f"{RESULTS}/logs/turning_points-{{chunk}}.log",
     conda:
         "../envs/pendpipe.yaml"
+    resources:
+        configuration=CONFIGURATION,
     params:
-        refusal=refusal,
-        repaired=repaired("{record}", "turning-points"),
+        settings=planned("turning-points", "settings"),
+        repaired=planned("turning-points", "repaired"),
         code=code_version("pendpipe.commands.turning_points"),
     message:
-        "{wildcards.record}: turning points"
+        "turning points, chunk {wildcards.chunk}"
     shell:
-        "pendpipe turning-points {input.recording:q} --record {wildcards.record:q}"
-        " --calibration {input.calibration:q} --out {output:q} {params.refusal} > {log:q} 2>&1"
+        "pendpipe stage turning-points --campaign {resources.configuration:q} --chunk {wildcards.chunk:q}"
+        " --out {output:q} 2> {log:q}"

@@ -2,13 +2,12 @@
 
 import os
 import sys
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from pendpipe import files
-from pendpipe.configuration.load import Campaign
-from pendpipe.manifest import source_sha256
+from pendpipe.configuration.load import Campaign, Record
+from pendpipe.manifest import Manifest, read_manifest, source_sha256
 from pendpipe.process import one_thread
 
 
@@ -42,30 +41,21 @@ def store(campaign: Campaign, folder: str | Path) -> str:
     return path.as_posix()
 
 
-_OF_SNAKEMAKE: Final = "{}<>"
+def acquisition(campaign: Campaign, row: Record, made: Manifest | None = None) -> str:
+    """Digest all that a record's acquisition depends on, a file's content included.
 
-
-def source_files(campaign: Campaign, record: str) -> list[str]:
-    """The file that a record comes from, where it is one and exists.
-
-    A missing file is no input: the record is then refused by its own job, in one line,
-    while Snakemake would stop the whole campaign. So is one in whose name Snakemake would see
-    wildcards; its content is part of `acquisition` all the same.
+    Parameters
+    ----------
+    campaign, row
+        The record and its campaign.
+    made
+        What the stage has listed, where that is known already.
     """
-    path = campaign.record(record).file
-    if path is None or set(path.as_posix()) & set(_OF_SNAKEMAKE) or not files.is_file(path):
-        return []
-    return [path.as_posix()]
-
-
-def acquisition(campaign: Campaign, record: str) -> str:
-    """Digest all that a record's acquisition depends on, a file's content included."""
-    row = campaign.record(record)
     settings = campaign.configuration
-    home = Path(settings.results, record)
+    made = made or read_manifest(Path(settings.results, row.record), "acquire")
     content: dict[str, Any] = {
-        "row": asdict(row),
-        "source_sha256": row.file and source_sha256(home, "acquire", row.file),
+        "row": vars(row),
+        "source_sha256": row.file and source_sha256(made, row.file),
     }
     if row.source == "simulated" and settings.simulated is not None:
         truth = settings.simulated.model_dump()
@@ -84,12 +74,15 @@ def acquisition(campaign: Campaign, record: str) -> str:
 def caliper(campaign: Campaign) -> str:
     """Digest all that the sensor's calibration depends on."""
     settings, source = campaign.configuration, caliper_source(campaign)
-    home, truth = Path(settings.results, "calibration"), settings.simulated
+    made, truth = (
+        read_manifest(Path(settings.results, "calibration"), "caliper"),
+        settings.simulated,
+    )
     return digest(
         {
             "run": settings.calibration and settings.calibration.model_dump(),
             "seed": settings.seed,
-            "source_sha256": source and source_sha256(home, "caliper", source),
+            "source_sha256": source and source_sha256(made, source),
             "instrument": truth and truth.model_dump(include={"sensor", "device"}),
         }
     )
@@ -106,4 +99,4 @@ def theory(campaign: Campaign) -> str:
     content = campaign.configuration.model_dump(
         include={"title", "apparatus", "geometries", "fluids", "typical_record"}
     )
-    return digest([content, [asdict(record) for record in campaign.records]])
+    return digest([content, [vars(record) for record in campaign.records]])

@@ -48,7 +48,7 @@ _OF_WINDOWS: Final = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNO
 _OF_THE_CAMPAIGN: Final = (
     *("figures", "calibration", "logs", "manifest", "pendulums", "challenge", "challenge-sealed"),
     *("campaign.json", "comparison.json", "separation.json", "report.html", "readme.md"),
-    *("campaign_diagnosis.json", "records", "records.csv", "records.parquet"),
+    *("campaign_diagnosis.json", "chunks", "records", "records.csv", "records.parquet"),
 )
 """What stands beside the records' folders."""
 

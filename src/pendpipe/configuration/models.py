@@ -261,6 +261,9 @@ class Configuration(Section):
     only: list[str] = Field(
         [], description="records whose own stages are run, and nothing else; none: all"
     )
+    batch: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="most records in a job of a stage; blank: some four jobs, of 16 to 128"
+    )
     strict: bool = Field(
         False, description="whether a record that can't be used stops the campaign"
     )

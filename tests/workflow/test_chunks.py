@@ -1,0 +1,253 @@
+"""A job does a stage for a chunk of records: what is done stays done, whatever happens."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pendpipe import manifest
+from pendpipe.cli import main
+from pendpipe.configuration.load import Campaign, Record, load_campaign, read_configuration
+from pendpipe.files import sha256
+from pendpipe.stages.chunks import ANEW, STAGES, chunks_of, plan, split, write_chunk
+
+RECORDS = ("one", "two", "three", "four", "five")
+ORDER = ("acquire", "calibrate", "turning-points", "fit")
+
+names = st.sets(st.text("abcdefghij0123456789", min_size=1, max_size=6), min_size=1, max_size=80)
+
+
+def of_names(words: set[str]) -> dict[str, Record]:
+    return {word: Record(word, "file.csv") for word in words}
+
+
+@given(names, st.integers(1, 20), st.text("abcdefghij", min_size=1, max_size=6))
+def test_an_added_record_changes_one_chunk(words: set[str], batch: int, added: str) -> None:
+    before, after = split(of_names(words), batch), split(of_names(words | {added}), batch)
+    for chunks, members in ((before, words), (after, words | {added})):
+        assert sorted(each.record for rows in chunks.values() for each in rows) == sorted(members)
+        assert max(map(len, chunks.values())) <= batch
+    as_sets = [
+        {name: {each.record for each in rows} for name, rows in chunks.items()}
+        for chunks in (before, after)
+    ]
+    changed = [name for name, rows in as_sets[0].items() if as_sets[1].get(name) != rows]
+    assert len(changed) <= 1
+
+
+def write_decay(path: Path, seed: int) -> None:
+    time_s = np.arange(1200) / 60.0
+    noise = 1e-4 * np.random.default_rng(seed).standard_normal(len(time_s))
+    angle = 0.05 * np.exp(-time_s / (8.0 + seed)) * np.cos(2.0 * np.pi * time_s) + noise
+    rows = zip(time_s.tolist(), angle.tolist(), strict=True)
+    text = "time_s,angle_rad\n" + "".join(f"{t:.6f},{y:.7f}\n" for t, y in rows)
+    path.write_text(text, encoding="utf-8")
+
+
+@pytest.fixture
+def campaign(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Campaign:
+    """Five files of decays in one chunk, without a diagnosis."""
+    monkeypatch.chdir(tmp_path)
+    lines = ["record\tsource"]
+    for seed, name in enumerate(RECORDS):
+        write_decay(Path(f"{name}.csv"), seed)
+        lines.append(f"{name}\t{name}.csv")
+    Path("records.tsv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    Path("config.yaml").write_text("title: Five\nrecords: records.tsv\n", encoding="utf-8")
+    return loaded()
+
+
+def loaded() -> Campaign:
+    return load_campaign(read_configuration("config.yaml"), "config.yaml")
+
+
+def words(stage: str, chunk: str = "all") -> list[str]:
+    out = STAGES[stage].path(loaded(), chunk)
+    return ["stage", stage, "--campaign", "config.yaml", "--chunk", chunk, "--out", str(out)]
+
+
+def run(*stages: str) -> None:
+    for stage in stages:
+        assert main(words(stage)) == 0
+
+
+def fits() -> dict[str, Path]:
+    return {name: Path("results", name, "fit.json") for name in RECORDS}
+
+
+def written(paths: dict[str, Path]) -> dict[str, int]:
+    return {name: path.stat().st_ino for name, path in paths.items() if path.exists()}
+
+
+def test_what_is_done_is_not_done_again(campaign: Campaign) -> None:
+    run(*ORDER)
+    before = written(fits())
+    assert set(before) == set(RECORDS)
+    STAGES["fit"].path(campaign, "all").unlink()  # as Snakemake does before the job
+    run("fit")
+    assert written(fits()) == before
+
+
+def test_a_changed_input_is_done_anew_and_no_other(campaign: Campaign) -> None:
+    run(*ORDER)
+    before = written(fits())
+    write_decay(Path("two.csv"), 17)
+    run(*ORDER)
+    after = written(fits())
+    assert [name for name in RECORDS if after[name] != before[name]] == ["two"]
+
+
+def test_a_changed_setting_is_done_anew(campaign: Campaign) -> None:
+    run(*ORDER)
+    before = written(fits())
+    with Path("config.yaml").open("a", encoding="utf-8") as stream:
+        stream.write("fit: {method: waveform}\n")
+    run("fit")
+    assert not set(written(fits()).values()) & set(before.values())
+
+
+def test_a_forced_stage_is_done_anew(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    run(*ORDER)
+    before = written(fits())
+    monkeypatch.setenv(ANEW, "fit")
+    run("fit")
+    assert not set(written(fits()).values()) & set(before.values())
+
+
+def test_one_records_fault_is_its_own(
+    campaign: Campaign, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The others are done, the chunk's job fails, and the next ends what is left."""
+    run(*ORDER[:3])
+    from pendpipe.commands import fit
+
+    real = fit.run
+
+    def faulty(arguments: object) -> int:
+        if getattr(arguments, "record", None) == "two":
+            raise ZeroDivisionError("a fault of the program")
+        return real(arguments)  # type: ignore[arg-type]
+
+    with monkeypatch.context() as patched:
+        patched.setattr(fit, "run", faulty)
+        assert main(words("fit")) == 1
+    assert "two: ZeroDivisionError: a fault of the program" in capsys.readouterr().err
+    assert "Traceback" in Path("results/two/logs/fit.log").read_text(encoding="utf-8")
+    before = written(fits())
+    assert set(before) == set(RECORDS) - {"two"}
+    assert not STAGES["fit"].path(campaign, "all").exists()
+    run("fit")
+    assert {name: number for name, number in written(fits()).items() if name != "two"} == before
+
+
+def test_a_refused_record_stops_no_chunk(campaign: Campaign) -> None:
+    Path("two.csv").write_text("no recording\n", encoding="utf-8")
+    run(*ORDER)
+    assert json.loads(fits()["two"].read_text(encoding="utf-8"))["refused"]
+    before = written(fits())
+    run(*ORDER)
+    assert written(fits()) == before
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-5])
+
+
+def altered(path: Path) -> None:
+    before = path.stat()
+    path.write_bytes(path.read_bytes().replace(b"1", b"7"))
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+
+
+def in_the_future(path: Path) -> None:
+    """Altered while the manifest's time lies in the future."""
+    later = time.time() + 1e6
+    os.utime(path.parent / "manifest/fit.json", (later, later))
+    altered(path)
+
+
+@pytest.mark.parametrize("change", [Path.unlink, cut, altered, in_the_future])
+def test_a_plan_notices_what_a_job_then_makes_again(
+    campaign: Campaign, change: Callable[[Path], None]
+) -> None:
+    run(*ORDER)
+    fit, records = STAGES["fit"], chunks_of(campaign)["all"]
+    sound = plan(campaign, fit, "all", records)
+    assert (sound.repaired, sound.lines, sound.damaged) == ("", (), ())
+    before, others = sha256(fits()["two"]), written(fits())
+    change(fits()["two"])
+    found = plan(campaign, fit, "all", records)
+    (line,) = found.lines
+    assert "two/fit.json" in line
+    assert found.damaged == (Path("results/two"),)
+    assert found.repaired != sound.repaired, "a changed parameter runs the job"
+    manifest.set_aside_damaged(Path("results/two"), missing=True)
+    run("fit")
+    assert sha256(fits()["two"]) == before
+    after = plan(campaign, fit, "all", records)
+    assert (after.lines, after.repaired) == ((), found.repaired), "and runs it once"
+    assert {n: i for n, i in written(fits()).items() if n != "two"} == {
+        n: i for n, i in others.items() if n != "two"
+    }
+
+
+def test_what_a_chunk_says_when_it_is_torn_is_made_again(campaign: Campaign) -> None:
+    run("acquire")
+    acquire, records = STAGES["acquire"], chunks_of(campaign)["all"]
+    path = acquire.path(campaign, "all")
+    whole = path.read_bytes()
+    path.write_bytes(whole[:100])
+    assert plan(campaign, acquire, "all", records).lines == ()
+    write_chunk(campaign, acquire, records, path)
+    assert path.read_bytes() == whole
+
+
+def test_records_of_an_instrument_have_a_chunk_each(campaign: Campaign) -> None:
+    with Path("records.tsv").open("a", encoding="utf-8") as table:
+        table.write("live\tdataq:/dev/none\n")
+    assert set(chunks_of(loaded())) == {"all", "record.live"}
+    with Path("config.yaml").open("a", encoding="utf-8") as stream:
+        stream.write("only: [two]\n")
+    assert set(chunks_of(loaded())) == {"record.two"}
+
+
+@pytest.mark.slow
+def test_a_chunk_that_is_killed_ends_the_same_and_repeats_nothing(campaign: Campaign) -> None:
+    """Killed -9 ten times, wherever it is: what was finished stays, and all ends as undisturbed."""
+    run(*ORDER)
+    undisturbed = {name: sha256(path) for name, path in fits().items()}
+    draw = random.Random(1)
+    for _ in range(10):
+        for name, path in fits().items():
+            path.unlink()
+            (path.parent / "manifest/fit.json").unlink()
+            assert not written({name: path})
+        command = [sys.executable, "-m", "pendpipe.cli", *words("fit")]
+        job = subprocess.Popen(command, start_new_session=True)
+        wanted = draw.randrange(len(RECORDS))
+        while job.poll() is None and len(written(fits())) < wanted:
+            time.sleep(0.001)
+        time.sleep(draw.uniform(0.0, 0.03))
+        if job.poll() is None:
+            os.killpg(job.pid, signal.SIGKILL)
+        job.wait()
+        keyed = {
+            name: number
+            for name, number in written(fits()).items()
+            if manifest.read_manifest(Path("results", name), "fit").key
+        }
+        run("fit")
+        assert {name: sha256(path) for name, path in fits().items()} == undisturbed
+        assert {name: written(fits())[name] for name in keyed} == keyed
