@@ -96,10 +96,8 @@ def apart(path: Path, content: dict[str, Any]) -> str:
     with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(words):
         pendpipe(["diagnose", str(path), "--json"])
     answer = json.loads(words.getvalue() or "{}")
-    missing = [effect["id"] for effect in answer.get("effects", [])]
-    sine = content["restoring"] == "sine"
-    model = answer.get("improved" if sine else "baseline")
-    if content["light"] == "red" or not model or (sine and missing != ["circular-error"]):
+    model = answer.get("baseline")
+    if content["light"] == "red" or not model:
         return ""
     pairs = [(content["parameters"][name], model["parameters"][name]) for name in NUMBERS]
     return f"{max(abs(one['value'] - two['value']) / (one['sd'] or 1.0) for one, two in pairs):.2g}"

@@ -341,7 +341,11 @@ def answer(key: tuple[str, int]) -> dict[str, Any]:
         covers[name] = None if low is None and high is None else inside
     return kept | {
         "p_value": content["p_value"],
-        "effects": [[effect["id"], effect["probability"]] for effect in content["effects"]],
+        "effects": [
+            [effect["id"], effect["probability"]]
+            for effect in content["effects"]
+            if not effect["presumed"]
+        ],
         "covers": covers,
         "chi2_per_dof": content["improved"]["chi2_per_dof"],
         "noise_ratio": content["noise_rms_rad"] / null.noise_rms,

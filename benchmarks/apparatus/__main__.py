@@ -46,9 +46,12 @@ def answer(name: str, number: int) -> dict[str, Any]:
     effects = [
         (each["id"], each["probability"], [other["id"] for other in each["indistinguishable_from"]])
         for each in content["effects"]
+        if not each["presumed"]
     ]
+    presumed = [each["id"] for each in content["effects"] if each["presumed"]]
     over = float(content["improved"]["chi2_per_dof"]) ** 0.5
-    return kept | {"effects": effects, "p_value": content["p_value"], "over_noise": over}
+    kept |= {"effects": effects, "presumed": presumed}
+    return kept | {"p_value": content["p_value"], "over_noise": over}
 
 
 def digest() -> str:

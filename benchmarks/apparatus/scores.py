@@ -37,8 +37,11 @@ def judge(kept: Kept, names: frozenset[str]) -> dict[str, Any]:
     dict
         ``detected``, ``first``, ``held`` and ``both`` are None where they are not asked.
     """
-    truth, effects = kept["truth"], kept["effects"]
+    truth = kept["truth"]
     hidden, present = truth["hidden"], set(truth["present"])
+    # What was presumed and fitted is found where it is there, and elsewhere no claim.
+    fitted = [(name, 1.0, []) for name in kept.get("presumed", ()) if name in present]
+    effects = [*kept["effects"], *fitted]
     outside = bool(truth["outside"]) or any(name not in names for name in hidden)
     true = present | set(truth["near"]) | set(truth["allowed"])
     groups = [{name, *others} for name, _, others in effects]
@@ -56,7 +59,9 @@ def judge(kept: Kept, names: frozenset[str]) -> dict[str, Any]:
     return {
         "outside": outside,
         "refused": kept["verdict"] in ("not-analysable", "failed"),
-        "detected": bool(effects) if asked else None,
+        "detected": bool(kept["effects"]) or bool(set(hidden) & {e[0] for e in fitted})
+        if asked
+        else None,
         "first": bool(effects) and effects[0][0] in present if asked or sine else None,
         "leads": any(name == each[0] for name in hidden for each in effects) if asked else None,
         "held": held[0] if asked and len(hidden) == 1 else None,

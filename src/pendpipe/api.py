@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from pendpipe.errors import refuse_if
 from pendpipe.recording import Recording
@@ -308,7 +308,7 @@ def diagnose(
     *,
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
-    restoring: Literal["linear"] | None = None,
+    restoring: Restoring | None = None,
     level: float = 0.01,
     seed: int = 0,
     volts_per_radian: float | None = None,
@@ -333,7 +333,7 @@ def diagnose(
     fixed
         Parameters to hold, by name, so that a prediction is compared with the recording.
     restoring
-        ``"linear"`` for a torsion wheel or a mass on a spring: sin x is no candidate.
+        ``"linear"`` (a torsion wheel, a mass on a spring) or ``"sine"``; by default as for `fit`.
     level
         Significance level: how often a recording that lacks nothing may be reported.
     seed
@@ -365,11 +365,12 @@ def diagnose(
     Examples
     --------
     >>> answer = diagnose("examples/string-pendulum.csv")
-    >>> answer.verdict, answer.effects[0].identifier
-    ('missing-physics', 'circular-error')
+    >>> answer.verdict, answer.effects[0].identifier, answer.effects[0].presumed
+    ('consistent', 'circular-error', True)
     """
-    known, problem = restoring in (None, "auto", "linear"), f"{restoring!r} is no choice"
-    refuse_if(not known, "restoring", problem, "give 'linear', or leave it out")
+    torque = None if restoring in (None, "auto") else restoring
+    known, problem = torque in (None, "linear", "sine"), f"{restoring!r} is no choice"
+    refuse_if(not known, "restoring", problem, "give 'linear' or 'sine', or leave it out")
     refuse_if(seed < 0, "seed", f"{seed} is negative", "give 0 or more")
     if not isinstance(recording, Recording | str | Path):
         from pendpipe.diagnosis.several import diagnose_several
@@ -382,8 +383,7 @@ def diagnose(
             "say together=True if they are of one pendulum; else diagnose them one by one",
         )
         refuse_if(fixed, "fixed", "nothing is held in several recordings", "leave it out")
-        one = restoring == "linear"
-        refuse_if(one, "restoring", "it is for one recording", "leave it out")
+        refuse_if(torque, "restoring", "it is for one recording", "leave it out")
         if not isinstance(recording, Mapping):
             files = [
                 f"recording {number}" if isinstance(each, Recording) else each
@@ -406,7 +406,7 @@ def diagnose(
         baseline=baseline,
         fixed=fixed or {},
         level=level,
-        linear=restoring == "linear",
+        restoring=torque,
         seed=seed,
         place=name or _place(recording),
     )

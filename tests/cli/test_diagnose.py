@@ -65,6 +65,8 @@ def diagnosis(folder: Path) -> dict[str, Any]:
 TOP = {
     "schema_version",
     "baseline",
+    "restoring",
+    "drag_form",
     "noise_rms_rad",
     "verdict",
     "p_value",
@@ -76,12 +78,12 @@ TOP = {
     "figures",
     "provenance",
 }
-MODEL = {"parameters", "residual_rms_rad", "chi2_per_dof"}
+MODEL = {"parameters", "residual_rms_rad", "chi2_per_dof", "noise_rms_rad", "fit_p_value"}
 EFFECT = {
     "id",
+    "presumed",
     "name",
     "kind",
-    "presumed",
     "equation",
     "parameters",
     "delta_chi2",
@@ -163,18 +165,30 @@ def test_sin_x_is_no_candidate_for_what_gravity_does_not_restore(
     assert "circular-error" not in names | rivals
 
 
-def test_circular_error_is_named_and_the_fit_improves_to_the_noise(
+def test_a_pendulum_lacks_nothing_and_its_sin_x_is_presumed(sine: Path, tmp_path: Path) -> None:
+    words = ["--out", str(tmp_path), "--no-figures", "--fail-on", "missing-physics"]
+    assert cli.main(["diagnose", str(sine), *words]) == 0
+    content = diagnosis(tmp_path)
+    check_contract(content)
+    assert content["verdict"] == "consistent"
+    assert content["restoring"] == "sine"
+    assert [(each["id"], each["presumed"]) for each in content["effects"]] == [
+        ("circular-error", True)
+    ]
+
+
+def test_what_is_missing_is_named_and_the_fit_improves_to_the_noise(
     sine: Path, tmp_path: Path
 ) -> None:
-    status = cli.main(
-        ["diagnose", str(sine), "--out", str(tmp_path), "--fail-on", "missing-physics"]
-    )
+    """As of a spring, sin x is a torque that softens."""
+    words = ["--out", str(tmp_path), "--restoring", "linear", "--fail-on", "missing-physics"]
+    status = cli.main(["diagnose", str(sine), *words])
     content = diagnosis(tmp_path)
     check_contract(content)
     assert status == 3
     assert content["verdict"] == "missing-physics"
     first = content["effects"][0]
-    assert first["id"] == "circular-error"
+    assert (first["id"], first["presumed"]) == ("cubic-stiffness", False)
     assert first["kind"] == "dynamics"
     assert content["baseline"]["residual_rms_rad"] > 10 * NOISE_RAD
     assert content["improved"]["residual_rms_rad"] == pytest.approx(NOISE_RAD, rel=0.06)

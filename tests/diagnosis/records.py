@@ -6,17 +6,19 @@ import functools
 import math
 from collections.abc import Callable
 from copy import copy
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
 
+from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.begin import Beginning, begin
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise, white_noise
 from pendpipe.diagnosis.refine import Fit, refine
-from pendpipe.diagnosis.run import Outcome, diagnose_recording
+from pendpipe.diagnosis.run import Outcome, _fit_of, diagnose_recording
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.any_law import Motion
 from pendpipe.effects import Effect
@@ -72,10 +74,12 @@ def recording(readings: FloatArray, seed: int) -> Recording:
 
 def beginning_of(record: Recording) -> Beginning:
     """What a diagnosis starts from, as in `diagnose_recording`."""
+    from pendpipe.analysis.fit import fit_recording
     from pendpipe.analysis.free_decay import measure_recording
 
     points, part = measure_recording(record, "the test")
-    return begin(prepare(part, "the test"), points, baseline="eq8", fixed={})
+    fit = fit_recording(part, points=points)
+    return begin(prepare(part, "the test"), points, fit, baseline="eq8", fixed={})
 
 
 def prepared(
@@ -137,15 +141,21 @@ _READINGS: dict[str, Callable[[], FloatArray]] = {
 
 @functools.cache
 def diagnosed(name: str, seed: int = 1) -> Outcome:
-    """The diagnosis of an effect's recording, or of one of the others above."""
+    """The diagnosis of an effect's recording, or of one of the others above: wheels and springs."""
+    if name == "circular-error":
+        return scanned(name)
     make = _READINGS.get(name, lambda: with_effects(name))
-    return diagnose_recording(recording(make(), seed))
+    return diagnose_recording(recording(make(), seed), restoring="linear")
 
 
 @functools.cache
 def scanned(name: str) -> Outcome:
-    """The same by the scan alone: what the half swings ask for is not fitted first."""
-    with patch("pendpipe.diagnosis.search.known_law_first", lambda *_: None):
+    """The same where the fit takes x, so that the scan finds whatever else there is."""
+
+    def linear(*given: Any) -> FitResult | None:
+        return _fit_of(*given[:-2], "linear", given[-1])
+
+    with patch("pendpipe.diagnosis.run._fit_of", linear):
         return diagnose_recording(recording(with_effects(name), 1))
 
 

@@ -7,11 +7,13 @@ is quick; ``docs/recordings.md`` holds whole diagnoses, and what they have found
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pendpipe.analysis.fit import fit_recording
 from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
@@ -22,6 +24,7 @@ from pendpipe.diagnosis.location import beat_of
 from pendpipe.diagnosis.refine import Fit, fit_in_growing_window
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.state import first_noise
+from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects.baseline import A, C
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.formats import read
@@ -45,15 +48,16 @@ def whole(name: str) -> Recording:
 @functools.cache
 def beginning_of(name: str) -> Beginning:
     points, part = measure_recording(whole(name), name)
-    return begin(prepare(part, name), points, baseline="eq8", fixed={})
+    fit = fit_recording(part, points=points)
+    return begin(prepare(part, name), points, fit, baseline="eq8", fixed={})
 
 
 @functools.cache
-def fitted(name: str, **effects: tuple[float, ...]) -> Fit:
+def fitted(name: str, restoring: Restoring = "linear", **effects: tuple[float, ...]) -> Fit:
     """Eq. 8 with some effects (underscores for hyphens) from start values, to a recording."""
     found = beginning_of(name)
-    model, noise = found.model, first_noise(found)
-    value = found.value if found.known is None else found.known[1][:-1]
+    model, noise = replace(found.model, restoring=restoring), first_noise(found)
+    value = found.value
     for identifier, start in effects.items():
         model = model.adding(by_identifier(identifier.replace("_", "-")))
         value = np.append(value, start)
@@ -71,13 +75,12 @@ def values(fit: Fit, identifier: str) -> FloatArray:
 
 @pytest.mark.parametrize("name", [RIG, STRING])
 def test_a_pendulum_has_the_circular_error_of_its_geometry(name: str) -> None:
-    switched = fitted(name, circular_error=(1.0,))
+    sine = fitted(name, "sine")
     free = fitted(name, cubic_stiffness=(-0.16,))
     # A cubic torque in its place is the first term of sin x = x - x^3/6, and a little less.
     assert values(free, "cubic-stiffness")[0] == pytest.approx(-1.0 / 6.0, rel=0.05)
     # The frequency follows sin x over all cycles to a few tenths of a radian of phase.
-    assert values(switched, "circular-error")[0] == 1.0
-    assert switched.max_phase_error_rad < 0.2
+    assert sine.max_phase_error_rad < 0.2
 
 
 def test_a_ships_righting_moment_hardens() -> None:
@@ -114,7 +117,7 @@ def test_a_mass_on_a_spring_beats_with_a_second_mode() -> None:
 
 def test_a_bearing_stiffens_where_it_no_longer_slides() -> None:
     found = beginning_of(ROD)
-    small = small_swings(fitted(ROD, circular_error=(1.0,)), found.data, first_noise(found))
+    small = small_swings(fitted(ROD, "sine"), found.data, first_noise(found))
     assert small is not None
     assert small.significant
     assert small.amplitude < 0.04
@@ -123,7 +126,7 @@ def test_a_bearing_stiffens_where_it_no_longer_slides() -> None:
 
 
 def test_bearing_and_air_share_the_loss_of_a_rig() -> None:
-    fit = fitted(RIG, circular_error=(1.0,))
+    fit = fitted(RIG, "sine")
     # Known: quadratic drag and Coulomb friction in near equal measure, at 1.2 rad and below.
     drag, friction = fit.value[A] * 1.2, fit.value[C] / 1.2
     assert 0.2 < friction / drag < 5.0

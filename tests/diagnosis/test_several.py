@@ -84,10 +84,10 @@ def test_each_release_is_predicted_from_the_others_within_its_band() -> None:
 
 def test_amplitudes_exclude_a_drift_that_one_recording_cannot_tell_from_cubic_damping() -> None:
     found = together("cubic")
-    largest = found.outcomes[-1].effects[0]
+    largest = found.outcomes[-1].diagnosis.missing[0]
     alone = {largest.identifier, *(name for name, _ in largest.indistinguishable)}
     assert {"cubic-damping", "damping-drift"} <= alone
-    effect = found.effects[0]
+    effect = found.diagnosis.missing[0]
     assert effect.identifier == "cubic-damping"
     assert "damping-drift" not in {name for name, _ in effect.indistinguishable}
     size = effect.parameters["d"]
@@ -160,7 +160,7 @@ def test_cubic_damping_of_three_amplitudes_is_in_the_class_and_no_value_differs(
         releases[f"{1e3 * amplitude:.0f} mrad"] = Recording(time, noisy, "angle_rad")
     found = pp.diagnose(releases, together=True)
     assert isinstance(found, JointOutcome)
-    (effect,) = found.effects
+    (effect,) = found.diagnosis.missing
     assert "cubic-damping" in {effect.identifier, *(mate for mate, _ in effect.indistinguishable)}
     values = found.to_dict()["improved"]["parameters"]
     for value, truth in (("b", b), ("c", c), ("frequency", omega / 2.0 / np.pi)):
@@ -169,7 +169,7 @@ def test_cubic_damping_of_three_amplitudes_is_in_the_class_and_no_value_differs(
 
 def test_recording_with_another_damping_is_named_with_its_value() -> None:
     found = together("odd")
-    effect = found.effects[0]
+    effect = found.diagnosis.missing[0]
     assert effect.identifier == "parameter-b"
     assert effect.location.summary == "in 150 mrad"
     odd, usual = effect.parameters["150 mrad"], effect.parameters["50 mrad"]
@@ -186,7 +186,7 @@ def test_knock_in_one_recording_is_its_own_and_the_shared_values_stand() -> None
     }
     found = pp.diagnose(releases, volts_per_radian=1.0, together=True)
     assert isinstance(found, JointOutcome)
-    (effect,) = found.effects
+    (effect,) = found.diagnosis.missing
     assert effect.location.summary == "in second alone"
     values = found.to_dict()["improved"]["parameters"]
     for name, truth in (("b", B), ("c", C), ("frequency", 0.9)):

@@ -29,7 +29,7 @@ TIME_S = np.arange(1500) / 15.0
 
 @pytest.fixture(scope="module")
 def outcome() -> Any:
-    """The diagnosis of a pendulum with circular error, integrated by scipy."""
+    """The diagnosis of a pendulum taken for a spring, integrated by scipy."""
 
     def rate(_: float, state: np.ndarray) -> list[float]:
         x, v = state
@@ -39,7 +39,8 @@ def outcome() -> Any:
         rate, (0.0, TIME_S[-1]), [AMPLITUDE, 0.0], "DOP853", t_eval=TIME_S, rtol=1e-10, atol=1e-12
     )
     noise = NOISE_RAD * np.random.default_rng(5).standard_normal(len(TIME_S))
-    return diagnose_recording(Recording(TIME_S, solved.y[0] + noise, "angle_rad"))
+    record = Recording(TIME_S, solved.y[0] + noise, "angle_rad")
+    return diagnose_recording(record, restoring="linear")
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +83,7 @@ def test_a_model_goes_on_smoothly_where_its_own_cycles_begin_late() -> None:
 def test_the_figure_of_the_frequency_draws_readings_and_both_models(content: Shown) -> None:
     (axes,) = diagnosis.draw_frequency(content).axes
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["Eq. 8", "with circular-error", "readings"]
+    assert labels == ["Eq. 8", "with cubic-stiffness", "readings"]
     flat, bent = (line.get_ydata() for line in axes.lines[1:3])
     points = axes.containers[0][0].get_ydata()
     assert np.ptp(flat) < 0.05 * np.ptp(bent)

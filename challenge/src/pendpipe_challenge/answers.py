@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -55,13 +56,22 @@ class Answer:
         return kind_of(self.lead) if self.lead else ""
 
 
-def read_answer(entry: dict[str, Any]) -> Answer:
-    """Read one kept answer; a diagnosis that lacks what contract.md asks counts as none."""
+def read_answer(entry: dict[str, Any], hidden: Collection[str] = ()) -> Answer:
+    """Read one kept answer; a diagnosis that lacks what contract.md asks counts as none.
+
+    What was presumed and fitted is found where it was hidden, and elsewhere no claim.
+    """
     diagnosis = entry.get("diagnosis")
     if not isinstance(diagnosis, dict) or diagnosis.get("verdict") == "not-analysable":
         return Answer(False, False, (), float("nan"), diagnosis or {})
+    claimed = [
+        effect
+        for effect in diagnosis.get("effects") or []
+        if not effect.get("presumed") or effect["id"] in hidden
+    ]
+    diagnosis = diagnosis | {"effects": claimed}
     groups, probability = [], float("nan")
-    for number, effect in enumerate(diagnosis.get("effects") or []):
+    for number, effect in enumerate(claimed):
         rest = sorted(
             effect.get("indistinguishable_from") or [], key=lambda e: -(e.get("probability") or 0)
         )
@@ -157,7 +167,14 @@ def read_items(opened: dict[str, Any]) -> list[Solved]:
         Solved(
             name,
             entry["truth"],
-            read_answer(entry["answer"]),
+            read_answer(
+                entry["answer"],
+                [
+                    name
+                    for effect in entry["truth"]["effects"]
+                    for name in (effect["effect"], *effect.get("also", []))
+                ],
+            ),
             read_answer(entry["twin"]) if "twin" in entry else None,
         )
         for name, entry in opened["items"].items()

@@ -82,9 +82,9 @@ _OWN: Final[Flags] = {
         "help": "as --figures none",
     },
     "--restoring": {
-        "choices": ("auto", "linear"),
+        "choices": ("auto", "linear", "sine"),
         "default": "auto",
-        "help": "linear: a torsion wheel or a spring, for which sin x is no candidate",
+        "help": "linear: a torsion wheel or a spring; sine: a pendulum; auto: as pendpipe fit",
     },
     "--together": {
         "action": "store_true",
@@ -252,7 +252,7 @@ def _outcome(arguments: Arguments, recording: Recording, **more: Any) -> Outcome
         "baseline": arguments.baseline,
         "seed": arguments.seed,
         "level": arguments.level,
-        "linear": arguments.restoring == "linear",
+        "restoring": None if arguments.restoring == "auto" else arguments.restoring,
         "place": arguments.file,
         "progress": _print_progress,
     }

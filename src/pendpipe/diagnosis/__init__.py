@@ -3,8 +3,8 @@
 >>> from pendpipe.diagnosis.run import diagnose_recording
 >>> from pendpipe.formats import read
 >>> outcome = diagnose_recording(read("examples/string-pendulum.csv"))
->>> outcome.verdict, outcome.effects[0].identifier
-('missing-physics', 'circular-error')
+>>> outcome.verdict, outcome.effects[0].identifier, outcome.effects[0].presumed
+('consistent', 'circular-error', True)
 >>> outcome.to_dict()["effects"][0]["kind"]
 'dynamics'
 

@@ -7,31 +7,33 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import held_values, start_of
+from pendpipe.analysis.fit.by_points import as_angles, held_values, restoring_of
 from pendpipe.analysis.fit.by_waveform import start_values, usable_span
-from pendpipe.analysis.fit.period import swing_phase
-from pendpipe.analysis.fit.result import Baseline
+from pendpipe.analysis.fit.result import Baseline, FitResult, Restoring
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.analysis.two_modes import two_modes
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data, gather
 from pendpipe.diagnosis.unwrapped import anchored
+from pendpipe.dynamics import Eq8, Release
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects import Effect
-from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C, with_parts
-from pendpipe.effects.catalogue.in_time import BEATING_MODE
-from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN, circular_error
+from pendpipe.effects.baseline import (
+    BASELINE,
+    OFFSET,
+    OMEGA,
+    SHARE,
+    START,
+    TIME,
+    A,
+    B,
+    C,
+    with_parts,
+)
 from pendpipe.effects.model import Evaluated, Model
 from pendpipe.physics.decay import time_at
 
-LARGE_PHASE_ERROR: Final = 0.1
-"""Phase error in rad from which a model has lost the motion."""
-SINE: Final = "circular-error"
-"""The effect that turns x into sin x."""
 _FEWEST_READINGS: Final = 24
-_ROUNDS: Final = 4
-"""In which the frequency of small swings and their angles settle."""
 _DEAD_BANDS: Final = 10.0
 """Distance from the end in half widths of the Coulomb dead band: nearer to it the rest position
 jumps with the parameters."""
@@ -55,9 +57,10 @@ class Beginning:
         First estimate of one reading's noise.
     points
         The turning points.
-    known
-        An effect that the half swings ask for, sin x or a second mode, with start values of the
-        model with it.
+    fit
+        What ``pendpipe fit`` prints of the same readings; None where it refuses.
+    second_mode
+        Start values of a second mode that beats with the first, behind the baseline's.
     """
 
     data: Data
@@ -66,47 +69,43 @@ class Beginning:
     held: tuple[int, ...]
     noise_rms: float
     points: TurningPoints
-    known: tuple[Effect, FloatArray] | None = None
+    fit: FitResult | None = None
+    second_mode: FloatArray | None = None
 
 
 def begin(
     samples: Samples,
     points: TurningPoints,
+    fit: FitResult | None = None,
     *,
     baseline: Baseline,
     fixed: Mapping[str, float],
     stated: bool = True,
-    linear: bool = False,
 ) -> Beginning:
     """Choose the readings that are compared, and the start values of the search.
 
-    `stated` is whether it is known that the readings are angles; `linear`, that there is no sin x.
+    It begins with the law that `fit` has, its torque and form of drag; with its numbers unless its
+    light is red, for then they have lost the motion. `stated` is whether it is known that the
+    readings are angles.
     """
     held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
-    start = start_values(points, held_rates, fixed, baseline)
-    span = usable_span(samples, points, start)
-    value = start.value.copy()
-    if "offset" in fixed:
-        value[OFFSET] = fixed["offset"]
-    sine = known = None
-    if not fixed and any(note.startswith(BEAT) for note in points.notes):
+    angles, _ = as_angles(points, None, position=False)
+    beats = not fixed and any(note.startswith(BEAT) for note in points.notes)
+    torque: Restoring = fit.restoring if fit else restoring_of(angles, stated=stated)
+    if beats:
+        torque = "linear"
+    start = start_values(angles, held_rates, fixed, baseline, torque, samples=samples)
+    value, drag, second = start.value[: len(BASELINE)].copy(), None, None
+    span = usable_span(samples, angles, start)
+    if beats:
         # The turning points of a beat tell nothing of either mode.
         span = slice(None)
         value, second = _modes_start(samples, value)
-        known = BEATING_MODE, np.append(value, second)
-    elif not (fixed or linear) and samples.unit in ("rad", "rad/s"):
-        laws = start_of(points if samples.unit == "rad" else _of_the_angle(points), stated=stated)
-        asked = laws.coefficient.agrees or laws.linear.slip_rad > LARGE_PHASE_ERROR
-        if laws.sine and laws.favoured == "sine" and asked:
-            # Both laws begin at the first turning point, so that they count the same half cycles.
-            value, sine = laws.linear.value, laws.sine.value
-            if samples.unit == "rad/s":
-                value, sine = (_of_the_rate(each) for each in (value, sine))
-            value[TIME] = sine[TIME]
-            if baseline == "viscous":
-                value[[A, C]] = sine[[A, C]] = 0.0
-            first = int(np.searchsorted(samples.time_s, laws.sine.time_s))
-            span = slice(max(first, span.start), span.stop)
+    elif fit is not None and fit.motion is not None and fit.light != "red":
+        law, release = fit.motion
+        drag, value = law.drag, _values_of(law, release, fit.value("offset"))
+        before = int(release.time_s < samples.time_s[0])
+        span = usable_span(samples, angles, start._replace(value=value, before=before))
     omega, angle = float(value[OMEGA]), float(value[START])
     data = gather(
         samples.time_s[span],
@@ -117,54 +116,35 @@ def begin(
         period_s=2.0 * math.pi / omega,
         noise_rms=points.noise_rms_rad,
     )
+    data = replace(data, row=span.indices(len(samples.time_s))[0])
     value = with_parts(value, parts)
     data = _far_from_the_stop(data, value)
+    is_angle = samples.unit in ("rad", "rad/s")
     model = Model(
         data.time_s,
         data.interval_s,
-        order=order_for(abs(angle) / (omega if samples.unit == "rad/s" else 1.0), samples.unit),
+        order=order_for(abs(angle), "rad" if is_angle else samples.unit),
         fold=data.fold,
         first_s=float(data.time_s[0]),
         parts=parts,
-        scale=1.0 if samples.unit in ("rad", "rad/s") else abs(angle),
+        scale=1.0 if is_angle else abs(angle),
+        restoring=torque,
+        drag=drag or "energy",
+        seen="rate" if samples.unit == "rad/s" else "angle",
     )
     data, model, at = _before_the_stop(data, model, value)
-    if sine is not None:
-        known = CIRCULAR_ERROR_IN.get(samples.unit, circular_error), np.append(sine, 1.0)
-        data, _, at = _before_the_stop(data, model.adding(known[0]), known[1])
-        model = model.at_times(data.time_s)
-    if sine is not None or known is None:
+    if second is None:
         data = replace(data, anchor=anchored(data, at))
     held = _held(held_rates, fixed, parts, baseline)
-    return Beginning(data, model, value, held, data.noise_rms, points, known)
+    return Beginning(data, model, value, held, data.noise_rms, points, fit, second)
 
 
-def _of_the_angle(points: TurningPoints) -> TurningPoints:
-    """Turning points of the angle from those of its rate: the largest is 2 omega sin(A/2)."""
-    rate, half = points.angle_rad, np.diff(points.half_cycle)
-    paces = np.diff(points.time_s) / half
-    omega = math.pi / float(np.median(paces))
-    for _ in range(_ROUNDS):
-        angle = 2.0 * np.arcsin(np.clip(0.5 * rate / omega, -1.0, 1.0))
-        omega = float(np.median(swing_phase(np.abs(angle), "sine") / paces))
-    slope = 1.0 / (omega * np.cos(0.5 * angle))
-    return replace(
-        points,
-        angle_rad=angle,
-        angle_sd_rad=points.angle_sd_rad * slope,
-        level_rad=points.level_rad / omega,
-        noise_rms_rad=points.noise_rms_rad / omega,
-        step_rad=points.step_rad / omega,
-        unit="rad",
-    )
-
-
-def _of_the_rate(value: FloatArray) -> FloatArray:
-    """Values of Eq. 8 for the angle's rate u from those for the angle."""
-    omega, found = value[OMEGA], value.copy()
-    found[A], found[C], found[OFFSET] = value[A] / omega, value[C] * omega, value[OFFSET] * omega
-    found[START] = 2.0 * omega * math.sin(0.5 * value[START])
-    return found
+def _values_of(law: Eq8, release: Release, offset: float) -> FloatArray:
+    """The baseline's values of a law that moves from a turning point."""
+    b = law.hysteretic + law.viscous
+    share = law.hysteretic / b if b > 0.0 else 0.5
+    losses = law.quadratic, b, law.coulomb, share
+    return np.array([*losses, law.angular_frequency, release.angle_rad, release.time_s, offset])
 
 
 def _modes_start(samples: Samples, value: FloatArray) -> tuple[FloatArray, FloatArray]:

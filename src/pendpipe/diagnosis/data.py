@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -9,6 +11,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from scipy.fft import prev_fast_len
 
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray
 
 _NOISE_RATIOS: Final = tuple(np.linspace(0.04, 0.5, 12))
@@ -52,6 +55,10 @@ class Data:
     anchor
         A time in s near the beginning, and the phase of the readings then, so that whole turns
         are counted the same way for every model.
+    row
+        Of the first reading, in the recording.
+    within_rms
+        How much the readings of each mean scatter about it, less the motion, over all of them.
     """
 
     time_s: FloatArray
@@ -66,6 +73,8 @@ class Data:
     fold: int = 1
     lattice: tuple[float, float] | None = None
     anchor: tuple[float, float] | None = None
+    row: int = 0
+    within_rms: float = 0.0
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -81,6 +90,18 @@ class Data:
             return self.values - reading
         origin, noise = self.lattice
         return self.values - reading - rounding_bias(reading - origin, self.step, noise)
+
+    def rms_of_reading(self, rms: float) -> float:
+        """Return the rms of single readings from that of their means."""
+        return math.hypot(rms, self.within_rms)
+
+    def chi2_per_dof(self, chi2: float, fitted: int) -> float:
+        """Return chi^2 of single readings over their degrees of freedom, from that of means.
+
+        What scatters within the means is noise, by the noise's definition.
+        """
+        readings = self.used * self.fold
+        return (chi2 + readings - self.used) / max(readings - fitted, 1)
 
     def each(self) -> list[Data]:
         """Return each recording's readings: these are of one."""
@@ -145,6 +166,31 @@ def with_lattice(data: Data, reading: FloatArray) -> Data:
         if cost < least:
             best, least = share, cost
     return replace(data, lattice=None if best is None else (origin, best * data.step))
+
+
+_MOST_SCATTERED: Final = 40_000
+"""Readings from which the scatter within means is told to 0.4 %."""
+
+
+def with_scatter(data: Data, samples: Samples, model: Callable[[FloatArray], FloatArray]) -> Data:
+    """Measure how readings scatter within the means that stand for them.
+
+    Parameters
+    ----------
+    data, samples
+        The means, and the readings as they were recorded.
+    model
+        The readings of a model at some times; an error that is slow does no harm.
+    """
+    if data.fold == 1:
+        return data
+    kept = np.flatnonzero(data.weight > 0.0)
+    kept = kept[:: max(len(kept) * data.fold // _MOST_SCATTERED, 1)]
+    rows = data.row + data.fold * kept[:, None] + np.arange(data.fold)
+    time_s = samples.time_s[rows]
+    time_s = time_s + (data.time_s[kept] - time_s.mean(axis=1))[:, None]
+    left = samples.values[rows] - model(time_s.reshape(-1)).reshape(rows.shape)
+    return replace(data, within_rms=float(np.sqrt(np.mean(np.var(left, axis=1)))))
 
 
 def at_even_times(data: Data, time_s: FloatArray) -> Data:

@@ -409,3 +409,18 @@ def fit_in_growing_window(
         return refine(model, data, noise, value, held=fixed)
     except (NoMotionError, np.linalg.LinAlgError):
         return None
+
+
+LARGE_PHASE_ERROR: Final = 0.1
+"""Phase error in rad from which a model has lost the motion."""
+
+
+def fitted_from(
+    model: Model, data: Data, noise: Noise, start: FloatArray, *, held: Iterable[int] = ()
+) -> Fit | None:
+    """Fit at once, and in a growing window where that loses the phase; return the better one."""
+    fixed = tuple(held)
+    fit = best_fit(model, data, noise, [start], held=fixed)
+    if fit and fit.converged and fit.max_phase_error_rad < LARGE_PHASE_ERROR:
+        return fit
+    return better(fit, fit_in_growing_window(model, data, noise, start, held=fixed))

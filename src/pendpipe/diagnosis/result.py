@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, NamedTuple
 
-from pendpipe.analysis.fit.result import FitResult
+from pendpipe.analysis.fit.result import FitResult, Restoring
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.cycles import SmallSwings
 from pendpipe.diagnosis.held_out import HeldOut
@@ -18,6 +18,15 @@ from pendpipe.estimate import Estimate
 FILE_NAME: Final = "diagnosis.json"
 BASELINES: Final = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 """The baselines in words."""
+
+
+def swinging(baseline: str, restoring: str, drag_form: str) -> str:
+    """Return a baseline with its forms, in words."""
+    forms = {"sin x": restoring == "sine", "v|v|": drag_form == "speed"}
+    with_them = " and ".join(name for name, has in forms.items() if has)
+    return BASELINES.get(baseline, baseline) + (f" with {with_them}" if with_them else "")
+
+
 Verdict = Literal["consistent", "missing-physics", "not-analysable"]
 _DENSITIES: Final = ("log_density_before", "log_density_after", "gain", "gain_sd")
 
@@ -29,6 +38,15 @@ class FittedModel:
     parameters: Mapping[str, Estimate]
     residual_rms_rad: float
     chi2_per_dof: float
+    noise_rms_rad: float = 0.0
+    fit_p_value: float | None = None
+    """Of the one test of fit, where the model is the one that ``fit`` prints."""
+
+    @classmethod
+    def of_fit(cls, fit: FitResult) -> FittedModel:
+        """Take the numbers, the residual and the noise of a fit, all of its readings."""
+        left = fit.residual_rms_rad, fit.chi2_per_dof, fit.noise_rms_rad
+        return cls(fit.parameters, *left, fit.fit_p_value)
 
     def as_json(self) -> dict[str, Any]:
         """Return the contract's form."""
@@ -36,6 +54,8 @@ class FittedModel:
             "parameters": {name: each.as_json() for name, each in self.parameters.items()},
             "residual_rms_rad": self.residual_rms_rad,
             "chi2_per_dof": self.chi2_per_dof,
+            "noise_rms_rad": self.noise_rms_rad,
+            "fit_p_value": self.fit_p_value,
         }
 
 
@@ -249,7 +269,7 @@ class Diagnosis:
     verdict, p_value
         Global: of the largest score over the whole catalogue.
     effects
-        In the order in which they were added.
+        What the baseline has, and the missing in the order in which they were added.
     held_out
         None where nothing was added.
     unexplained_rms_rad, unexplained_p_value
@@ -266,6 +286,8 @@ class Diagnosis:
         The fit that the diagnosis began with.
     scanned
         What was looked for, with its p-value on the baseline's residual.
+    restoring, drag_form
+        The baseline's torque, and the form of drag that the readings prefer.
     """
 
     baseline_name: str
@@ -283,6 +305,8 @@ class Diagnosis:
     figures: tuple[str, ...] = ()
     remainder: Remainder | None = None
     small_swings: SmallSwings | None = None
+    restoring: Restoring = "linear"
+    drag_form: str = "energy"
     provenance: Mapping[str, Any] = field(default_factory=dict)
     name: str = ""
     fit: FitResult | None = field(default=None, repr=False, compare=False)
@@ -307,7 +331,7 @@ class Diagnosis:
         return "\n".join(self.summary.lines(self.name))
 
     def __repr__(self) -> str:
-        names = ", ".join(effect.identifier for effect in self.effects)
+        names = ", ".join(effect.identifier for effect in self.missing)
         return f"Diagnosis({self.verdict}{': ' if names else ''}{names}, p = {self.p_value:.2g})"
 
     def to_dict(self) -> dict[str, Any]:
@@ -321,6 +345,8 @@ class Diagnosis:
         return {
             "schema_version": 1,
             "baseline": {"name": self.baseline_name, **self.baseline.as_json()},
+            "restoring": self.restoring,
+            "drag_form": self.drag_form,
             "noise_rms_rad": self.noise_rms_rad,
             "verdict": self.verdict,
             "p_value": self.p_value,
@@ -366,9 +392,12 @@ def not_analysable(
         Goes into the result.
     """
     nothing: dict[str, Any] = {"parameters": {}, "residual_rms_rad": None, "chi2_per_dof": None}
+    nothing |= {"noise_rms_rad": None, "fit_p_value": None}
     return {
         "schema_version": 1,
         "baseline": {"name": baseline, **nothing},
+        "restoring": None,
+        "drag_form": None,
         "noise_rms_rad": None,
         "verdict": "not-analysable",
         "reason": reason,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,12 +11,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendpipe.analysis.fit.by_points import check_fixed
-from pendpipe.analysis.fit.result import Baseline, Restoring
+from pendpipe.analysis.fit.result import Baseline, FitResult, Restoring
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples, prepare
+from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import Progress, silent
-from pendpipe.diagnosis.begin import SINE, Beginning, begin
+from pendpipe.diagnosis.begin import Beginning, begin
 from pendpipe.diagnosis.cycles import SmallSwings, small_swings
+from pendpipe.diagnosis.data import with_scatter
 from pendpipe.diagnosis.forensics.codes import with_true_step
 from pendpipe.diagnosis.forensics.colour import level_note, wander_note
 from pendpipe.diagnosis.forensics.corrections import loss_confirmed
@@ -24,7 +27,15 @@ from pendpipe.diagnosis.held_out import held_out
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of
-from pendpipe.diagnosis.result import FILE_NAME, Diagnosis, FittedModel, FoundEffect
+from pendpipe.diagnosis.result import (
+    FILE_NAME,
+    Diagnosis,
+    FittedModel,
+    FoundEffect,
+    Location,
+    swinging,
+)
+from pendpipe.diagnosis.scores import whitened
 from pendpipe.diagnosis.search import Search, search
 from pendpipe.diagnosis.statement import statement
 from pendpipe.diagnosis.summary import COLOURED_NOISE, Summary, html_of
@@ -36,7 +47,10 @@ from pendpipe.diagnosis.weighing import (
     law_of,
     swap_in_likelier,
 )
-from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.dynamics.any_law import NoMotionError, sample_pieces
+from pendpipe.effects import Effect
+from pendpipe.effects.catalogue.losses import drag_form as drag_form_effect
+from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.errors import NotAnalysableError
 from pendpipe.quantities import stretch
 from pendpipe.recording import Recording
@@ -61,7 +75,7 @@ class Answer:
 
     @property
     def effects(self) -> tuple[FoundEffect, ...]:
-        """What is missing, in the order in which it was found."""
+        """What is presumed, then what is missing, in the order in which it was found."""
         return self.diagnosis.effects
 
     def __str__(self) -> str:
@@ -167,7 +181,7 @@ def diagnose_recording(
     fixed: Mapping[str, float] | None = None,
     seed: int = 0,
     level: float = LEVEL,
-    linear: bool = False,
+    restoring: Restoring | None = None,
     place: str | Path = "recording",
     provenance: Mapping[str, Any] | None = None,
     progress: Progress = silent,
@@ -186,9 +200,9 @@ def diagnose_recording(
         Of the random draws that count the trials of the scans.
     level
         The false-alarm probability: an effect is reported where the global p-value is below it.
-    linear
-        Whether it is known that gravity does not restore it (a torsion wheel, a mass on a spring):
-        then sin x is no candidate.
+    restoring
+        The torque, where it is known: ``"linear"`` for a torsion wheel or a mass on a spring, for
+        which sin x is no candidate. By default that of the fit.
     place
         Named in error messages.
     provenance
@@ -215,7 +229,7 @@ def diagnose_recording(
         fixed=fixed,
         seed=seed,
         level=level,
-        linear=linear,
+        restoring=restoring,
         place=place,
         provenance=provenance,
         progress=progress,
@@ -233,7 +247,7 @@ def diagnose_decay(
     fixed: Mapping[str, float] | None = None,
     seed: int = 0,
     level: float = LEVEL,
-    linear: bool = False,
+    restoring: Restoring | None = None,
     place: str | Path = "recording",
     provenance: Mapping[str, Any] | None = None,
     progress: Progress = silent,
@@ -245,7 +259,7 @@ def diagnose_decay(
     ----------
     part, points
         The free decay, and its turning points.
-    baseline, fixed, seed, level, linear, place, provenance, progress
+    baseline, fixed, seed, level, restoring, place, provenance, progress
         As for `diagnose_recording`.
     whole
         The recording that the decay was cut from; only its time stamps are used.
@@ -260,19 +274,16 @@ def diagnose_decay(
     fixed = fixed or {}
     check_fixed(fixed, baseline)
     samples = with_true_step(prepare(part, place))
+    progress("fitting Eq. 8 to all readings")
+    fit = _fit_of(part, points, baseline, fixed, restoring, place)
     try:
         beginning = begin(
-            samples,
-            points,
-            baseline=baseline,
-            fixed=fixed,
-            stated=part.unit_is_stated,
-            linear=linear,
+            samples, points, fit, baseline=baseline, fixed=fixed, stated=part.unit_is_stated
         )
         found = search(
             beginning,
             samples,
-            [effect for effect in CATALOGUE if not (linear and effect.identifier == SINE)],
+            [each for each in CATALOGUE if not (restoring and each is circular_error)],
             baseline=baseline,
             level=level,
             seed=seed,
@@ -280,6 +291,7 @@ def diagnose_decay(
             progress=progress,
         )
         found, weighed = swap_in_likelier(found, beginning, progress)
+        found = _with_scatter(found, samples)
     except NoMotionError as error:
         remedy = "cut it with --start and --stop, or change what is held with --fix"
         raise NotAnalysableError(place, f"the model can't follow it ({error})", remedy) from error
@@ -291,17 +303,17 @@ def diagnose_decay(
     changing = level_note(found.noise) if seen else None
     wander = wander_note(found.noise, found.data, found.improved)
     stamps = tuple(note for note in (gap, *found.clock_notes, changing, wander) if note)
-    before = _fitted_model(found.baseline, found)
-    if not fixed:
-        # A part of b that is held bounds b here, and not in the fit.
-        before = _as_fit_prints(before, part, points, baseline, "linear", place)
+    # With a red light the fit has lost the motion, which the search follows by its phase; and a
+    # part of b that is held bounds b here alone.
+    stands = fit is not None and fit.light != "red" and not beginning.model.parts
+    before = FittedModel.of_fit(fit) if fit and stands else _fitted_model(found.baseline, found)
     same = found.improved.value is found.baseline.value and found.improved.error_scale == 1.0
     law = law_of(found, weighed)
     after = before if same else _fitted_model(found.improved, found, law)
-    if not fixed and [each.key for each in found.improved.model.effects] == [SINE]:
-        after = _as_fit_prints(after, part, points, baseline, "sine", place)
-    # What is left holds all noise.
-    noise_rms = max(min(found.noise.rms, after.residual_rms_rad), rounding)
+    drag_form = fit.drag_form if fit and stands else "energy"
+    presumed = _presumed(found, drag_form)
+    swung = found.baseline.model.restoring
+    noise_rms = after.noise_rms_rad
     missing = any(effect.identifier != COLOURED_NOISE for effect in effects)
     if missing:
         progress("predicting cycles that are left out of the fit")
@@ -315,12 +327,12 @@ def diagnose_decay(
         noise_rms,
         "missing-physics" if missing else "consistent",
         found.p_value,
-        effects,
+        (*presumed, *effects),
         held,
         after.residual_rms_rad,
         found.unexplained,
         statement(
-            baseline,
+            swinging(baseline, swung, drag_form),
             before,
             after,
             effects,
@@ -333,11 +345,15 @@ def diagnose_decay(
             remainder=found.remainder,
             swings=swings,
             notes=stamps,
+            rounded=noise_rms <= rounding,
         ),
         warnings=(*points.notes, *stamps),
         remainder=found.remainder,
         small_swings=swings,
+        restoring=swung,
+        drag_form=drag_form,
         provenance=dict(provenance or {}),
+        fit=fit,
         name=Path(place).name if str(place) != "recording" else "",
         scanned=tuple((lead.effect.identifier, lead.p_value) for lead in found.detection.leads),
     )
@@ -375,44 +391,85 @@ def _small_swings(law: Fit, found: Search) -> SmallSwings | None:
     return swings if swings is not None and swings.significant else None
 
 
-def _as_fit_prints(
-    own: FittedModel,
+def _fit_of(
     part: Recording,
     points: TurningPoints,
     baseline: Baseline,
-    restoring: Restoring,
+    fixed: Mapping[str, float],
+    restoring: Restoring | None,
     place: str | Path,
-) -> FittedModel:
-    """Take the numbers of a model from the fit, which has the same model and uses all readings.
-
-    With the torque that the fit takes by itself they are what ``pendpipe fit`` prints; with the
-    other, the waveform's. Where the fit does not settle, or contradicts the decay, it prints no
-    law. It has lost the phase, as a least squares of all readings does in a gross misfit; the
-    diagnosis follows it along the motion, and its own numbers stand.
-    """
+) -> FitResult | None:
+    """Return what ``pendpipe fit`` prints; None where it refuses."""
     from pendpipe.analysis.fit import fit_recording
 
     try:
-        fitted = fit_recording(part, points=points, baseline=baseline, place=place)
-        if fitted.restoring != restoring:
-            fitted = fit_recording(
-                part,
-                points=points,
-                method="waveform",
-                restoring=restoring,
-                baseline=baseline,
-                place=place,
-            )
+        return fit_recording(
+            part, points=points, baseline=baseline, fixed=fixed, restoring=restoring, place=place
+        )
     except NotAnalysableError:
-        return own
-    return own if fitted.light == "red" else replace(own, parameters=fitted.parameters)
+        return None
+
+
+def _presumed(found: Search, drag_form: str) -> tuple[FoundEffect, ...]:
+    """List what the baseline has that Eq. 8 has not: sin x, and v|v| where that was fitted."""
+    law = found.baseline.at.span.pendulum
+    swung = [circular_error] if law.has(circular_error.form) else []
+    dragged = [drag_form_effect] if drag_form == "speed" and law.has(drag_form_effect.form) else []
+    return tuple(_as_presumed(each, found) for each in (*swung, *dragged))
+
+
+def _as_presumed(effect: Effect, found: Search) -> FoundEffect:
+    """Return what an effect of the baseline explains, to first order beside its other numbers."""
+    fit = found.baseline
+    (column,) = whitened(fit, found.noise, effect, [()])
+    worth = float(np.sum(fit.beside(column, ()) ** 2))
+    everywhere = replace(
+        Location.over(found.data.time_s, fit.at.sampled.amplitude),
+        summary="it is fitted, throughout the record",
+    )
+    return FoundEffect(
+        effect.identifier,
+        effect.name,
+        effect.kind,
+        effect.equation,
+        {},
+        worth,
+        math.erfc(math.sqrt(0.5 * worth)),
+        1.0 / (1.0 + math.exp(-0.5 * min(worth + effect.prior, 1e3))),
+        (),
+        effect.discriminating_test,
+        everywhere,
+        presumed=True,
+    )
 
 
 def _fitted_model(fit: Fit, found: Search, law: Fit | None = None) -> FittedModel:
-    """Return a fit's residual and parameters; those of its `law` where that is another fit."""
+    """Return a fit's residual and parameters; those of its `law` where that is another fit.
+
+    Residual, chi^2 and noise are those of a reading.
+    """
     data = found.data
     residual = data.residual(fit.at.reading)[data.weight > 0.0]
-    dof = max(data.used - len(fit.free), 1)
+    left = float(np.sqrt(np.mean(residual**2)))
+    # What is left holds all noise.
+    noise = max(min(found.noise.rms, left), data.step / 12.0**0.5)
     return FittedModel(
-        parameters_of(law or fit, data.unit), float(np.sqrt(np.mean(residual**2))), fit.chi2 / dof
+        parameters_of(law or fit, data.unit),
+        data.rms_of_reading(left),
+        data.chi2_per_dof(fit.chi2, len(fit.free)),
+        data.rms_of_reading(noise),
     )
+
+
+def _with_scatter(found: Search, samples: Samples) -> Search:
+    """Measure the scatter of the readings that were averaged."""
+    data, fit = found.data, found.improved
+    if data.fold == 1:
+        return found
+    pieces = fit.model.follow(fit.value)
+    single = replace(fit.model, fold=1, interval_s=data.interval_s / data.fold)
+
+    def reading(time_s: FloatArray) -> FloatArray:
+        return single.read(single.as_seen(sample_pieces(pieces, time_s), fit.value), fit.value)
+
+    return replace(found, data=with_scatter(data, samples, reading))

@@ -16,10 +16,10 @@ from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Detection, more_leads, pr
 from pendpipe.diagnosis.evidence import Rival, Scale
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.held_out import predicts_worse
-from pendpipe.diagnosis.known_first import known_law_first
+from pendpipe.diagnosis.known_first import second_mode_first
 from pendpipe.diagnosis.moves import describe, improve, prefer_rare, refit_without
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit, best_fit, refine
+from pendpipe.diagnosis.refine import Fit, best_fit, fitted_from
 from pendpipe.diagnosis.refits import refit_leads
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import Remainder, remainder_of, with_errors
@@ -124,12 +124,14 @@ def search(
     data, held = beginning.data, list(beginning.held)
     progress(f"fitting {BASELINES.get(baseline, baseline)} to {data.used} readings")
     white = first_noise(beginning)
-    fit = refine(beginning.model, data, white, beginning.value, held=held)
+    fit = fitted_from(beginning.model, data, white, beginning.value, held=held)
+    if fit is None:
+        raise NoMotionError("it stops")
     state = State(fit, data, white, held, fit.value)
     state.settle(fit)
     forensics = Forensics(samples, level)
     task = Task(catalogue, released, baseline, level, seed, forensics, progress)
-    known_law_first(beginning, state, task)
+    second_mode_first(beginning, state, task)
     return grown(state, task, beginning)
 
 

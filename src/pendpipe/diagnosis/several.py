@@ -35,6 +35,7 @@ from pendpipe.diagnosis.result import (
     FittedModel,
     FoundEffect,
     Location,
+    swinging,
 )
 from pendpipe.diagnosis.run import LEVEL, Answer, Outcome, diagnose_recording
 from pendpipe.diagnosis.search import LESS_FRICTION, Search, grown
@@ -181,7 +182,7 @@ def diagnose_several(
     events = [
         replace(each, location=replace(each.location, summary=f"in {name} alone"))
         for name, outcome, part in zip(names, outcomes, law.at.parts, strict=True)
-        for each in outcome.effects
+        for each in outcome.diagnosis.missing
         if each.kind not in ("unnamed", "parameter")
         and (
             each.identifier in {one.identifier for one in part.model.effects if happened(one)}
@@ -190,9 +191,10 @@ def diagnose_several(
     ]
     p_value = min([found.p_value, *(outcome.diagnosis.p_value for outcome in outcomes)])
     p_value = min(1.0, (len(outcomes) + 1) * p_value)
-    effects = (*named, *differing, *events)
+    own_forms = [each for each in outcomes[0].effects if each.presumed]
+    effects = (*own_forms, *named, *differing, *events)
     told = [after.recording(number) for number in range(len(names))]
-    missing = any(each.identifier != COLOURED_NOISE for each in effects)
+    missing = any(not (each.presumed or each.identifier == COLOURED_NOISE) for each in effects)
     noise_rms = _rms([outcome.diagnosis.noise_rms_rad for outcome in outcomes])
     held = (
         held_out(found.baseline, found.improved, found.data, found.noise, found.held, found.held)
@@ -201,7 +203,7 @@ def diagnose_several(
     )
     models = (before.model() if named else after.model(), after.model())
     text = statement(
-        baseline,
+        swinging(baseline, outcomes[0].diagnosis.restoring, outcomes[0].diagnosis.drag_form),
         *models,
         named,
         held,
@@ -233,6 +235,8 @@ def diagnose_several(
             for line in outcome.diagnosis.warnings
         ),
         remainder=found.remainder,
+        restoring=outcomes[0].diagnosis.restoring,
+        drag_form=outcomes[0].diagnosis.drag_form,
         provenance=dict(provenance or {}),
         name=f"{listed(names)} together",
     )
@@ -441,7 +445,9 @@ def _member(outcome: Outcome) -> Model:
     found = outcome.search
     laws = {each.identifier for each in CATALOGUE if not happened(each)}
     doubted = {
-        e.identifier for e in outcome.effects if laws.intersection(dict(e.indistinguishable))
+        e.identifier
+        for e in outcome.diagnosis.missing
+        if laws.intersection(dict(e.indistinguishable))
     }
     model = found.baseline.model.bare().at_times(found.data.time_s)
     for effect in found.improved.model.effects:
@@ -569,13 +575,27 @@ class _Answer:
     def model(self) -> FittedModel:
         """Return the shared values, and what the model leaves."""
         data, fit = self.found.data, self.improved
-        left = data.residual(fit.at.reading)[data.weight > 0.0]
+        alone = [outcome.search.data for outcome in self.outcomes]
+        size = np.array([float(each.used * each.fold) for each in alone])
+        left = np.array([self._residual_rms(number) for number in range(len(alone))])
+        within = sum(each.used * (each.fold - 1) for each in alone)
         shared = {
             name: value
             for name, value in constants_of(self.law, data.unit).items()
             if name in MAY_DIFFER and name not in {*self.own, *self.differing}
         }
-        return FittedModel(shared, _rms(left), fit.chi2 / max(data.used - len(fit.free), 1))
+        return FittedModel(
+            shared,
+            float(np.sqrt(size @ left**2 / size.sum())),
+            (fit.chi2 + within) / max(float(size.sum()) - len(fit.free), 1.0),
+            _rms([outcome.diagnosis.noise_rms_rad for outcome in self.outcomes]),
+        )
+
+    def _residual_rms(self, number: int) -> float:
+        """Return what the model leaves of one recording's readings."""
+        used = self._of(number) & (self.found.data.weight > 0.0)
+        left = _rms(self.found.data.residual(self.improved.at.reading)[used])
+        return self.outcomes[number].search.data.rms_of_reading(left)
 
     def of_recording(self, name: str, number: int) -> Estimate:
         """Return one recording's value of a parameter."""
@@ -603,16 +623,15 @@ class _Answer:
     def recording(self, number: int) -> dict[str, Any]:
         """Return what is to be said of one recording."""
         diagnosis, part = self.outcomes[number].diagnosis, self.law.at.parts[number]
-        used = self._of(number) & (self.found.data.weight > 0.0)
         white = self.improved.residual[:-1][self._of(number)]
         return {
             "name": self.names[number],
             "alone": {
                 "verdict": diagnosis.verdict,
-                "effects": [each.identifier for each in diagnosis.effects],
+                "effects": [each.identifier for each in diagnosis.missing],
                 "classes": [
                     sorted({each.identifier, *(name for name, _ in each.indistinguishable)})
-                    for each in diagnosis.effects
+                    for each in diagnosis.missing
                 ],
             },
             "amplitude_rad": float(part.at.span.first_amplitude),
@@ -621,8 +640,10 @@ class _Answer:
                 for name in MAY_DIFFER
                 if name in {*self.own, *self.differing}
             },
-            "residual_rms_rad": _rms(self.found.data.residual(self.improved.at.reading)[used]),
-            "chi2_per_dof": float(white @ white) / max(int(used.sum()) - len(part.value), 1),
+            "residual_rms_rad": self._residual_rms(number),
+            "chi2_per_dof": self.outcomes[number].search.data.chi2_per_dof(
+                float(white @ white), len(part.value)
+            ),
             "prediction": self._prediction(number),
         }
 

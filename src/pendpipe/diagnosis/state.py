@@ -7,13 +7,13 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.diagnosis.begin import LARGE_PHASE_ERROR, Beginning
+from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data, with_lattice
 from pendpipe.diagnosis.detect import Detection
 from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise
-from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.refine import LARGE_PHASE_ERROR, Fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import INCOMPLETE
 from pendpipe.diagnosis.result import Finding

@@ -70,6 +70,7 @@ def statement(
     remainder: Remainder | None = None,
     swings: SmallSwings | None = None,
     notes: Sequence[str] = (),
+    rounded: bool = False,
 ) -> str:
     """Write the paragraph.
 
@@ -99,6 +100,8 @@ def statement(
         What the extended model leaves, and the frequency at the smallest amplitudes.
     notes
         Properties of the time stamps, a clause each.
+    rounded
+        Whether the noise is that of the rounding.
     """
     model = BASELINES.get(baseline, baseline)
     stamps = [f"Note: {'; '.join(notes)}."] if notes else []
@@ -108,7 +111,7 @@ def statement(
         what = "the motion of this recording, whose zero wanders" if wanders else "this recording"
         left, noise_is = (compact(each, unit) for each in (before.residual_rms_rad, noise_rms))
         agrees = f"the residual of {left} rms agrees with the noise ({noise_is})"
-        if before.residual_rms_rad < noise_rms:
+        if rounded and before.residual_rms_rad < noise_rms:
             agrees = f"it leaves {left} rms, less than the rounding adds ({noise_is})"
         nothing = (
             f"{_capital(model)} describes {what}: {agrees}, and no effect of the catalogue"

@@ -36,7 +36,8 @@ def applicable(
         if effect.has_signature
         and (effect.rare or (rare and effect.expected)) == rare
         and baseline not in effect.inside
-        and (unit == "rad" or not effect.angular)
+        and (unit in ("rad", "rad/s") or not effect.angular)
+        and not (effect.form and fit.at.span.pendulum.has(effect.form))
         and all(present[name] for name in effect.needs)
         and (effect.identifier not in used or effect.local)
     ]

@@ -76,6 +76,10 @@ class Pendulum(Eq8):
         """The sum b = b_h + b_v, 1/s."""
         return self.hysteretic + self.viscous
 
+    def has(self, form: Mapping[str, Any]) -> bool:
+        """Whether these are its forms already."""
+        return all(getattr(self, name) == each for name, each in form.items())
+
     def losses(self, motion: Motion) -> FloatArray:
         """Return the acceleration by Eq. 8's losses at the nodes, rad/s^2."""
         return self.friction(motion.angle, motion.velocity, motion.direction)

@@ -85,7 +85,7 @@ class Shown:
         """The baseline and, where something was found, the extended model, named for legends."""
         named = [(self.baseline_name, self.baseline)]
         if self.extended is not None:
-            found = [effect.identifier for effect in self.diagnosis.effects]
+            found = [effect.identifier for effect in self.diagnosis.missing]
             more = f" and {len(found) - 1} more" if len(found) > 1 else ""
             named.append((f"with {found[0]}{more}", self.extended))
         return named
@@ -127,7 +127,7 @@ class Shown:
 def shown(outcome: Outcome) -> Shown:
     """Take from an outcome what is drawn."""
     found = outcome.search
-    extended = found.improved if outcome.diagnosis.effects else None
+    extended = found.improved if outcome.diagnosis.missing else None
     return Shown(outcome.diagnosis, found.data, found.noise, found.baseline, extended)
 
 
@@ -449,7 +449,7 @@ def _power(values: FloatArray) -> tuple[str, float]:
 @styled
 def draw_curve(content: Shown) -> Figure:
     """Draw the curve of each unnamed effect, one below the other."""
-    unnamed = [effect for effect in content.diagnosis.effects if effect.curve is not None]
+    unnamed = [effect for effect in content.diagnosis.missing if effect.curve is not None]
     if not unnamed:
         raise NothingToDrawError("every effect has a name")
     below = [panel for effect in unnamed for panel in _curves(effect.name, effect.curve or {})]

@@ -254,6 +254,8 @@ def diagnoses(folder: Path, names: list[str], room: Room) -> list[dict[str, Any]
         if not (place / "diagnosis.json").is_file():
             continue
         content = read_json(place / "diagnosis.json")
+        # What is presumed is fitted, and no finding.
+        content["effects"] = [each for each in content["effects"] if not each.get("presumed")]
         figure = None
         if content["verdict"] == "missing-physics":
             words = f"{CAPTIONS['residual_map'].shows} Record {name}."

@@ -818,6 +818,7 @@ def waveform_result(
         and (OMEGA in fitted.held or matrix[3, 3] > 0.0),
         drag_form=form,
         zero_drift=drift,
+        motion=problem.model(fitted.value),
     )
 
 

@@ -25,7 +25,7 @@ from pendpipe.analysis.fit.quality import (
 )
 from pendpipe.analysis.turning_points import TurningPoints, write_turning_points
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics import Eq8
+from pendpipe.dynamics import Eq8, Release
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Estimate, number, quality_of_rate
 from pendpipe.files import read_json, write_json, writing
@@ -130,6 +130,9 @@ class FitResult:
         By what standard deviations were multiplied for what the law misses.
     name
         Of the file that was fitted.
+    motion
+        The waveform's law at its minimum, where b has its parts, and the turning point from which
+        it moves; None where the fit was read from a file.
     points, decay
         The turning points and the readings of the fitted decay; None where the fit was read
         from a file.
@@ -166,6 +169,7 @@ class FitResult:
     period_check: tuple[PeriodCheck, ...] = ()
     widening: Widening = field(default_factory=Widening)
     name: str = field(default="", compare=False)
+    motion: tuple[Eq8, Release] | None = field(default=None, repr=False, compare=False)
     points: TurningPoints | None = field(default=None, repr=False, compare=False)
     decay: Recording | None = field(default=None, repr=False, compare=False)
 

@@ -29,29 +29,6 @@ circular_error: Final = other_form(
 )
 
 
-@enters(
-    "acceleration",
-    identifier="circular-error",
-    key="circular-error:rate",
-    name="circular error",
-    equation=r"\omega^2 u \to \omega^2 u \cos x, \quad \sin x = -\dot u/\omega^2",
-    parameter_free=True,
-    expected=True,
-    prior=12.0,
-    example=(1.0,),
-    discriminating_test=circular_error.discriminating_test,
-)
-def circular_error_of_rate(motion: Motion, pendulum: Pendulum, size: float) -> FloatArray:
-    """The form of `circular-error` in readings of the angular velocity u (rad/s), up to pi/2.
-
-    The time derivative of x'' = -omega^2 sin x is u'' = -omega^2 u cos x, with
-    sin x = -u'/omega^2.
-    """
-    omega = pendulum.angular_frequency
-    sine = np.clip(motion.velocity / (omega * omega), -1.0, 1.0)
-    return np.asarray(size * omega * omega * motion.angle * (1.0 - np.sqrt(1.0 - sine * sine)))
-
-
 _GRAVITY: Final = 9.81
 _LENGTH_SD: Final = 0.2
 """Of ln L about g/omega^2: physical pendulums, and marks that are not at their centre."""
@@ -89,7 +66,6 @@ def _seen_from_the_side(unit: str, **more: Any) -> Effect:
 
 
 CIRCULAR_ERROR_IN: Final[dict[str, Effect]] = {
-    "rad/s": circular_error_of_rate,
     "m": _seen_from_the_side(
         "m", expected=True, prior=circular_error.prior, prior_penalty=_unlike_a_pendulum
     ),
