@@ -58,6 +58,21 @@ OTHERWISE_MODELLED: Final = ("wall-confinement", "free-surface")
 and modes at three frequencies. They test the class; sizes and loss torques mean something else."""
 
 
+QUANTITIES: Final = (
+    "k",
+    "kappa",
+    "uniform-drag-excess",
+    "history-term",
+    "k of the table",
+    "kappa of the table",
+    "theory_factor",
+    "C_H of the table",
+    "Q_v",
+)
+"""Coverage is asked of each: of the joint fit with the cause, and of the first table where nothing
+is missing; Q_v of each record in the water."""
+
+
 class Generator:
     """The readings of a campaign for nuisances in standard deviations, then causes in own units."""
 
@@ -264,12 +279,18 @@ def bound(maker: Generator, theta: Array, sds: Array, cause: str) -> float:
 
 
 def judge(
-    maker: Generator, values: Array, sds: Array, truth: dict[str, float], cause: str | None
+    maker: Generator,
+    values: Array,
+    sds: Array,
+    truth: dict[str, float],
+    cause: str | None,
+    viscous: Array,
 ) -> dict[str, Any]:
     """What the library answers on the readings."""
     from pendpipe.campaign.design import design_of
     from pendpipe.campaign.diagnose import search
     from pendpipe.campaign.fit import coefficient, joint_fit, loss_torques, measured, named
+    from pendpipe.campaign.values import campaign_values
     from pendpipe.configuration.load import load_campaign, read_configuration
 
     content = read_configuration(ROOT / "config/config.yaml")
@@ -298,6 +319,7 @@ def judge(
         "p": answer.p_value,
         "class": list(inside),
         "found": len(answer.found),
+        "left_out": [far.record for far in answer.left_out],
         "seconds": spent,
     }
     if cause in inside and cause != "wall-confinement":  # whose size has another meaning here
@@ -306,6 +328,15 @@ def judge(
     if cause is None:  # the drag factor and C_H of campaigns that lack nothing
         for name in ("uniform-drag-excess", "history-term"):
             pulls[name] = pull(joint_fit(design, data, named(name), fit.unknowns).size(0), 0.0)
+        table = campaign_values(design, data)
+        assert table is not None
+        pulls["k of the table"] = pull(table.coefficient, truth["k"])
+        pulls["kappa of the table"] = pull(table.loss_torques["water"], truth["kappa"])
+        pulls["theory_factor"] = pull(table.theory_factor.estimate, 1.0)
+        pulls["C_H of the table"] = pull(table.history_coefficient.estimate, 1.0)
+        for number, record in zip(table.wet, table.records, strict=True):
+            estimate = table.quality("viscous_rate", number)
+            pulls[f"Q_v of {record}"] = pull(estimate, viscous[index[number]])
     return result | {"pulls": pulls}
 
 
@@ -344,7 +375,7 @@ def draw(maker: Generator, number: int) -> dict[str, Any]:
         "cause": cause,
         "size": truth["size"],
         "oracle": oracle(maker, theta, values, sds, cause),
-        **judge(maker, values, sds, truth, cause),
+        **judge(maker, values, sds, truth, cause, maker.read(theta[None], viscous=True)[0]),
     }
 
 
@@ -378,9 +409,16 @@ def table(results: list[dict[str, Any]]) -> str:
         lines.append(f"mean size of the class, {whose}: {np.mean(sizes):.2f}")
     more = sum(one["found"] > 1 for one in hidden)
     lines.append(f"a second effect claimed: {share(more, len(hidden))}")
-    for key in ("k", "kappa", "size", "uniform-drag-excess", "history-term"):
-        known = [one for one in results if one["cause"] not in OTHERWISE_MODELLED]
-        pulls = np.array([one["pulls"][key] for one in known if key in one["pulls"]])
+    lines.append(
+        f"a record left out: {share(sum(bool(one['left_out']) for one in hidden), len(hidden))}"
+    )
+    known = [one for one in results if one["cause"] not in OTHERWISE_MODELLED]
+    everything: dict[str, list[float]] = {}
+    for one in known:
+        for key, value in one["pulls"].items():
+            everything.setdefault("Q_v" if key.startswith("Q_v") else key, []).append(value)
+    for key in (*QUANTITIES, "size"):
+        pulls = np.array(everything.get(key, []))
         if not len(pulls):
             continue
         one_sd, two_sd = (int(np.sum(np.abs(pulls) < limit)) for limit in (1.0, 1.96))

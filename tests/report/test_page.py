@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from pendpipe.cli import main
 from pendpipe.figures.data import typical_record
@@ -253,6 +254,15 @@ def test_the_command_writes_the_page_whole_or_not_at_all(
     assert capsys.readouterr().err.count("\n") == 1
     assert not out.exists()
     assert main([*words, str(example.summary)]) == 0
+    Outline(out.read_text(encoding="utf-8"))
+
+
+def test_the_configuration_alone_is_enough_for_the_command(example: Any, tmp_path: Path) -> None:
+    """In YAML, as the campaign has it; comparison and numbers are those of its results."""
+    configuration = tmp_path / "config.yaml"
+    configuration.write_text(yaml.safe_dump(json.loads(example.campaign.read_text())))
+    out = tmp_path / "report.html"
+    assert main(["report", "--campaign", str(configuration), "--out", str(out)]) == 0
     Outline(out.read_text(encoding="utf-8"))
 
 

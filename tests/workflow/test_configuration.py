@@ -123,6 +123,7 @@ def test_an_added_unknown_key_names_its_place(content: dict[str, Any]) -> None:
         (lambda c: c.update(results="-rf"), "is no folder"),
         (lambda c: c.update(results=""), "is no folder"),
         (lambda c: c.update(results="README.md/x"), "README.md is a file"),
+        (lambda c: c["fluids"]["water"].update(temperature_c=68.0), "less than or equal to 40"),
     ],
 )
 def test_what_cannot_be_is_said_in_one_line(
@@ -133,6 +134,24 @@ def test_what_cannot_be_is_said_in_one_line(
         load_campaign(content, "config.yaml")
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("celsius", ["68", "-0.5", "293.15"])
+def test_a_temperature_outside_waters_table_is_refused_by_row(
+    content: dict[str, Any], tmp_path: Path, celsius: str
+) -> None:
+    """Fahrenheit and kelvin; where a fluid's own values hold for every record they are not read."""
+    path = tmp_path / "records.tsv"
+    head = "record\tsource\tfluid\tgeometry\ttemperature_c\n"
+    row = f"one\tsimulated\twater\tlow-3\t{celsius}\n"
+    path.write_text(
+        head + row.replace("one", "two").replace("water", "air").replace("low-3", "air-07")
+    )
+    changed = content | {"records": str(path), "typical_record": None}
+    assert load_campaign(changed, "config.yaml").records[0].temperature_c == float(celsius)
+    path.write_text(head + row)
+    with pytest.raises(InputError, match=rf"record one: {celsius} °C is not between 0 and 40"):
+        load_campaign(changed, "config.yaml")
 
 
 @pytest.mark.parametrize("written", [b"\xff\xfe", b"a: \x01", b"[" * 5000, b"a: [1", b"", b"3"])

@@ -17,7 +17,7 @@ from pendpipe import physics
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.configuration.apparatus import fluid_at
 from pendpipe.configuration.load import Campaign, Record
-from pendpipe.configuration.models import Apparatus, Fluid, Tank
+from pendpipe.configuration.models import WATER_C, Apparatus, Fluid, Tank
 
 AIR_DRAG_RELATIVE_SD = 0.1
 """Of the drag that weights and rod meet in air: each weight counts as the sphere of its area."""
@@ -274,7 +274,7 @@ class Design:
             found = physics.Fluid(0.0, 1.0)
             if run.fluid is not None:
                 about = run.fluid.temperature_c if run.temperature_c is None else run.temperature_c
-                then = None if about is None else np.clip(about + warmer_k[..., number], 0.0, 40.0)
+                then = None if about is None else np.clip(about + warmer_k[..., number], *WATER_C)
                 found = fluid_at(run.fluid, then)
             columns.append(np.broadcast_arrays(*found, warmer_k[..., number])[:2])
         density, viscosity = np.moveaxis(np.array(columns), (0, 1), (-1, 0))

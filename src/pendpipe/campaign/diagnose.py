@@ -10,17 +10,21 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri_exp
 
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.campaign.design import Design, Run
+from pendpipe.campaign.effects import CATALOGUE
 from pendpipe.campaign.fit import (
     Candidate,
     JointFit,
     Measured,
     candidates,
     chi2_near,
+    coefficient,
     joint_fit,
+    named,
+    only,
     predict,
 )
 from pendpipe.estimate import chi_square_p_value
@@ -29,6 +33,11 @@ from pendpipe.templates import render
 CLASS_CHI2: Final = 6.0
 """A rival whose likelihood is within exp(-3) of the best one's is in the class (contract)."""
 MOST_EFFECTS: Final = 3
+MOST_LEFT_OUT: Final = 3
+FAR_SIGMA: Final = 4.0
+"""A record that lies farther from what all others predict is named."""
+NOTHING_MISSING: Final = 0.5
+"""Probability beforehand that nothing is missing; the effects share the rest alike."""
 _DRAWS: Final = 10_000
 _SEED: Final = 24
 _REACH: Final = 30.0
@@ -45,8 +54,17 @@ class Found:
     rivals: tuple[tuple[JointFit, float], ...]
     """The fits with each of the rest of the class in its place, and their probabilities."""
     probability: float
+    nothing: float
+    """Probability that no effect is missing."""
     p_value: float
     delta_chi2: float
+
+
+class Far(NamedTuple):
+    """A record that disagrees with the others, by how many sigma."""
+
+    record: str
+    sigma: float
 
 
 @dataclass(frozen=True)
@@ -56,7 +74,7 @@ class CampaignSearch:
     Parameters
     ----------
     baseline, improved
-        The joint fits without and with what was found.
+        The joint fits without and with what was found, of the records that were kept.
     p_value
         Global: of the largest score over the catalogue, or of chi^2 as a whole.
     found
@@ -65,6 +83,12 @@ class CampaignSearch:
         Whether something is missing.
     excluded
         Rise of chi^2 above the best rival, by identifier, of those outside the first class.
+    left_out
+        Records that disagree with all others, and explain a misfit better than any effect.
+    suspect
+        A record that would explain it about as well as what was found.
+    whole
+        The answer with all records, where some were left out.
     """
 
     baseline: JointFit
@@ -73,6 +97,9 @@ class CampaignSearch:
     found: tuple[Found, ...]
     missing: bool
     excluded: dict[str, float]
+    left_out: tuple[Far, ...] = ()
+    suspect: Far | None = None
+    whole: "CampaignSearch | None" = None
 
 
 def local_scores(fit: JointFit, tried: Sequence[Candidate]) -> tuple[FloatArray, FloatArray]:
@@ -129,21 +156,55 @@ def global_p_value(
 def search(
     design: Design, data: Measured, level: float = 0.01, base: JointFit | None = None
 ) -> CampaignSearch:
-    """Look for what the model lacks.
+    """Look for what the model lacks, and for records that disagree with all others.
 
-    Half of the level goes to the catalogue's scan, half to chi^2 as a whole.
+    A record that lies beyond `FAR_SIGMA` whatever was found, or explains the misfit better than
+    what was found, is left out, and the search is made again.
 
     Parameters
     ----------
     design, data
         As for `joint_fit`.
     level
-        False-alarm probability for a campaign that lacks nothing.
+        False-alarm probability for a campaign that lacks nothing: half of it goes to the
+        catalogue's scan, half to chi^2 as a whole.
     base
         The fit without effects, where it is there already.
     """
-    baseline = base or joint_fit(design, data)
-    everything = candidates(design)
+    whole = answer = _search(base or joint_fit(design, data), level)
+    left_out: list[Far] = []
+    while answer.missing and len(answer.baseline.design.runs) > MOST_LEFT_OUT:
+        suspect = _farthest(answer.improved) or _farthest(answer.baseline)
+        if suspect is None:
+            break
+        keep = np.array([run.record != suspect.record for run in answer.baseline.design.runs])
+        fewer = joint_fit(*only(answer.baseline.design, answer.baseline.data, keep))
+        better = answer.improved.chi2 - fewer.chi2
+        if _farthest(answer.improved) is None and better < CLASS_CHI2:
+            answer = replace(answer, suspect=suspect if better > -CLASS_CHI2 else None)
+            break
+        if len(left_out) == MOST_LEFT_OUT:
+            break
+        left_out.append(suspect)
+        answer = _search(fewer, level)
+    if not left_out:
+        return answer
+    return replace(
+        answer, p_value=whole.p_value, missing=True, left_out=tuple(left_out), whole=whole
+    )
+
+
+def _farthest(fit: JointFit) -> Far | None:
+    """The record that differs most from what all others predict, if it is far."""
+    _, pulls = held_out(fit)
+    number = int(np.argmax(np.abs(pulls)))
+    far = Far(fit.design.runs[number].record, float(pulls[number]))
+    return far if abs(far.sigma) > FAR_SIGMA else None
+
+
+def _search(baseline: JointFit, level: float) -> CampaignSearch:
+    """Add effects as long as the scan of the catalogue alarms."""
+    everything = candidates(baseline.design)
     fit, found, first = baseline, [], 1.0
     excluded: dict[str, float] = {}
     for number in range(MOST_EFFECTS):
@@ -151,13 +212,13 @@ def search(
         tried = [one for one in everything if one.effect.identifier not in taken]
         scores, correlations = local_scores(fit, tried)
         scan = global_p_value(scores, correlations, tried)
-        whole = chi_square_p_value(fit.chi2, fit.degrees_of_freedom)
-        p_value = min(1.0, 2.0 * min(scan, whole))
-        first = p_value if number == 0 else first
-        if p_value >= level or (number and scan >= 0.5 * level):
+        if not number:
+            whole = chi_square_p_value(fit.chi2, fit.degrees_of_freedom)
+            first = min(1.0, 2.0 * min(scan, whole))
+        if scan >= 0.5 * level:
             break
         rivals = refit(fit, tried, scores)
-        members = class_of(rivals)
+        members, nothing = class_of(rivals, fit, len({one.effect.identifier for one in tried}))
         if members[0][0].chi2 > fit.chi2 - 1.0:
             break
         leader, probability = members[0]
@@ -170,9 +231,9 @@ def search(
             ]
             above += [(rival.last.identifier, rival.chi2 - best) for rival in rivals]
             excluded = {name: rise for name, rise in above if name not in inside}
-        found.append(
-            Found(leader, tuple(members[1:]), probability, p_value, fit.chi2 - leader.chi2)
-        )
+        gain = fit.chi2 - leader.chi2
+        chance = min(1.0, 2.0 * scan)
+        found.append(Found(leader, tuple(members[1:]), probability, nothing, chance, gain))
         fit = leader
     return CampaignSearch(baseline, fit, first, tuple(found), first < level, excluded)
 
@@ -185,11 +246,15 @@ def refit(fit: JointFit, tried: Sequence[Candidate], scores: FloatArray) -> list
     return [joint_fit(fit.design, fit.data, (*fit.added, one), fit.unknowns) for one in near]
 
 
-def class_of(rivals: Sequence[JointFit]) -> list[tuple[JointFit, float]]:
-    """The rivals that the data cannot tell apart, the most probable first, with probabilities.
+def class_of(
+    rivals: Sequence[JointFit], without: JointFit, effects: int
+) -> tuple[list[tuple[JointFit, float]], float]:
+    """The rivals that the data cannot tell apart, and the probability that nothing is missing.
 
-    One shape of an effect stands for it. What is left to 1 is "none of these": it is likely where
-    even the best of them leaves more chi^2 than chance would.
+    The most probable first, with probabilities. One shape of an effect stands for it. Nothing is a
+    rival too (`NOTHING_MISSING`, the rest shared by all `effects` that were tried). What is left
+    to 1 is "none of these": it is likely where even the best of them leaves more chi^2 than chance
+    would.
     """
     best = min(rival.chi2 for rival in rivals)
     inside: dict[str, JointFit] = {}
@@ -197,14 +262,19 @@ def class_of(rivals: Sequence[JointFit]) -> list[tuple[JointFit, float]]:
         if rival.chi2 <= best + CLASS_CHI2:
             inside.setdefault(rival.last.identifier, rival)
     members = sorted(inside.values(), key=lambda rival: -rival.log_evidence)
-    weights = np.exp([rival.log_evidence - members[0].log_evidence for rival in members])
+    each = math.log((1.0 - NOTHING_MISSING) / effects)
+    logs = [rival.log_evidence + each for rival in members]
+    logs.append(math.log(NOTHING_MISSING) - 0.5 * without.chi2)
+    weights = np.exp(np.array(logs) - max(logs))
     left = chi_square_p_value(best, members[0].degrees_of_freedom)
-    named = left / (left + 0.01)
-    return list(zip(members, (named * weights / weights.sum()).tolist(), strict=True))
+    *named_ones, nothing = (left / (left + 0.01) * weights / weights.sum()).tolist()
+    return list(zip(members, named_ones, strict=True)), nothing
 
 
 def held_out(fit: JointFit) -> tuple[FloatArray, FloatArray]:
     """Each record predicted from all the others: log densities and pulls, shape (records,).
+
+    A pull is the sigma of frequency and b together, with the sign of b's excess.
 
     For a model that is linear about its optimum the fit without a record follows from the fit
     with it: of whitened residuals r_i with hat matrix H_i, the prediction's are
@@ -218,7 +288,8 @@ def held_out(fit: JointFit) -> tuple[FloatArray, FloatArray]:
     size = np.einsum("ri,ri->r", off, np.linalg.solve(left, off[..., None])[..., 0])
     volume = np.linalg.slogdet(left)[1] + np.linalg.slogdet(whitening @ whitening.mT)[1]
     densities = 0.5 * (volume - size - rows * math.log(2.0 * math.pi))
-    return densities, -np.copysign(np.sqrt(size / rows), off[:, -1])
+    sigma = -ndtri_exp(-0.5 * size - math.log(2.0))  # of chi^2 with two degrees of freedom
+    return densities, -np.copysign(sigma, off[:, -1])
 
 
 _CLAMPED_ANEW_M: Final = 1e-9
@@ -254,6 +325,8 @@ class NextRun(NamedTuple):
     what: str
     now: dict[str, float]
     then: dict[str, float]
+    lost: tuple[str, ...]
+    """Records whose pendulum would turn over."""
 
     @property
     def worst(self) -> float:
@@ -278,15 +351,15 @@ def next_measurements(fit: JointFit, rivals: Sequence[JointFit]) -> list[NextRun
     if not rivals:
         return []
     with np.errstate(invalid="ignore", divide="ignore"):  # without the sphere some turn over
-        now = _sigmas(fit, rivals, None)
-        found = [NextRun(what, now, _sigmas(fit, rivals, change)) for what, change in RUNS.items()]
+        now, _ = _sigmas(fit, rivals, None)
+        found = [NextRun(what, now, *_sigmas(fit, rivals, change)) for what, change in RUNS.items()]
     return sorted(found, key=lambda run: -run.worst)
 
 
 def _sigmas(
     fit: JointFit, rivals: Sequence[JointFit], change: Callable[[Run], Run] | None
-) -> dict[str, float]:
-    """How many sigma each rival would be away."""
+) -> tuple[dict[str, float], tuple[str, ...]]:
+    """How many sigma each rival would be away, and which records would not swing."""
     design, again = _extended(fit.design, change)
     expected = predict(design, fit.added, _carried(fit, fit, design))
     usable = np.asarray(np.isfinite(expected).all(axis=-1))
@@ -294,12 +367,14 @@ def _sigmas(
     whitening = fit.data.whitening[again] * (fit.data.values[again] / expected)[:, None, :]
     runs = tuple(run for run, good in zip(design.runs, usable.tolist(), strict=True) if good)
     kept, data = replace(design, runs=runs), Measured(expected[usable], whitening[usable])
-    return {
+    sigma = {
         rival.last.identifier: math.sqrt(
             chi2_near(kept, data, rival.added, _carried(rival, fit, kept))
         )
         for rival in rivals
     }
+    swings = zip(design.runs, usable.tolist(), strict=True)
+    return sigma, tuple(run.record for run, good in swings if not good)
 
 
 def _extended(design: Design, change: Callable[[Run], Run] | None) -> tuple[Design, list[int]]:
@@ -333,13 +408,26 @@ BASELINE = "eq16"
 """Eq. 16 with the exact root, the priors of the configuration and the loss torque."""
 
 
-def campaign_diagnosis(search: CampaignSearch, provenance: dict[str, Any]) -> dict[str, Any]:
+def campaign_diagnosis(
+    search: CampaignSearch, provenance: dict[str, Any], twins: dict[str, str] | None = None
+) -> dict[str, Any]:
     """Return the content of campaign_diagnosis.json: the keys of diagnosis.json, and more.
 
     Added are ``baseline.chi2`` and ``improved.chi2``; for each effect ``rivals`` (values and chi^2
-    of its class) and ``next_measurements``; for the campaign ``excluded``, ``records`` and
-    ``patterns`` (`causes`).
+    of its class), ``next_measurements`` and ``probability_of_nothing``; for the campaign
+    ``priors``, ``excluded``, ``records``, ``left_out`` (records that disagree with all others,
+    with the numbers with and without them) and ``patterns`` (`causes`).
+
+    Parameters
+    ----------
+    search
+        The answer.
+    provenance
+        As in diagnosis.json.
+    twins
+        Records that were not counted, and those whose recording they repeat.
     """
+    copies = [f"{name} is the same recording as {first}" for name, first in (twins or {}).items()]
     ranked = [
         next_measurements(found.leader, [rival for rival, _ in found.rivals])
         for found in search.found
@@ -374,10 +462,41 @@ def campaign_diagnosis(search: CampaignSearch, provenance: dict[str, Any]) -> di
             {"record": run.record, "pull_from_the_others": float(pull)}
             for run, pull in zip(search.improved.design.runs, pulls, strict=True)
         ],
-        "statement": statement(search, ranked),
+        "left_out": [far._asdict() for far in search.left_out],
+        "numbers": {name: _shown(fit) for name, fit in _with_and_without(search).items()},
+        "priors": {
+            "nothing_missing": NOTHING_MISSING,
+            "expected_size": {name: each.expected for name, each in CATALOGUE.items()},
+        },
+        "statement": statement(search, ranked, copies),
         "figures": [],
-        "warnings": [],
+        "warnings": copies,
         "provenance": provenance,
+    }
+
+
+def _with_and_without(search: CampaignSearch) -> dict[str, JointFit]:
+    """Fits with a drag factor, of all records and without those that are left out."""
+    answers = {"all_records": search.whole or search}
+    if search.whole:
+        answers["without"] = search
+    return {
+        name: joint_fit(
+            each.baseline.design,
+            each.baseline.data,
+            named("uniform-drag-excess"),
+            each.baseline.unknowns,
+        )
+        for name, each in answers.items()
+    }
+
+
+def _shown(fit: JointFit) -> dict[str, Any]:
+    return {
+        "drag_factor": fit.size(about=1.0).as_json(),
+        "hysteretic_coefficient": coefficient(fit).as_json(),
+        "chi2": fit.chi2,
+        "dof": fit.degrees_of_freedom,
     }
 
 
@@ -412,6 +531,7 @@ def _effect(search: CampaignSearch, found: Found, runs: Sequence[NextRun]) -> di
         "delta_chi2": found.delta_chi2,
         "p_value_global": found.p_value,
         "probability": found.probability,
+        "probability_of_nothing": found.nothing,
         "indistinguishable_from": [
             {"id": rival.last.identifier, "probability": probability}
             for rival, probability in found.rivals
@@ -426,7 +546,13 @@ def _effect(search: CampaignSearch, found: Found, runs: Sequence[NextRun]) -> di
         ],
         "deciding_measurement": _deciding(runs),
         "next_measurements": [
-            {"measurement": run.what, "sigma": run.worst, "rivals": run.then, "now": run.now}
+            {
+                "measurement": run.what,
+                "sigma": run.worst,
+                "rivals": run.then,
+                "now": run.now,
+                "would_not_swing": list(run.lost),
+            }
             for run in runs
         ],
         "location": _location(search),
@@ -442,19 +568,21 @@ def _parameters(fit: JointFit) -> dict[str, Any]:
 
 def _unnamed(search: CampaignSearch) -> dict[str, Any]:
     """What no entry explains: the records that differ from the rest, in sigma."""
-    _, pulls = held_out(search.baseline)
-    far = sorted(
-        zip(pulls.tolist(), (run.record for run in search.baseline.design.runs), strict=True),
-        key=lambda pair: -abs(pair[0]),
-    )[:3]
-    summary = "; ".join(f"{name} by {pull:+.1f} sigma" for pull, name in far)
+    whole = search.whole or search
+    _, pulls = held_out(whole.baseline)
+    names = (run.record for run in whole.baseline.design.runs)
+    pairs = zip(names, pulls.tolist(), strict=True)
+    far = search.left_out or sorted((Far(*pair) for pair in pairs), key=lambda one: -abs(one.sigma))
+    summary = "; ".join(f"{one.record} by {one.sigma:+.1f} sigma" for one in far[:3])
     return {
         "id": "unnamed-damping",
         "name": "records that disagree, by nothing that the catalogue has",
         "kind": "unnamed",
         "equation": r"b \to b + \Delta b(\text{record})",
         "parameters": {},
-        "delta_chi2": search.baseline.chi2 - search.baseline.degrees_of_freedom,
+        "delta_chi2": whole.baseline.chi2 - search.baseline.chi2
+        if search.whole
+        else whole.baseline.chi2 - whole.baseline.degrees_of_freedom,
         "p_value_global": search.p_value,
         "probability": 1.0,
         "indistinguishable_from": [],
@@ -484,15 +612,32 @@ def _deciding(runs: Sequence[NextRun]) -> str:
     if not runs:
         return "none is needed: no other effect of the catalogue fits as well"
     apart = ", ".join(f"{name} by {sigma:.1f} sigma" for name, sigma in runs[0].then.items())
-    return f"{runs[0].what}: it would reject {apart}"
+    lost = f" ({', '.join(runs[0].lost)} would not swing in it)" if runs[0].lost else ""
+    return f"{runs[0].what}{lost}: it would reject {apart}"
 
 
-def statement(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> str:
+def statement(
+    search: CampaignSearch, ranked: Sequence[Sequence[NextRun]], copies: Sequence[str] = ()
+) -> str:
     """One paragraph of plain English."""
     left = chi_square_p_value(search.improved.chi2, search.improved.degrees_of_freedom)
-    deciding = map(_deciding, ranked)
-    found = list(zip(search.found, deciding, strict=True))
-    text = render("pendpipe.campaign", "statement.txt", search=search, found=found, left=left)
+    members = [
+        (one.leader, *(rival for rival, probability in one.rivals if probability >= 0.01))
+        for one in search.found
+    ]
+    expected = {each.last.identifier: each.last for group in members for each in group}.values()
+    text = render(
+        "pendpipe.campaign",
+        "statement.txt",
+        search=search,
+        found=list(zip(search.found, map(_deciding, ranked), strict=True)),
+        left=left,
+        numbers=_with_and_without(search) if search.whole else {},
+        coefficient=coefficient,
+        expected=expected,
+        effects=len(CATALOGUE),
+        copies=copies,
+    )
     return " ".join(text.split())
 
 

@@ -10,12 +10,14 @@ from typing import Final
 
 from pendpipe.arguments import INPUT, OUTPUT, Arguments, shared, tell
 
-ARGUMENTS: Final = shared("--campaign", "--comparison", required=True) | {
+ARGUMENTS: Final = {
+    **shared("--campaign", required=True),
+    **shared("--comparison"),
     "--summary": {
-        "required": True,
         "type": Path,
         "metavar": "FILE",
-        "help": "campaign.json, from pendpipe compare; it can be saved from the page",
+        "help": "campaign.json, from pendpipe compare, by default that beside the comparison;"
+        " it can be saved from the page",
     }
     | INPUT,
     "--figures": {
@@ -28,7 +30,12 @@ ARGUMENTS: Final = shared("--campaign", "--comparison", required=True) | {
         "metavar": "FOLDER",
         "help": "scores of a challenge, if there is one, from pendpipe challenge score",
     },
-    "--out": {"required": True, "type": Path, "metavar": "PAGE.html", "help": "the page"} | OUTPUT,
+    "--out": {
+        "type": Path,
+        "metavar": "PAGE.html",
+        "help": "the page; report.html among the campaign's results by default",
+    }
+    | OUTPUT,
 }
 
 
@@ -41,18 +48,21 @@ def run(arguments: Arguments) -> None:
     from pendpipe.report.tables import as_text, headline
 
     configuration, folder, comparison = read_compared(arguments.campaign, arguments.comparison)
-    figures = arguments.figures or arguments.out.parent / "figures"
-    inputs = [arguments.comparison, arguments.summary, *page_files(comparison, folder, figures)]
-    with job(folder, "report", inputs=inputs, outputs=[arguments.out]):
+    out = arguments.out or folder / "report.html"
+    compared = arguments.comparison or folder / "comparison.json"
+    summary = arguments.summary or compared.with_name("campaign.json")
+    figures = arguments.figures or out.parent / "figures"
+    inputs = [compared, summary, *page_files(comparison, folder, figures)]
+    with job(folder, "report", inputs=inputs, outputs=[out]):
         page = render(
             configuration,
             comparison,
-            read_content(arguments.summary, "run pendpipe compare first"),
+            read_content(summary, "run pendpipe compare first"),
             folder,
             figures,
             arguments.proof,
         )
-        write_whole(arguments.out, page)
-    tell(f"{arguments.out}: {len(page.encode()) / 1e6:.1f} MB")
+        write_whole(out, page)
+    tell(f"{out}: {len(page.encode()) / 1e6:.1f} MB")
     if rows := headline(comparison, configuration.get("simulated") or {}):
         print(as_text(rows))

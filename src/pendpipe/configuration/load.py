@@ -18,7 +18,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.dataclasses import dataclass as checked
 
-from pendpipe.configuration.models import Celsius, Configuration, Geometry, Section
+from pendpipe.configuration.models import WATER_C, Celsius, Configuration, Geometry, Section
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import is_file, names_in, read_json, read_text
 
@@ -352,6 +352,16 @@ def _check_record(campaign: Campaign, entry: Record) -> None:
         "stop_s is not after start_s",
         "fix or blank the cells",
     )
+    fluid = configuration.fluids.get(entry.fluid)
+    if fluid and fluid.temperature_c is not None and entry.temperature_c is not None:
+        coldest, warmest = WATER_C
+        refuse_if(
+            not coldest <= entry.temperature_c <= warmest,
+            where,
+            f"{entry.temperature_c:g} °C is not between {coldest:g} and {warmest:g} °C, where"
+            f" the formulas for water hold",
+            "give degrees Celsius, or blank the cell",
+        )
     if entry.source != "simulated":
         return
     missing = [

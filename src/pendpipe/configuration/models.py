@@ -5,13 +5,15 @@ from these models, so a key is described once: here. Lengths are metres, masses
 kilograms, angles radians; distances are counted from the axis along the rod.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Celsius = Annotated[float, Field(gt=-273.15)]
+WATER_C: Final = (0.0, 40.0)
+"""Where the formulas of `pendpipe.physics` for water's density and viscosity hold, in Celsius."""
 
 
 class Section(BaseModel):
@@ -157,7 +159,7 @@ class Fluid(Section):
     boundary_layer: bool = Field(
         True, description="whether Stokes' drag with its history term acts (Eq. 2)"
     )
-    temperature_c: Celsius | None = Field(
+    temperature_c: Annotated[float, Field(ge=WATER_C[0], le=WATER_C[1])] | None = Field(
         None,
         description="water only: where density and viscosity hold; a record's own temperature"
         " then scales them; blank: they hold for every record",

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.configuration.load import read_configuration
 from pendpipe.errors import refuse_if
 from pendpipe.files import read_json
 from pendpipe.manifest import check
@@ -105,8 +106,10 @@ def read_content(path: Path, remedy: str = "run the campaign first") -> dict[str
     return content
 
 
-def read_compared(campaign: Path, comparison: Path) -> tuple[dict[str, Any], Path, dict[str, Any]]:
-    """Read a campaign's configuration and comparison.json.
+def read_compared(
+    campaign: Path, comparison: Path | None
+) -> tuple[dict[str, Any], Path, dict[str, Any]]:
+    """Read a campaign's configuration and comparison.json, by default that of its results.
 
     Returns
     -------
@@ -118,9 +121,11 @@ def read_compared(campaign: Path, comparison: Path) -> tuple[dict[str, Any], Pat
     InputError
         If one of them is absent or something else; DamagedError if it was altered.
     """
-    configuration = read_content(campaign)
+    configuration = read_configuration(campaign)
+    folder = Path(str(configuration.get("results") or "results"))
+    comparison = comparison or folder / "comparison.json"
     check([comparison])
     content = read_content(comparison, "run pendpipe compare first")
     again = "make it again with pendpipe compare"
     refuse_if("records" not in content, comparison, "it has no records", again)
-    return configuration, Path(str(configuration.get("results") or "results")), content
+    return configuration, folder, content

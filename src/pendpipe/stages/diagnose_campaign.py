@@ -14,7 +14,7 @@ from pendpipe.configuration.load import Campaign
 from pendpipe.files import write_json
 from pendpipe.manifest import job
 from pendpipe.provenance import code_version
-from pendpipe.stages.results import campaign_data, enough, read_results, record_files
+from pendpipe.stages.results import campaign_data, enough, read_results, record_files, twins
 from pendpipe.version import __version__
 
 FILE_NAME = "campaign_diagnosis.json"
@@ -58,7 +58,8 @@ def diagnose_campaign(campaign: Campaign) -> dict[str, Any]:
     from pendpipe.campaign.diagnose import BASELINE, campaign_diagnosis, search
 
     provenance = {"version": __version__, "code": code_version(__name__)}
-    found = campaign_data(campaign, read_results(campaign))
+    results = read_results(campaign)
+    found = campaign_data(campaign, results)
     if found is None or not enough(found[0]):
         from pendpipe.diagnosis.result import not_analysable
 
@@ -68,5 +69,5 @@ def diagnose_campaign(campaign: Campaign) -> dict[str, Any]:
             provenance,
         )
     return campaign_diagnosis(
-        search(*found, level=campaign.configuration.diagnose.level), provenance
+        search(*found, level=campaign.configuration.diagnose.level), provenance, twins(results)
     )

@@ -53,13 +53,13 @@ def separate_campaign(campaign: Campaign, out: Path) -> None:
         content["loss_torque"] = {
             name: each.as_json() for name, each in values.loss_torques.items()
         }
-    spread = common_relative_sd(results)
+    usable = [result for result in results if result.usable]
+    spread = common_relative_sd(usable)
     content["records"] = [
         {"record": result.record.record}
         | {name: widened(result.parameter(name), spread).as_json() for name in "ac"}
         | separated(values, result.record.record)
-        for result in results
-        if result.usable
+        for result in usable
     ]
     write_json(out, content)
 
@@ -100,7 +100,7 @@ def common_relative_sd(results: list[RecordResult]) -> float:
     shared = [
         result.calibration["volts_per_radian"]
         for result in results
-        if result.usable and result.calibration.get("from") == "the caliper run"
+        if result.calibration.get("from") == "the caliper run"
     ]
     return float(shared[0]["sd"]) / abs(float(shared[0]["value"])) if shared else 0.0
 
