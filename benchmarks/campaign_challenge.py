@@ -29,6 +29,8 @@ ROOT: Final = Path(__file__).resolve().parents[1]
 Array = NDArray[np.float64]
 RELATIVE_SD_B: Final = {"water": 1e-3, "air": 1.5e-4}
 RELATIVE_SD_F: Final = 3e-6
+LEAST_Q: Final = 3.0
+"""Of every record: with less there is no decay to fit."""
 GRAVITY_SD: Final = 0.01
 CLOCK_SD: Final = 1e-4
 CLASS: Final = 6.0
@@ -357,8 +359,9 @@ def draw(maker: Generator, number: int) -> dict[str, Any]:
         if cause:
             theta[maker.at[cause]] = random.uniform(*CAUSES[cause])
         exact = maker.read(theta[None])[0]
-        if np.isfinite(exact).all() and (exact > 0.0).all():
-            break  # the lowest record's weights nearly balance: a few draws turn over
+        # The lowest record's weights nearly balance: a few draws turn over, or hardly swing.
+        if np.isfinite(exact).all() and (np.pi * exact[:, 0] > LEAST_Q * exact[:, 1]).all():
+            break
     relative = np.where(maker.wet, RELATIVE_SD_B["water"], RELATIVE_SD_B["air"])
     sds = exact * np.stack([np.full(len(relative), RELATIVE_SD_F), relative], axis=-1)
     values = exact + sds * random.standard_normal(exact.shape)

@@ -219,3 +219,16 @@ def test_the_drag_of_the_air_is_taken_off_what_the_water_does() -> None:
     still = found.quantities["viscous_rate"] + np.pi / 3940.0 / found.quantities["frequency"]
     low_1 = number_of("water-low-1")
     assert 0.002 < found.fit.data.values[low_1, 1] / still[low_1] - 1.0 < 0.02
+
+
+def test_a_record_near_balance_is_fitted_from_far() -> None:
+    """The scale's zero is off by 2 sd: the lowest record swings at half of what is configured."""
+    design, low_1 = default(0.0), number_of("water-low-1")
+    moved = np.zeros(len(design.nuisances))
+    moved[design.index["zero of the scale"]] = -2.0
+    measured = data(design, moved=moved)
+    frequency = measured.values[low_1, 0]
+    assert 0.02 < frequency < 0.035
+    found = values_of(design, measured)
+    assert found.fit.chi2 < 4.0
+    assert found.quantities["frequency"][low_1] == pytest.approx(frequency, rel=1e-5)

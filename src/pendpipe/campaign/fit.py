@@ -20,6 +20,10 @@ from pendpipe.physics import POTENTIAL_FLOW_ADDED_MASS
 STEP: Final = 1e-4
 """Of the derivatives, in standard deviations of the priors."""
 
+_APPROACH: Final = (1e-4, 1e-2)
+"""Weights of the data on the way to the optimum. Where weights nearly balance, the frequency that
+is configured can be several times the measured one, by a million of its standard deviations."""
+
 
 class Candidate(NamedTuple):
     """An effect with its discrete shape."""
@@ -208,7 +212,11 @@ def joint_fit(
         first[: len(start)] = start[: len(first)]
     low, high = np.array([(-np.inf, np.inf)] * count + [one.bounds for one in added]).T
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        at = _least_squares(design, data, added, first, np.ones(len(first), dtype=np.bool_))
+        free = np.ones(len(first), dtype=np.bool_)
+        for weight in _APPROACH if start is None else ():
+            loose = data._replace(whitening=weight * data.whitening)
+            first = _least_squares(design, loose, added, first, free)
+        at = _least_squares(design, data, added, first, free)
         outside = (at < low) | (at > high)
         if outside.any():  # that size stays on its bound
             at = _least_squares(design, data, added, np.clip(at, low, high), ~outside)
@@ -261,7 +269,10 @@ def _residuals(
     design: Design, data: Measured, added: Sequence[Candidate], unknowns: FloatArray
 ) -> FloatArray:
     """Whitened data, then priors; shape (..., rows)."""
-    off = predict(design, added, unknowns) - data.values
+    found = predict(design, added, unknowns)
+    off = found - data.values
+    # As f^2, which is linear in where the weights are, however near they are to balance.
+    off[..., 0] *= 0.5 * (1.0 + found[..., 0] / data.values[:, 0])
     white = np.einsum("rij,...rj->...ri", data.whitening, off)
     white = white.reshape(*white.shape[:-2], -1)
     priors = unknowns[..., : len(design.nuisances)][..., design.has_prior]
