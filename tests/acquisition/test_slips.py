@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from pendpipe.acquisition import slips
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.raw import RawWriter
 from pendpipe.acquisition.slips import find_slips
@@ -141,3 +142,10 @@ def test_whole_words_and_short_streams_are_not_told() -> None:
     assert not list(find_slips(data[:3000] + data[3002:], 1))
     assert not list(find_slips(data[:60], 1))
     assert not list(find_slips(b"", 1))
+
+
+@pytest.mark.parametrize("slope", [-40.0, 0.0, 7.0])
+def test_words_on_a_straight_line_go_on_along_it_behind_a_gap(slope: float) -> None:
+    """Eight words, six scans thrown away about the slip, and the mean of the eight behind."""
+    ahead = slope * np.arange(8 + 6 + 8)[:, None]
+    assert slips._onwards(ahead[:8]) == pytest.approx(ahead[14:].mean(axis=0))

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import binom, t
 
+from pendpipe.acquisition import decode
 from pendpipe.acquisition.decode import find_clock_losses, measure_rate
 
 
@@ -89,3 +93,28 @@ def test_a_drift_of_a_busy_hosts_delays_is_no_rate(drift_s: float, chosen: str) 
         scans = np.arange(1.0, 251.0) * 16.0
         arrival_s = scans / 100.0 * (1.0 + drift_s * clock_scale / 40.0)
         assert measure_rate(arrival_s, scans, 100.0, clock_scale).chosen == chosen
+
+
+def test_chance_makes_a_rate_as_rarely_as_students_distribution_says() -> None:
+    """Twelve stretches and a line leave ten degrees of freedom: 1 in 8,000 beyond six."""
+    trust = decode._RATE_TRUST
+    assert 2.0 * t.sf(trust, 10) == pytest.approx(1.0 / 8000.0, rel=0.1)
+    generator, scans = np.random.default_rng(11), np.arange(1.0, 481.0) * 16.0
+    beyond = 0
+    for _ in range(1000):
+        # Delays of many ms: the floor of the host's ten is far below.
+        arrival_s = scans / 100.0 + generator.uniform(0.0, 3.0, len(scans))
+        beyond += measure_rate(arrival_s, scans, 100.0).chosen == "measured"
+    assert beyond <= binom.isf(1e-3, 1000, 1.0 / 8000.0)
+
+
+@pytest.mark.parametrize(("spreads", "lost"), [(5.0, 0), (15.0, 1)])
+def test_a_loss_is_a_step_of_more_than_eight_spreads_of_the_others(
+    spreads: float, lost: int
+) -> None:
+    """Beyond the usual delays, which take some four spreads of a step away."""
+    generator, scans = np.random.default_rng(12), np.arange(1.0, 2049.0)
+    # Eight arrivals a stretch alike: the least late is normal, and a step has root two of it.
+    arrival_s = scans / 100.0 + np.repeat(generator.normal(10.0, 0.1, 256), 8)
+    arrival_s[1024:] += spreads * math.sqrt(2.0) * 0.1
+    assert len(find_clock_losses(arrival_s, scans, 100.0)[0]) == lost

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.special import ellipk
 
@@ -297,12 +297,14 @@ def test_an_encoder_s_counts_go_on_over_its_zero(bits: int, zero: float) -> None
     assert np.array_equal(guess._over_the_turn(slow.copy())[0], slow)
 
 
+@settings(settings.get_profile("same"))
 @given(
     x=st.floats(-3.0, 3.0),
     y=st.floats(0.5, 3.0),
     arm=st.floats(0.3, 2.0),
     wide=st.floats(0.15, 1.2),
 )
+@example(x=0.5, y=0.5, arm=0.5, wide=0.15)
 def test_the_pivot_is_the_centre_of_the_circle(x: float, y: float, arm: float, wide: float) -> None:
     angle = wide * np.exp(-0.02 * TIME) * np.cos(2 * np.pi * TIME)
     found = guess._pivot(x + arm * np.sin(angle), y - arm * np.cos(angle))

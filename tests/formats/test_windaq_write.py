@@ -91,7 +91,23 @@ def test_the_worked_bytes_of_a_header() -> None:
         (5.0, 0x00),  # 5000 mV, gain 1
         (2.5, 0x01),  # 5000 mV, gain 2
         (0.1, 0x04),  # 5000 mV, gain 50
+        (1.0, 0x02),  # 5000 mV, gain 5
+        (0.5, 0x03),  # 5000 mV, gain 10
+        (0.05, 0x05),  # 5000 mV, gain 100
+        (0.01, 0x06),  # 5000 mV, gain 500
+        (0.005, 0x07),  # 5000 mV, gain 1000
+        (1.25, 0x08),  # 5000 mV, gain 4
+        (0.625, 0x09),  # 5000 mV, gain 8
+        (0.25, 0x0A),  # 5000 mV, gain 20
+        (0.025, 0x0B),  # 5000 mV, gain 200
+        (0.0005, 0x0C),  # 5000 mV, gain 10 000
+        (0.00005, 0x0D),  # 5000 mV, gain 100 000
+        (0.125, 0x0E),  # 5000 mV, gain 40
+        (0.0625, 0x0F),  # 5000 mV, gain 80
+        (0.256, 0x39),  # 2048 mV, gain 8
+        (0.16, 0x49),  # 1280 mV, gain 8
         (100.0, 0x52),  # 500 000 mV, gain 5
+        (1000.0, 0x60),  # 1 000 000 mV, gain 1
         (7.3, 0x10),  # what no code says is left at 10 V
         (None, 0x10),
     ],

@@ -1256,7 +1256,9 @@ def _pivot(x: FloatArray, y: FloatArray) -> FloatArray | None:
         arm = points - centre
         radius = np.hypot(*arm.T)
         off = np.abs(radius - np.median(radius))
-        near = (off <= 6.0 * np.median(off)) & (radius > 0.0)
+        # Exact positions are off by rounding alone, which leaves none of them out.
+        far = max(6.0 * float(np.median(off)), 1e-9 * float(np.median(radius)))
+        near = (off <= far) & (radius > 0.0)
         inverse = np.linalg.pinv(np.hstack([arm / radius[:, None], one])[near])
         centre = centre + (inverse @ radius[near])[:2]
     mean, (wide, high) = float(radius[near].mean()), np.abs(arm[near]).T
