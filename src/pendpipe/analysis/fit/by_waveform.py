@@ -466,8 +466,10 @@ _SETTLED: Final = 0.1
 _SHARES: Final = 9
 """Shares at which the likelihood is looked at, in a range that narrows until half of them count."""
 _UNLIKELY: Final = 0.02
-"""Of the likeliest, below which a share does not count."""
+"""Of the most likely, below which a share does not count."""
 _LEAST: Final = 1e-300
+_HAIR: Final = 1e-13
+"""For what the readings do not tell apart."""
 _ZOOMS: Final = 12
 _MOST: Final = 12
 _OTHER: Final = 0.9
@@ -689,60 +691,74 @@ class _Shared(NamedTuple):
 
 def _over_shares(fitted: Fitted, noise_rms: float | None = None, enlarged: float = 1.0) -> _Shared:
     """Average over the share: at each the others are at their bounded minimum."""
-    problem, value, held = fitted.problem, fitted.value, (*fitted.held, SHARE)
-    gradient, normal = problem.by_parts(value)
-    scale = 1.0 / enlarged
-    if not problem.step:
-        scale *= (problem.noise_rms / (noise_rms or fitted.noise_rms)) ** 2
-    gradient, normal = gradient * scale, normal * scale
-    here = problem.parts(value)
-
-    def at(share: float) -> tuple[FloatArray, float, FloatArray, FloatArray]:
-        """Minimum, chi^2 above that of the fit, normal matrix and gradient at one share."""
-        first = value.copy()
-        first[SHARE] = share
-        change = problem.change(first)
-        change[:, SHARE] = 0.0
-        off = problem.parts(first) - here
-        own, slope = change.T @ normal @ change, change.T @ (gradient - normal @ off)
-        step = bounded_step(own, slope, problem.bounds.about(first), held)
-        off = off + change @ step
-        chi2 = float(off @ normal @ off - 2.0 * gradient @ off)
-        return first + step, chi2, own, slope - own @ step
-
-    y = abs(float(value[START]))
-    loss = float(value[A]) * y + float(value[B]) + float(value[C]) / y
-    # No loss is more than the whole.
-    whole = np.zeros((9, 9))
-    whole[[A, B, C], [A, B, C]] = np.array([y, 1.0, 1.0 / y]) ** 2 / max(loss, 1e-300) ** 2
-    if SHARE in fitted.held:
-        best, _, own, slope = at(float(value[SHARE]))
-        return _Shared(value, covariance(own + whole, held), slope)
-    low, high = 0.0, 1.0
+    low, high = (0.0, 1.0) if SHARE not in fitted.held else 2 * (float(fitted.value[SHARE]),)
     for _ in range(_ZOOMS):
-        shares = np.linspace(low, high, _SHARES)
-        found = [at(share) for share in shares.tolist()]
-        spreads = [covariance(each[2] + whole, held) for each in found]
-        chi2 = np.array([each[1] for each in found])
-        width = np.array([math.sqrt(max(each[B, B], 0.0)) for each in spreads])
-        size = np.array([float(each[0][B]) for each in found])
+        shares = np.linspace(low, high, _SHARES if low < high else 1)
+        found = _at_shares(fitted, shares, noise_rms or fitted.noise_rms, enlarged)
+        width = np.sqrt(np.maximum(found.covariance[:, B, B], 0.0))
         # Parts of b are as likely beforehand, so that at a share b counts as b db.
-        likely = np.exp(0.5 * (chi2.min() - chi2)) * np.maximum(
-            np.maximum(size, width) * width, _LEAST
-        )
+        likely = np.maximum(np.maximum(found.value[:, B], width) * width, _LEAST)
+        likely *= np.exp(0.5 * (found.chi2.min() - found.chi2))
         likely /= likely.max()
         inside = np.flatnonzero(likely > _UNLIKELY)
-        if len(inside) >= _SHARES // 2:
+        if len(inside) >= len(shares) // 2:
             break
         first, last = max(int(inside[0]) - 1, 0), min(int(inside[-1]) + 1, _SHARES - 1)
         low, high = float(shares[first]), float(shares[last])
     likely[[0, -1]] *= 0.5
     likely /= likely.sum()
-    best, _, _, slope = at(float(likely @ shares))
-    spread = np.zeros((9, 9))
-    for weight, (there, *_), each in zip(likely.tolist(), found, spreads, strict=True):
-        spread += weight * (each + np.outer(there - best, there - best))
-    return _Shared(best, spread, slope)
+    mean = np.array([float(likely @ shares)])
+    (best,), _, _, (gradient,) = _at_shares(fitted, mean, noise_rms or fitted.noise_rms, enlarged)
+    off = found.value - best
+    spread = np.einsum("k,kpq->pq", likely, found.covariance) + (likely[:, None] * off).T @ off
+    return _Shared(best, spread, gradient)
+
+
+class _AtShares(NamedTuple):
+    """Minima at some shares: their values, chi^2 above the fit's, covariances and gradients."""
+
+    value: FloatArray
+    chi2: FloatArray
+    covariance: FloatArray
+    gradient: FloatArray
+
+
+def _at_shares(fitted: Fitted, shares: FloatArray, noise_rms: float, enlarged: float) -> _AtShares:
+    """Move all other parameters to their bounded minimum at each of some shares."""
+    problem, value, held = fitted.problem, fitted.value, (*fitted.held, SHARE)
+    gradient, normal = problem.by_parts(value)
+    scale = (1.0 if problem.step else (problem.noise_rms / noise_rms) ** 2) / enlarged
+    gradient, normal = gradient * scale, normal * scale
+    first = np.repeat(value[None], len(shares), axis=0)
+    first[:, SHARE] = shares
+    change = np.stack([problem.change(each) for each in first])
+    change[:, :, SHARE] = 0.0
+    # Only the parts of b differ, by as much as each other.
+    off = np.zeros_like(first)
+    off[:, 1] = value[B] * (shares - value[SHARE])
+    off[:, 2] = -off[:, 1]
+    own = change.swapaxes(1, 2) @ normal @ change
+    slope = np.einsum("kqp,kq->kp", change, gradient - off @ normal)
+    y = abs(float(value[START]))
+    loss = float(value[A]) * y + float(value[B]) + float(value[C]) / y
+    # No loss is more than the whole.
+    whole = np.zeros((9, 9))
+    whole[[A, B, C], [A, B, C]] = np.array([y, 1.0, 1.0 / y]) ** 2 / max(loss, 1e-300) ** 2
+    free = [j for j in range(9) if j not in held]
+    grid = np.ix_(range(len(shares)), free, free)
+    size = 1.0 / np.sqrt(np.maximum(np.einsum("kpp->kp", own[grid]), 1e-300))
+    outer = size[:, :, None] * size[:, None]
+    scaled = own[grid] * outer + _HAIR * np.eye(len(free))
+    step = np.zeros_like(first)
+    step[:, free] = np.linalg.solve(scaled, (slope[:, free] * size)[..., None])[..., 0] * size
+    bounds = problem.bounds.about(first)
+    for k in np.flatnonzero(((step < bounds.lower) | (step > bounds.upper)).any(axis=1)).tolist():
+        step[k] = bounded_step(own[k], slope[k], problem.bounds.about(first[k]), held)
+    spread = np.zeros_like(own)
+    spread[grid] = np.linalg.inv(scaled + whole[np.ix_(free, free)] * outer) * outer
+    off += np.einsum("kpq,kq->kp", change, step)
+    chi2 = np.einsum("kp,pq,kq->k", off, normal, off) - 2.0 * off @ gradient
+    return _AtShares(first + step, chi2, spread, slope - np.einsum("kpq,kq->kp", own, step))
 
 
 def _rounded(fitted: Fitted, samples: Samples) -> Fitted:
