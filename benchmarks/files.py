@@ -200,7 +200,7 @@ def judge(name: str, known: Holds | Refused | None) -> Row:
         if abs(duration / known.duration_s - 1.0) > 0.02 + 0.1 * (known.duration_s < 11.0):
             faults.append(f"duration {duration:.4g} s, not {known.duration_s:g}")
         level = float(np.median(usable))
-        if known.level is not None and abs(level - known.level) > 0.03:
+        if sure and known.level is not None and abs(level - known.level) > 0.03:
             faults.append(f"hangs at {level:.3g}, not {known.level:g}")
     said = "; ".join(faults) or "; ".join(recording.weak_guesses)
     return Row(

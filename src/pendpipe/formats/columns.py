@@ -11,9 +11,11 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.errors import InputError, refuse_if
+from pendpipe.formats.grammar import MOST_DAMAGED
 from pendpipe.formats.table import (
     Column,
     ReadOptions,
@@ -89,6 +91,8 @@ _BY_UNIT: Final[Mapping[str, Role]] = {
 def meaning(column: Column) -> Role:
     """Say what a column holds, by its name and, where that is silent, by its unit."""
     role: Role = role_of(column.name) if column.name else "unknown"
+    # Of an array's path ("Meas.Gyro.Timestamp") the last part says so.
+    role = "time" if role_of(column.name.rpartition(".")[2]) == "time" else role
     unit = unit_of(column.unit) if column.unit else None
     if unit is None or role == "none":
         return role
@@ -611,9 +615,12 @@ def _from_column(
         # Of runs side by side one is shorter.
         filled &= ~(np.isnan(column.values) & ~np.isfinite(reading.values))
     refuse_text(table, column, "correct or drop the row")
-    bad = np.flatnonzero(~np.isfinite(column.values) & filled)
+    lost = ~np.isfinite(column.values) & filled
+    bad = np.flatnonzero(lost)
+    if few := 0 < len(bad) <= MOST_DAMAGED * len(filled):
+        filled &= ~lost
     refuse_if(
-        bad.size,
+        bad.size and not few,
         table.where(int(bad.min(initial=len(filled) - 1))),
         "the time is missing or NaN",
         "correct or drop the row",
@@ -626,7 +633,9 @@ def _from_column(
         note = f"'{column.label}' ticks every {factor:g} s, by the header's {rate:g} Hz"
     rows = np.flatnonzero(filled)
     base = TimeBase(column.values[rows] * factor, rows)
-    if left := len(filled) - len(rows):
+    if few:
+        base.notes.append(f"{len(bad)} row(s) without a time left out")
+    if left := len(filled) - len(rows) - few * len(bad):
         base.notes.append(f"{left} row(s) with neither time nor reading left out")
     (base.weak_guesses if weak else base.notes).extend([note] * bool(note))
     return _in_order(table, choice, base, factor, options)
@@ -711,6 +720,7 @@ def _in_order(
     steps = np.diff(base.time_s)
     if steps.min(initial=1.0) > 0:
         _count_late_rows(choice, base)
+        _without_lone_ends(base)
         return base
     at = int(np.argmax(steps <= 0))
     verb = "repeats" if steps[at] == 0 else "falls"
@@ -774,6 +784,16 @@ def _count_late_rows(choice: Choice, base: TimeBase) -> None:
         base.time_s = even
 
 
+def _without_lone_ends(base: TimeBase) -> None:
+    """Leave out a first or last row that a torn stamp has put a long way from the others."""
+    steps = np.diff(base.time_s)
+    usual = float(np.median(steps)) if len(steps) > 99 else np.inf
+    first, last = bool(steps[:1] > 50.0 * usual), bool(steps[-1:] > 50.0 * usual)
+    if first or last:
+        note = f"{first + last} lone row(s) left out, with a stamp far from the others'"
+        base.keep(slice(int(first), len(base.time_s) - last), note)
+
+
 def _values(choice: Choice, base: TimeBase) -> FloatArray:
     """Give the readings of the rows that are kept; none where there are fewer."""
     values = choice.readings[0].values if choice.readings else np.empty(0)
@@ -831,23 +851,31 @@ def _lone_stamps(_choice: Choice, base: TimeBase) -> None:
 
 
 def _rounded(time: FloatArray) -> FloatArray | None:
-    """Undo the rounding of evenly spaced time stamps; ``None`` if they are not that.
+    """Undo the coarseness of the stamps of evenly spaced rows; ``None`` if they are not that.
 
-    Each row is counted one interval after the row above, or, where a stamp shows that frames
-    are missing, as many as bring it within the stamp's last digit. The interval with which
-    fewest are missing is right.
+    One test for stamps that are rounded, cut, or stand for a block of rows: the rows are even
+    within what one stamp stands for (`_coarseness`), which may change on the way. Stamps lie at
+    the middle of it (rounded), or at either end (cut; the arrival of a block).
+
+    Where a stamp shows that frames are missing, each row is counted one interval after the row
+    above, or as many as bring it within its stamp. The interval with which fewest are missing
+    is right.
     """
     steps = np.diff(time)
-    if len(time) < 10 or steps.min() < 0 or np.mean(steps == 0) < 0.02:
+    if len(time) < 10 or steps.min() < 0 or np.mean(steps == 0) < 0.001:
         return None
     # A clock's own jitter comes on top: a tenth of an interval.
-    digit = _last_digit(time) + 0.15 * float(time[-1] - time[0]) / len(time)
+    digit = _coarseness(time) + 0.15 * float(time[-1] - time[0]) / len(time)
     index = np.arange(len(time), dtype=np.float64)
-    even: FloatArray = np.polynomial.Polynomial.fit(index, time, 1, w=1.0 / digit)(index)
-    # Of two rows in three the rounding errors have a mean; the line lies midway between the ends.
-    even += 0.5 * float(np.max(time - even) + np.min(time - even))
-    if np.all(np.abs(time - even) <= 0.6 * digit):
-        return even if even[-1] > even[0] else None
+    for late in (0.0, 0.5, -0.5):
+        centre = time + late * digit
+        even: FloatArray = np.polynomial.Polynomial.fit(index, centre, 1, w=1.0 / digit)(index)
+        # Of two rows in three the rounding errors have a mean: the line lies midway.
+        even += 0.5 * float(np.max(centre - even) + np.min(centre - even)) * (late == 0.0)
+        if np.all(np.abs(centre - even) <= 0.6 * digit) and even[-1] > even[0]:
+            return even
+    if np.mean(steps == 0) < 0.02:
+        return None
     # The first stamps are the finest.
     early = time[: max(10, min(30, int(np.argmax(steps == 0))))]
     changes = (0.0, 1e-3, -1e-3, 5e-3, -5e-3, 1e-2, -1e-2)
@@ -858,6 +886,24 @@ def _rounded(time: FloatArray) -> FloatArray | None:
         key=lambda even: np.diff(even).min(),
         default=None,
     )
+
+
+def _coarseness(time: FloatArray) -> FloatArray:
+    """Find what one stamp stands for, shape (n,): its last digit, or the step to the next stamp.
+
+    The step where several rows have one stamp, as whole blocks and arrays do.
+    """
+    digit = _last_digit(time)
+    starts = np.flatnonzero(np.diff(time, prepend=-np.inf) > 0.0)
+    if len(starts) < 9:
+        return digit
+    rows = np.diff(np.append(starts, len(time)))
+    step = np.diff(time[starts])
+    around = sliding_window_view(np.pad(np.append(step, step[-1:]), 4, mode="edge"), 9)
+    usual = np.median(around, axis=1)
+    crowded = np.mean(sliding_window_view(np.pad(rows, 4, mode="edge"), 9), axis=1) > 1.3
+    blocks: FloatArray = np.repeat(np.where(crowded, usual, 0.0), rows)
+    return np.maximum(digit, blocks)
 
 
 def _last_digit(time: FloatArray) -> FloatArray:
@@ -911,6 +957,7 @@ def _keep_last(choice: Choice, base: TimeBase) -> None:
 
 _RADIAN = Unit("angle", 1.0, "rad")
 _DEGREE = Unit("angle", np.pi / 180, "rad")
+_TURN = Unit("angle", 2 * np.pi, "rad")
 _UNKNOWN = Unit("own", 1.0, "1")
 _QUANTITIES: dict[str, Quantity] = {
     "angle": "angle_rad",
@@ -958,7 +1005,7 @@ def readings(table: Table, choice: Choice, options: ReadOptions, base: TimeBase)
         "choose with --column",
     )
     if len(choice.readings) == 2:
-        return _position(choice.readings[0], choice.readings[1])
+        return _position(choice.readings[0], choice.readings[1], base)
     time_s = np.full(rows, np.nan)
     time_s[base.rows] = base.time_s
     column = choice.readings[0]
@@ -1011,52 +1058,25 @@ def _unit(
         "choose another with --column, or give its unit with --unit",
     )
     finite = column.values[np.isfinite(column.values)]
-    whole = bool(len(finite)) and bool(np.all(finite == np.rint(finite)))
-    reach = _reach(finite)
-    # Whole numbers are an instrument's counts where degrees or millimetres would not be: a
-    # pendulum seldom goes beyond 180 degrees.
-    few = {"volts": 20.0, "signal": 20.0, "angle": 180.0, "length": 400.0, "unknown": 400.0}
-    counted = re.search(r"(?i)enc|count|tick|raw", column.name) is not None
     headed = [*_UNITS_OF.findall(table.metadata.get("header", "")), ""][0]
     named = unit_of(headed) or Unit("none", 1.0)
-    by_header = named.kind in ("length", "volts") and role in ("unknown", named.kind)
-    names = {other.name.lower() for other in choice.channels if not other.unit}
+    if named.kind in ("length", "volts") and role in ("unknown", named.kind):
+        return _Guess(named, f"is in {headed}, by the header")
+    if np.all(finite == np.rint(finite)) and re.search(r"(?i)enc|count|tick|raw|adc", column.name):
+        return _Guess(Unit("own", 1.0, "counts"), "holds whole numbers: analysed as counts", True)
+    if role == "volts":
+        return _Guess(Unit("volts", 1.0, "V"), "has no unit: taken to be volts", True)
     # A phone's sensor: of a position it knows nothing.
+    names = {other.name.lower() for other in choice.channels if not other.unit}
     sensed = role == "length" and {"x", "y", "z"} <= names
-    what = "one of x, y, z" if sensed else role
-    for holds, guess in (
-        (
-            whole and (counted or reach > few.get(role, np.inf)),
-            _Guess(Unit("own", 1.0, "counts"), "holds whole numbers: analysed as counts", True),
-        ),
-        (by_header, _Guess(named, f"is in {headed}, by the header")),
-        (role == "volts", _Guess(Unit("volts", 1.0, "V"), "has no unit: taken to be volts", True)),
-        (
-            sensed or role in ("velocity", "acceleration", "signal"),
-            _Guess(_UNKNOWN, f"({what}) has no unit: analysed in its own", True),
-        ),
-        (
-            role == "length" and reach > 2.0,
-            _Guess(_UNKNOWN, f"swings by {reach:.3g} and has no unit: analysed in its own", True),
-        ),
-    ):
-        if holds:
-            return guess
-    if role == "length":
-        grown = _by_period(column, time_s, named=False)
-        metres = _Guess(Unit("length", 1.0, "m"), "has no unit: taken to be metres", weak=True)
-        return grown if grown and not grown.weak else metres
-    bare = [other.values for other in choice.channels if not other.name]
-    levels = [abs(float(np.median(values))) for values in bare if np.isfinite(values).all()]
-    for gravity, name, axes in ((9.8, "m/s^2", 1), (1.0, "g", 2)):
-        beside = any(abs(level / gravity - 1.0) < 0.03 for level in levels)
-        if not column.name and beside and len(bare) >= axes:
-            why = f"stands beside {gravity:g}, as an accelerometer's do: taken to be in {name}"
-            twice = " (along the string the pull swings twice in a period)"
-            return _Guess(unit_of(name) or _UNKNOWN, why + twice, weak=True)
-    return _angle_unit(table, choice, column, time_s)
+    what = " (one of x, y, z)" if sensed else f" ({role})" if role in _OF_SENSORS else ""
+    found = None if what else _angle_unit(table, choice, column, time_s)
+    return found or _Guess(
+        _UNKNOWN, f"{what.strip()} has no unit: analysed in its own".strip(), True
+    )
 
 
+_OF_SENSORS: Final = ("velocity", "acceleration", "signal")
 _UNITS_OF = re.compile(r"(?i)\b(?:vertical|length) units?\W+([a-zµ]+)")
 """What an oscilloscope, or a system of cameras, says above its table."""
 
@@ -1084,8 +1104,13 @@ def _contradicted(column: Column, written: Unit, time_s: FloatArray) -> _Guess |
     return None
 
 
-def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray) -> _Guess:
-    """Tell degrees from radians by whatever the file gives away."""
+def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray) -> _Guess | None:
+    """Find an angle's unit in the header's words, or by a test of physics; ``None`` without either.
+
+    In this order: the derivative beside it in a known unit; the period, which lengthens as that
+    of sin x does in one unit only; numbers that are round in the other unit; jumps of a turn; a
+    step that is a turn over the number of an encoder's lines.
+    """
     finite = column.values[np.isfinite(column.values)]
     if not len(finite):
         return _Guess(_RADIAN)
@@ -1093,80 +1118,64 @@ def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray
     stated = re.search(
         r"\b(deg|degs|degrees?|grad|grado|gradi|grados)\b(?! c)|_deg|°(?!\s*[cf])", words
     )
-    if stated and "rad" not in words.replace("grad", ""):
+    named = column.role == "angle"
+    if stated and column.role != "length" and "rad" not in words.replace("grad", ""):
         return _Guess(_DEGREE, "is taken to be in degrees (the header names them)")
     return (
-        _by_step(finite, column.role == "angle")
-        or _by_rate(choice, column, time_s)
-        or _by_size(column, finite, time_s)
+        _by_rate(choice, column, time_s)
+        or _by_period(column, time_s)
+        or (_by_digits(finite) if column.role != "length" else None)
+        or (_by_lines(finite) if named else None)
+        or (_Guess(_RADIAN, "jumps by 2 pi: it is in radians") if jumps_of_a_turn(finite) else None)
     )
 
 
-def _by_size(column: Column, finite: FloatArray, time_s: FloatArray) -> _Guess:
-    """Judge by how far it swings, and by whether the period follows the amplitude."""
-    named, reach = column.role == "angle", _reach(finite)
-    # Between -pi and pi with jumps of a turn: radians that go over the top of the scale.
-    if jumps_of_a_turn(finite):
-        return _Guess(_RADIAN, "jumps by 2 pi: taken to be in radians")
-    if reach > 1.1 * np.pi:
-        slope = follows_sine(time_s, column.values, np.pi / 180) if reach < 170 else None
-        if slope is not None and abs(slope - 1.0) < 0.4:
-            return _Guess(
-                _DEGREE, "is taken to be in degrees (its period grows as such swings' does)"
-            )
-        odd = slope is not None and np.radians(reach) > 0.5
-        if reach > 360.0 or odd or not (named or reach <= 90.0):
-            return _Guess(
-                _UNKNOWN, f"has no unit and swings by {reach:.4g}: analysed in its own", True
-            )
-        return _Guess(_DEGREE, f"has no unit and swings by {reach:.3g}: taken to be degrees", True)
-    grown = _by_period(column, time_s, named=named)
-    if grown is not None:
-        return grown
-    slope = follows_sine(time_s, column.values, 1.0)
-    if slope is None or abs(slope) >= 0.35 or reach <= 0.35:
-        return _Guess(_RADIAN, "has no unit: taken to be radians", weak=True)
-    # No pendulum of so many radians: a torsion pendulum, or another unit.
-    odd = f"has no unit, and its period does not grow as that of a pendulum of {reach:.2g} rad"
-    if named:
-        return _Guess(_RADIAN, f"{odd}: taken to be radians of a torsion pendulum", True)
-    return _Guess(_UNKNOWN, f"{odd}: analysed in its own", True)
+def _by_period(column: Column, time_s: FloatArray) -> _Guess | None:
+    """Take for radians, degrees or turns what is swung through ever faster, just as they are.
 
-
-def _by_period(column: Column, time_s: FloatArray, *, named: bool) -> _Guess | None:
-    """Take for radians what is swung through ever faster, just as such an angle is."""
-    slope = follows_sine(time_s, column.values, 1.0)
-    if slope is None or abs(slope - 1.0) >= 0.35:
-        return None
-    why = "is taken to be in radians (its period grows as such swings' does)"
-    # Of a pendulum 1 m long (2 s) metres look the same.
-    usual = float(np.median(periods(time_s, column.values)[0]))
-    metres = not named and abs(usual - 2.0) < 0.3
-    return _Guess(_RADIAN, why + ", or in metres, with a string of 1 m" * metres, weak=metres)
-
-
-def _by_step(finite: FloatArray, named: bool) -> _Guess | None:
-    """Read the unit off the step: a printed digit of the other unit, or a part of a turn.
-
-    A step of few digits is an encoder's in a column that is named an angle; in any other it may
-    be a converter's.
+    The period goes as K(sin(A/2)^2): to second order as 1 + A^2/16, so that of units which differ
+    by a factor of 39 or more at most one fits.
     """
-    if _printed_digit(finite, 1.0) is None:
-        for unit, scale, name, other in (
-            (_RADIAN, 180 / np.pi, "radians", "degrees"),
-            (_DEGREE, np.pi / 180, "degrees", "radians"),
-        ):
-            if digit := _printed_digit(finite, scale):
-                why = f"converted to {other}, its values are multiples of {digit:.4g}"
-                return _Guess(unit, f"is taken to be in {name} ({why})")
-    step = find_step(finite)
-    if step is None or _is_round(step, named=named):
+    for unit, name in ((_RADIAN, "radians"), (_DEGREE, "degrees"), (_TURN, "turns")):
+        slope = follows_sine(time_s, column.values, unit.factor)
+        if slope is not None and abs(slope - 1.0) < 0.35:
+            why = f"is in {name}: its period lengthens with the swing as sin x has it"
+            # Of a pendulum 1 m long (2 s) metres look the same.
+            usual = float(np.median(periods(time_s, column.values)[0]))
+            metres = unit == _RADIAN and column.role != "angle" and abs(usual - 2.0) < 0.3
+            return _Guess(unit, why + ", or in metres, with a string of 1 m" * metres, weak=metres)
+    return None
+
+
+def _by_digits(finite: FloatArray) -> _Guess | None:
+    """Read the unit off printed digits: all numbers are multiples of one in the other unit."""
+    if _printed_digit(finite, 1.0) is not None:
         return None
+    for unit, scale, name, other in (
+        (_RADIAN, 180 / np.pi, "radians", "degrees"),
+        (_DEGREE, np.pi / 180, "degrees", "radians"),
+    ):
+        if digit := _printed_digit(finite, scale):
+            why = f"converted to {other}, its values are multiples of {digit:.4g}"
+            return _Guess(unit, f"is in {name} ({why})")
+    return None
+
+
+def _by_lines(finite: FloatArray) -> _Guess | None:
+    """Compare the step of a column that is named an angle with a turn over an encoder's counts.
+
+    These are 2^k, or 1, 2, 4, 5, 8 times a power of ten: forty numbers, to six digits, are met by
+    chance once in ten thousand times.
+    """
+    step = find_step(finite)
     for turn, unit, name in ((2 * np.pi, _RADIAN, "radians"), (360.0, _DEGREE, "degrees")):
-        whole = round(turn / step)
-        near = abs(turn / step - whole) < 1e-6 * whole + 1e-4
-        if near and 100 <= whole <= 1 << 20 and (whole % 4 == 0 or whole % 50 == 0):
-            return _Guess(unit, f"is taken to be in {name} (its step is a turn over {whole})")
+        counts = turn / step if step else 0.0
+        whole = round(counts)
+        usual = whole & (whole - 1) == 0 or re.fullmatch("[12458]0+", str(whole))
+        if 100 <= whole <= 1 << 20 and usual and abs(counts / whole - 1.0) < 2e-6:
+            round_in_degrees = name == "degrees" and _printed_digit(finite, 1.0) is not None
+            if not round_in_degrees:
+                return _Guess(unit, f"is in {name} (its step is a turn over {whole})")
     return None
 
 
@@ -1183,16 +1192,6 @@ def _printed_digit(finite: FloatArray, scale: float) -> float | None:
         if np.ptp(whole) > 20.0 and np.all(np.abs(whole - np.rint(whole)) < 0.03):
             return 10.0**-place
     return None
-
-
-def _is_round(step: float, *, named: bool) -> bool:
-    """Say whether a step is 1, 2, 2.5 or 5 of some decimal place: a printed digit.
-
-    In a column that is not `named` an angle any step of three digits is round.
-    """
-    leading = step / 10.0 ** np.floor(np.log10(step) + 1e-9)
-    digits = [1.0, 2.0, 2.5, 5.0, 10.0] + ([] if named else [float(f"{leading:.3g}")])
-    return bool(np.min(np.abs(leading - np.array(digits)) / leading) < 2e-5)
 
 
 def _by_rate(choice: Choice, column: Column, time_s: FloatArray) -> _Guess | None:
@@ -1219,22 +1218,64 @@ def _over_the_turn(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     return values, (f"the counts jump by a turn of {turn:g}: unwrapped",)
 
 
-def _position(x: Column, y: Column) -> Readings:
+def _position(x: Column, y: Column, base: TimeBase) -> Readings:
     """Turn a position into an angle about the pivot: atan2(x, -y), 0 straight down.
 
-    Positions that are not on a circle about (0, 0) are on one about the pivot.
+    Positions that are not on a circle about (0, 0) are on one about the pivot. Where both fit
+    nearly, and the other's centre fits better by an F test, the length of the pendulum that has
+    this period under gravity decides; where that agrees with neither, the better circle is a guess.
     """
     left, up, seen = x.values, y.values, "the position seen from (0, 0)"
-    pivot = _pivot(left, up)
+    pivot, weak = _pivot(left, up), tuple[str, ...]()
+    if pivot is None and (better := _better_circle(left, up)) is not None:
+        period_s = float(np.median(periods(base.time_s, left[base.rows])[0]))
+        length_m = 9.81 * (period_s / (2.0 * np.pi)) ** 2
+        arms = [float(np.nanmedian(np.hypot(left - a, up - b))) for a, b in ((0.0, 0.0), better)]
+        agree = [any(abs(arm * f / length_m - 1.0) < 0.05 for f in _LENGTHS) for arm in arms]
+        if not agree[0]:
+            pivot = better
+        if agree == [False, False]:
+            weak = (
+                f"the pivot is not (0, 0) but ({better[0]:.4g}, {better[1]:.4g}), about which"
+                " the positions lie on a circle (--column x for the position itself)",
+            )
     if pivot is not None:
         left, up = left - pivot[0], up - pivot[1]
         seen = f"about the centre of their circle, ({pivot[0]:.5g}, {pivot[1]:.5g})"
     down, sign = (-1.0, "-") if float(np.nanmedian(up)) < 0 else (1.0, "")
     note = f"angle = atan2({x.label}, {sign}{y.label}), {seen}"
     angle, radius = np.arctan2(left, down * up), np.hypot(left, up)
-    return Readings(
-        angle, "angle_rad", 1.0, "rad", (note,), radius_excess=radius / np.nanmedian(radius) - 1.0
-    )
+    excess = radius / np.nanmedian(radius) - 1.0
+    return Readings(angle, "angle_rad", 1.0, "rad", (note,), weak, radius_excess=excess)
+
+
+_LENGTHS: Final = (1.0, 0.01, 1e-3, 0.0254)
+"""Metres of the units in which positions are given."""
+
+
+def _better_circle(x: FloatArray, y: FloatArray) -> FloatArray | None:
+    """Find the centre of a circle that fits positions better than that about (0, 0), by an F test.
+
+    The two further parameters lower the sum of squares by F > 30; the centre is known to 3 % of the
+    radius, and further than a tenth of it from (0, 0).
+    """
+    from scipy.optimize import least_squares
+
+    points = np.column_stack([x, y])[np.isfinite(x) & np.isfinite(y)]
+    if len(points) < 50 or not _on_a_circle(x, y, named=True):
+        return None
+
+    def excess(centre: FloatArray) -> FloatArray:
+        radius = np.hypot(*(points - centre).T)
+        return np.asarray(radius - radius.mean())
+
+    fitted = least_squares(excess, np.zeros(2))
+    spread, arm = float(fitted.fun @ fitted.fun), float(np.hypot(*(points - fitted.x).T).mean())
+    test = 0.5 * (float(np.sum(excess(np.zeros(2)) ** 2)) / spread - 1.0) * (len(points) - 3)
+    slopes = np.asarray(fitted.jac)
+    inverse = np.linalg.pinv(slopes.T @ slopes)
+    known = float(np.sqrt(spread / len(points) * np.trace(inverse))) < 0.03 * arm
+    return fitted.x if known and test > 30.0 and math.hypot(*fitted.x) > 0.1 * arm else None
 
 
 def _pivot(x: FloatArray, y: FloatArray) -> FloatArray | None:

@@ -189,11 +189,12 @@ def follows_sine(time: FloatArray, values: FloatArray, radians: float) -> float 
         ``None`` where noise, or too small an amplitude, leaves it open.
     """
     lasted, size = periods(time, values)
-    keep = size > 0.3 * size.max(initial=0.0)
+    # Near the top the period has no end.
+    keep = (size > 0.3 * size.max(initial=0.0)) & (radians * size < 2.8)
     lasted, angle = lasted[keep], radians * size[keep]
     expected, found = np.log(ellipk(np.sin(0.5 * angle) ** 2)), np.log(lasted)
     for _ in range(2):
-        if len(found) < 8 or angle.max() > 3.0:
+        if len(found) < 8:
             return None
         across = expected - expected.mean()
         spread = float(across @ across) or np.nan

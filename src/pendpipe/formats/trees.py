@@ -131,6 +131,7 @@ def _is_list(tree: dict[Any, Any]) -> bool:
 def _array_of_list(entries: list[Any]) -> Any:
     """Turn JSON's list of records, of numbers with gaps, or of times of day into arrays."""
     if entries and all(isinstance(entry, dict) for entry in entries):
+        entries = _unfolded(entries)
         return {name: [entry.get(name) for entry in entries] for name in entries[0]}
     try:
         return np.array([np.nan if entry is None else entry for entry in entries], dtype=np.float64)
@@ -138,6 +139,23 @@ def _array_of_list(entries: list[Any]) -> Any:
         strings = all(isinstance(entry, str) for entry in entries)
         clock = column_of_clock_times(entries) if strings else None
         return np.array([*entries, None], dtype=object)[:-1] if clock is None else clock
+
+
+def _unfolded(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Give records that hold lists of records, as sensors send them in blocks, a row a sample."""
+    held = [
+        k for k, v in records[0].items() if isinstance(v, list) and v and isinstance(v[0], dict)
+    ]
+    rows = [
+        {name: value for name, value in record.items() if name not in held}
+        | {f"{k}.{j}": w for k, v in one.items() if isinstance(v, dict) for j, w in v.items()}
+        for record in records
+        for one in (
+            dict(zip(held, values, strict=True))
+            for values in zip(*(record.get(k) or [] for k in held), strict=False)
+        )
+    ]
+    return rows if len(rows) > len(records) else records
 
 
 def _last(name: str) -> str:
