@@ -245,6 +245,7 @@ def spoilt_in_fifty(lines: list[str], row: str) -> list[str]:
     [
         (7, "0.12,oops"),
         (7, "oops,0.4"),
+        (7, "nan,0.4"),
         (1, "oops,0.4"),
         (2, "restarted here"),
         (400, "7.98,0.3\0\0"),
@@ -276,7 +277,7 @@ def set_back(lines: list[str], row: int) -> list[str]:
     [
         (lambda lines: set_back(lines, 7), "line 8: the time falls (0.1 is followed by 0.07)"),
         (spoil(7, "0.12,inf"), "line 8: 1 reading(s) that are infinite"),
-        (spoil(7, "nan,0.4"), "line 8: the time is missing or NaN"),
+        (lambda lines: spoilt_in_fifty(lines, "nan,0.4"), "line 51: the time is missing or NaN"),
         (lambda lines: spoilt_in_fifty(lines, "{},oops"), "line 51: 'oops' is no number"),
         (lambda lines: lines[:1], "no block of rows with numbers"),
         (lambda _: [], "the file is empty"),

@@ -6,13 +6,19 @@ from pendpipe.arguments import FILE, Arguments, print_answer, read_options, shar
 from pendpipe.formats import Inspection, inspect
 from pendpipe.quantities import after_number
 
-ARGUMENTS: Final = FILE | shared("--json")
+ARGUMENTS: Final = (
+    FILE
+    | shared("--json")
+    | {"--why": {"action": "store_true", "help": "print how the file was understood"}}
+)
 
 
 def run(arguments: Arguments) -> None:
     """Inspect and print."""
     found = inspect(arguments.file, read_options(arguments))
-    print_answer(arguments, found.as_json(), "\n".join(_lines(arguments.file, found)))
+    lines = [arguments.file, *("  " + line for line in found.why)]
+    text = lines if arguments.why else _lines(arguments.file, found)
+    print_answer(arguments, found.as_json(), "\n".join(text))
 
 
 def _lines(file: str, found: Inspection) -> list[str]:

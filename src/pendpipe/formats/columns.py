@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Final
 
 import numpy as np
@@ -372,10 +372,10 @@ def _evenness(finite: FloatArray) -> float:
 
 def _counts_samples(column: Column) -> bool:
     """Say whether a column counts 1, 2, 3, ... and is not called a time."""
-    values = column.values
+    values = column.values[np.isfinite(column.values)]
     if column.role not in ("index", "unknown", "length") or len(values) < 2:
         return False
-    whole = np.isfinite(values).all() and np.all(values == np.rint(values))
+    whole = len(values) > 0.98 * len(column.values) and np.all(values == np.rint(values))
     return bool(whole and abs(np.median(np.diff(values))) == 1.0)
 
 
@@ -413,9 +413,14 @@ def _readings(
 
 def _of_equals(equals: Sequence[tuple[Column, ...]]) -> tuple[tuple[Column, ...], str]:
     """The first of equals, unless another swings far more, or it is a drive."""
+    # Of columns without a name some wander, and one swings.
+    clearest = max(column[0].swing.clarity for column in equals)
+    clear = [each for each in equals if each[0].swing.clarity >= 0.7 * clearest]
+    wander = len(clear) == 1 < len(equals) and not clear[0][0].name
+    equals = clear if wander else equals
     first = equals[0]
     if len(equals) == 1 or len(first) > 1:
-        return first, ""
+        return first, ", which alone swings clearly" * wander
     # A drive has one size from beginning to end; a free decay has all of them.
     own = first[0].swing
     for column in equals:
@@ -555,10 +560,13 @@ class TimeBase:
     rows
         Row of the table that each comes from, shape (n,); a permutation where the file
         has its newest row first.
+    lines
+        Line of the file that each comes from, where it has lines: a lost row leaves one.
     """
 
     time_s: FloatArray
     rows: IntArray
+    lines: IntArray | None = None
     notes: list[str] = field(default_factory=list)
     weak_guesses: list[str] = field(default_factory=list)
     metadata: dict[str, str] = field(default_factory=dict)
@@ -566,6 +574,7 @@ class TimeBase:
     def keep(self, rows: slice | BoolArray | IntArray, *notes: str) -> None:
         """Keep some of the rows, or put them into another order, and say so."""
         self.time_s, self.rows = self.time_s[rows], self.rows[rows]
+        self.lines = None if self.lines is None else self.lines[rows]
         self.notes.extend(notes)
 
 
@@ -585,7 +594,7 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     every = np.arange(len(reading.values))
     if options.sample_rate is not None:
         note = f"times are counted at the given {options.sample_rate:g} Hz from the first row"
-        return TimeBase(every.astype(np.float64) / options.sample_rate, every, [note])
+        return TimeBase(every.astype(np.float64) / options.sample_rate, every, notes=[note])
     if reading.time_s is not None:
         return TimeBase(reading.time_s, every)
     column = choice.time
@@ -602,7 +611,7 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     number = every.astype(np.float64) if column is None else column.values - column.values[0]
     note = f"no time column: times from the header's {1 / interval_s:g} Hz"
     note += f" and '{column.label}'" if column is not None else ""
-    base = TimeBase(number * interval_s, every, [note])
+    base = TimeBase(number * interval_s, every, notes=[note])
     return _in_order(table, choice, base, interval_s, options)
 
 
@@ -632,7 +641,8 @@ def _from_column(
         factor, rate, weak = 10.0 ** np.rint(np.log10(factor)), 1.0 / table.interval_s, False
         note = f"'{column.label}' ticks every {factor:g} s, by the header's {rate:g} Hz"
     rows = np.flatnonzero(filled)
-    base = TimeBase(column.values[rows] * factor, rows)
+    lines = None if table.lines is None or len(table.lines) < len(filled) else table.lines[rows]
+    base = TimeBase(column.values[rows] * factor, rows, lines)
     if few:
         base.notes.append(f"{len(bad)} row(s) without a time left out")
     if left := len(filled) - len(rows) - few * len(bad):
@@ -714,7 +724,14 @@ def _in_order(
         base.keep(slice(late.min(initial=len(base.time_s)) + 1))
         early = np.flatnonzero(base.time_s <= (-np.inf if start_s is None else start_s))
         base.keep(slice(early.max(initial=0), None))
-    for repaired in (_count_rows, _keep_last, _drop_repeats, _first_of_stacked, _lone_stamps):
+    for repaired in (
+        _drop_torn,
+        _count_rows,
+        _keep_last,
+        _drop_repeats,
+        _lone_stamps,
+        _first_of_stacked,
+    ):
         if np.diff(base.time_s).min(initial=1.0) <= 0:
             repaired(choice, base)
     steps = np.diff(base.time_s)
@@ -745,7 +762,7 @@ def _count_rows(_choice: Choice, base: TimeBase) -> None:
     whole = len(base.time_s)
     last = int(np.max(np.flatnonzero(np.diff(base.time_s) == 0.0), initial=-2)) + 2
     for rows in sorted({whole, last}, reverse=True):
-        even = _rounded(base.time_s[:rows])
+        even = _rounded(base.time_s[:rows], base.lines)
         if even is None:
             continue
         interval = np.diff(even).min()
@@ -787,7 +804,7 @@ def _count_late_rows(choice: Choice, base: TimeBase) -> None:
 def _without_lone_ends(base: TimeBase) -> None:
     """Leave out a first or last row that a torn stamp has put a long way from the others."""
     steps = np.diff(base.time_s)
-    usual = float(np.median(steps)) if len(steps) > 99 else np.inf
+    usual = float(np.median(steps)) if len(steps) > 99 and is_uniform(base.time_s) else np.inf
     first, last = bool(steps[:1] > 50.0 * usual), bool(steps[-1:] > 50.0 * usual)
     if first or last:
         note = f"{first + last} lone row(s) left out, with a stamp far from the others'"
@@ -833,12 +850,27 @@ def _first_of_stacked(_choice: Choice, base: TimeBase) -> None:
     base.keep(slice(starts[0]))
 
 
+def _fallen(time: FloatArray) -> IntArray:
+    """Find stamps that fall out of a time that rises without them."""
+    padded = np.concatenate(([-np.inf], time, [np.inf]))
+    at = np.flatnonzero(np.diff(time) < 0)
+    # Either the stamp before a fall is too late, or the one behind it too early.
+    return np.where(padded[at + 3] >= padded[at + 1], at + 1, at)
+
+
+def _drop_torn(_choice: Choice, base: TimeBase) -> None:
+    """Leave out rows with torn stamps among those that are rounded, up to one in a hundred."""
+    wrong, steps = _fallen(base.time_s), np.diff(base.time_s)
+    good = np.delete(base.time_s, wrong)
+    rare = 0 < len(wrong) <= MOST_DAMAGED * len(steps) and np.mean(steps == 0.0) > 0.02
+    if rare and np.diff(good).min(initial=0.0) >= 0.0:
+        kept = np.delete(np.arange(len(base.time_s)), wrong)
+        base.keep(kept, f"{len(wrong)} row(s) with a stamp that falls out of order left out")
+
+
 def _lone_stamps(_choice: Choice, base: TimeBase) -> None:
     """Interpolate stamps that fall out of a time that rises without them."""
-    padded = np.concatenate(([-np.inf], base.time_s, [np.inf]))
-    at = np.flatnonzero(np.diff(base.time_s) < 0)
-    # Either the stamp before a fall is too late, or the one behind it too early.
-    wrong = np.where(padded[at + 3] > padded[at + 1], at + 1, at)
+    wrong = _fallen(base.time_s)
     good = np.delete(np.arange(len(base.time_s)), wrong)
     inside = not {0, len(base.time_s) - 1} & set(wrong.tolist())
     rows, steps = np.diff(good), np.diff(base.time_s[good])
@@ -850,7 +882,7 @@ def _lone_stamps(_choice: Choice, base: TimeBase) -> None:
         base.notes.append(f"{len(wrong)} time stamp(s) that fall out of order interpolated")
 
 
-def _rounded(time: FloatArray) -> FloatArray | None:
+def _rounded(time: FloatArray, lines: IntArray | None = None) -> FloatArray | None:
     """Undo the coarseness of the stamps of evenly spaced rows; ``None`` if they are not that.
 
     One test for stamps that are rounded, cut, or stand for a block of rows: the rows are even
@@ -866,10 +898,14 @@ def _rounded(time: FloatArray) -> FloatArray | None:
         return None
     # A clock's own jitter comes on top: a tenth of an interval.
     digit = _coarseness(time) + 0.15 * float(time[-1] - time[0]) / len(time)
-    index = np.arange(len(time), dtype=np.float64)
-    for late in (0.0, 0.5, -0.5):
+    index: FloatArray = np.arange(len(time), dtype=np.float64)
+    placed = index if lines is None else (lines[: len(time)] - lines[0]).astype(np.float64)
+    if not 0.0 < placed[-1] - index[-1] <= 0.03 * len(time):
+        placed = index
+    places = (placed, index)[placed is index :]
+    for place, late in product(places, (0.0, 0.5, -0.5)):
         centre = time + late * digit
-        even: FloatArray = np.polynomial.Polynomial.fit(index, centre, 1, w=1.0 / digit)(index)
+        even: FloatArray = np.polynomial.Polynomial.fit(place, centre, 1, w=1.0 / digit)(place)
         # Of two rows in three the rounding errors have a mean: the line lies midway.
         even += 0.5 * float(np.max(centre - even) + np.min(centre - even)) * (late == 0.0)
         if np.all(np.abs(centre - even) <= 0.6 * digit) and even[-1] > even[0]:
@@ -878,14 +914,14 @@ def _rounded(time: FloatArray) -> FloatArray | None:
         return None
     # The first stamps are the finest.
     early = time[: max(10, min(30, int(np.argmax(steps == 0))))]
+    usual = (float(np.median(np.diff(early))), float(np.ptp(time)) / float(placed[-1]))
     changes = (0.0, 1e-3, -1e-3, 5e-3, -5e-3, 1e-2, -1e-2)
-    tried = [_frames(time, digit, (1.0 + c) * float(np.median(np.diff(early)))) for c in changes]
-    # Fewest frames in all is the longest interval.
-    return max(
-        [even for even in tried if even is not None],
-        key=lambda even: np.diff(even).min(),
-        default=None,
-    )
+    for step, place in product(usual, places):
+        tried = [_frames(time, digit, (1.0 + c) * step, place) for c in changes]
+        if found := [even for even in tried if even is not None]:
+            # Fewest frames in all is the longest interval.
+            return max(found, key=lambda even: np.diff(even).min())
+    return None
 
 
 def _coarseness(time: FloatArray) -> FloatArray:
@@ -901,7 +937,7 @@ def _coarseness(time: FloatArray) -> FloatArray:
     step = np.diff(time[starts])
     around = sliding_window_view(np.pad(np.append(step, step[-1:]), 4, mode="edge"), 9)
     usual = np.median(around, axis=1)
-    crowded = np.mean(sliding_window_view(np.pad(rows, 4, mode="edge"), 9), axis=1) > 1.3
+    crowded = np.mean(sliding_window_view(np.pad(rows, 4, mode="reflect"), 9), axis=1) > 1.3
     blocks: FloatArray = np.repeat(np.where(crowded, usual, 0.0), rows)
     return np.maximum(digit, blocks)
 
@@ -919,8 +955,12 @@ def _last_digit(time: FloatArray) -> FloatArray:
     return np.maximum(10.0**-decimals, 10.0 ** (size - digits + 1))
 
 
-def _frames(time: FloatArray, digit: FloatArray, interval: float) -> FloatArray | None:
+def _frames(
+    time: FloatArray, digit: FloatArray, interval: float, index: FloatArray
+) -> FloatArray | None:
     """Count the frames from the first row to each, improving their interval on the way.
+
+    Each row is at least as many after the first as `index` says.
 
     Returns
     -------
@@ -928,7 +968,7 @@ def _frames(time: FloatArray, digit: FloatArray, interval: float) -> FloatArray 
         ``None`` where some stamp contradicts the count, or more than 2 % are missing: of
         so many any interval would do.
     """
-    index, start, tries = np.arange(len(time), dtype=np.float64), float(time[0]), 8
+    start, tries = float(time[0]), 8
     while interval > 0 and tries:
         # At least one more than the row above, and at least what the stamp asks for.
         least = np.ceil((time - start - 0.6 * digit) / interval - 1e-9)
@@ -1136,7 +1176,9 @@ def _by_period(column: Column, time_s: FloatArray) -> _Guess | None:
     The period goes as K(sin(A/2)^2): to second order as 1 + A^2/16, so that of units which differ
     by a factor of 39 or more at most one fits.
     """
-    for unit, name in ((_RADIAN, "radians"), (_DEGREE, "degrees"), (_TURN, "turns")):
+    units = (_RADIAN, "radians"), (_DEGREE, "degrees"), (_TURN, "turns")
+    # Of what is named a position other units may well be pixels, of any length.
+    for unit, name in units[: 1 if column.role == "length" else None]:
         slope = follows_sine(time_s, column.values, unit.factor)
         if slope is not None and abs(slope - 1.0) < 0.35:
             why = f"is in {name}: its period lengthens with the swing as sin x has it"
@@ -1172,25 +1214,10 @@ def _by_lines(finite: FloatArray) -> _Guess | None:
         counts = turn / step if step else 0.0
         whole = round(counts)
         usual = whole & (whole - 1) == 0 or re.fullmatch("[12458]0+", str(whole))
-        if 100 <= whole <= 1 << 20 and usual and abs(counts / whole - 1.0) < 2e-6:
-            round_in_degrees = name == "degrees" and _printed_digit(finite, 1.0) is not None
-            if not round_in_degrees:
-                return _Guess(unit, f"is in {name} (its step is a turn over {whole})")
-    return None
-
-
-def _printed_digit(finite: FloatArray, scale: float) -> float | None:
-    """Find the decimal place of which all readings, times `scale`, are multiples."""
-    some = finite[:: max(1, len(finite) // 2000)]
-    # Beyond 1e9 a double has no such digits left.
-    if len(some) < 20 or np.abs(some).max() > 1e9:
-        return None
-    some = scale * some
-    for place in range(7):
-        whole = some * 10.0**place
-        # Of readings that have no such digit a few in a hundred are this near to one.
-        if np.ptp(whole) > 20.0 and np.all(np.abs(whole - np.rint(whole)) < 0.03):
-            return 10.0**-place
+        # A step of three digits may as well be one that was printed.
+        printed = not step or abs(float(f"{step:.3g}") / step - 1.0) < 1e-6
+        if 100 <= whole <= 1 << 20 and usual and not printed and abs(counts / whole - 1.0) < 2e-6:
+            return _Guess(unit, f"is in {name} (its step is a turn over {whole})")
     return None
 
 

@@ -8,9 +8,9 @@ hundred is never taken, and where two readings keep all rows, a time that rises 
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise, product
+from itertools import islice, pairwise
 from typing import Final
 
 import numpy as np
@@ -40,6 +40,8 @@ _NAMES: Final = {
 }
 _SIGN_WORDS: Final = {"\t": "tabs", ",": "commas", ";": "semicolons", " ": "blanks", "|": "bars"}
 _DECIMALS: Final = {"comma": ",", "point": ".", "dot": "."}
+_MOST_WAYS: Final = 5000
+"""Ways to read a row of commas that are tried."""
 _BLANK: Final = re.compile(
     r'|""|[-*]{1,4}|--[.:]--|n/?[ad]|n\.[ad]\.|k\.a\.|\.|#+|#n/a|#nv|#[^\W\d]+(/0)?[!?]|[+-]?∞|null|none'
     r"|-?nan(\(ind\))?|-?1\.#(qnan|snan|ind|inf)\d*|\?|ol|over(load|flow|range)?|no data"
@@ -187,7 +189,9 @@ def layouts(lines: Sequence[str], options: ReadOptions, *, strict: bool = True) 
     kept = [(score[:2], replace(of, width=score[2])) for score, of in scored if score[0] > 0.0]
     best = max((score[0] for score, _ in kept), default=0.0)
     kept = [each for each in kept if each[0][0] > 0.9 * best]
-    return [of for _, of in sorted(kept, key=lambda each: each[0], reverse=True)]
+    # Blanks part a date from its time of day as well.
+    kept.sort(key=lambda each: (each[0][1], each[1].delimiter != " ", each[0][0]), reverse=True)
+    return [layout for _, layout in kept]
 
 
 def _score(sample: Sequence[str], layout: Layout, *, strict: bool) -> tuple[float, int, int]:
@@ -273,30 +277,34 @@ def joined_commas(lines: Sequence[str], layout: Layout, names: int) -> list[tupl
     """
     rows = [row for row in map(layout.split, lines) if len(row) == layout.width]
     columns = [list(column) for column in zip(*rows, strict=True)] if len(rows) > 3 else []
-    whole = [all(re.fullmatch(r"[+-]?\d+", cell) for cell in column) for column in columns]
-    parts = [all(cell.isascii() and cell.isdigit() for cell in column) for column in columns]
+    whole = [_often(r"[+-]?\d+", column) > 0.98 for column in columns]
+    parts = [_often(r"[0-9]+", column) > 0.98 for column in columns]
     pairs = [a and b for a, b in zip(whole, parts[1:], strict=False)]
-    if layout.delimiter != "," or layout.decimal != "." or not any(pairs) or layout.width > 12:
-        return [(1,) * layout.width]
-    ways = [way for way in _ways(layout.width, pairs) if names in (0, len(way))]
-    ways = ways if len(ways) > 1 else [*ways, (1,) * layout.width][:1]
-    for fits in (_parts_are_none_alone, _parts_change):
+    plain = (1,) * layout.width
+    if layout.delimiter != "," or layout.decimal != "." or not any(pairs) or names == layout.width:
+        return [plain]
+    ways = list(islice(_ways(pairs, names), _MOST_WAYS)) or [plain]
+    for fits in (_is_whole, _parts_change):
         ways = [way for way in ways if fits(way, columns)] or ways
+    # Where one number has a decimal comma for certain, the others have it too.
+    fewest = min(map(len, ways))
+    ways = ways if plain in ways else [way for way in ways if len(way) == fewest]
     ranks = [_evenness(_first_numbers(columns, way)) for way in ways]
     # Whole numbers under no names are whole numbers, unless that leaves no time.
-    if (
-        not names
-        and _parts_are_none_alone((1,) * layout.width, columns)
-        and _evenness(_first_numbers(columns, (1,) * layout.width))
-    ):
-        return [(1,) * layout.width]
+    if not names and plain in ways and _evenness(_first_numbers(columns, plain)):
+        return [plain]
     return [way for way, rank in zip(ways, ranks, strict=True) if rank == max(ranks)]
 
 
-def _parts_are_none_alone(way: Sequence[int], columns: Sequence[Sequence[str]]) -> bool:
-    """Say whether no cell is ``02`` or ``-0``, which are parts of decimals."""
-    alone = [columns[at] for at, many in _placed(way) if many == 1]
-    return not any(re.fullmatch(r"-0|0\d+", cell) for column in alone for cell in column)
+def _is_whole(way: Sequence[int], columns: Sequence[Sequence[str]]) -> bool:
+    """Say whether no number begins as ``02``, and none is ``-0``: these are parts of decimals."""
+    odd = {1: r"-0|[+-]?0\d+", 2: r"[+-]?0\d+"}
+    return all(_often(odd[many], columns[at]) <= MOST_DAMAGED for at, many in _placed(way))
+
+
+def _often(pattern: str, cells: Sequence[str]) -> float:
+    """Give the share of cells that have a form."""
+    return sum(re.fullmatch(pattern, cell) is not None for cell in cells) / len(cells)
 
 
 def _parts_change(way: Sequence[int], columns: Sequence[Sequence[str]]) -> bool:
@@ -305,14 +313,14 @@ def _parts_change(way: Sequence[int], columns: Sequence[Sequence[str]]) -> bool:
     return all(len(set(part)) > 1 or not part[0].strip("0") for part in parts)
 
 
-def _ways(width: int, pairs: Sequence[bool]) -> list[tuple[int, ...]]:
-    """Give all ways to part so many pieces into cells of one, or two where they are a pair."""
-    return [
-        way
-        for cells in range((width + 1) // 2, width + 1)
-        for way in product((1, 2), repeat=cells)
-        if sum(way) == width and all(pairs[at] for at, many in _placed(way) if many == 2)
-    ]
+def _ways(pairs: Sequence[bool], cells: int, at: int = 0) -> Iterator[tuple[int, ...]]:
+    """Give all ways to part pieces into so many cells (0: any), each of one or of a pair."""
+    left = len(pairs) + 1 - at
+    for many in (1, 2) if left > 1 and pairs[at] else (1,):
+        if left == many:
+            yield from [(many,)] if cells in (0, 1) else []
+        elif cells != 1 and (not cells or (left + 1) // 2 <= cells <= left):
+            yield from ((many, *rest) for rest in _ways(pairs, max(cells - 1, 0), at + many))
 
 
 def _placed(way: Sequence[int]) -> list[tuple[int, int]]:

@@ -382,6 +382,8 @@ class Inspection:
         The median of the readings, in `unit`: where the pendulum hangs.
     weak_guesses
         What was guessed on slender grounds, with the option that overrides it.
+    why
+        How the file was understood, a line a decision.
     """
 
     format: str
@@ -400,6 +402,7 @@ class Inspection:
     chosen: str = ""
     level: float = 0.0
     weak_guesses: tuple[str, ...] = ()
+    why: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Return the object that ``inspect --json`` prints."""
@@ -483,4 +486,23 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
         chosen=", ".join(column.label for column in choice.readings),
         level=float(np.median(finite)) if len(finite) else float("nan"),
         weak_guesses=weak,
+        why=(
+            f"read as {table.format}",
+            *(
+                f"column {each.number} '{each.label}': {_ROLES.get(each.role, each.role)}, "
+                + (f"in {each.unit}" if each.unit else "no unit stated")
+                for each in sorted(
+                    (*choice.channels, *([choice.time] if choice.time else [])),
+                    key=lambda c: c.number,
+                )
+            ),
+            *notes,
+            *(f"a guess: {guess}" for guess in weak),
+            f"so {len(time)} readings of {', '.join(c.label for c in choice.readings)}, in "
+            + (unit if unit != "1" else "their own unit"),
+        ),
     )
+
+
+_ROLES: Final = {"none": "nothing that swings", "unknown": "a name that says nothing"}
+"""What a column's name says, where the role's own name says it badly."""

@@ -175,7 +175,7 @@ def _with_decimals(place: Path, lines: Sequence[str], first: int, layout: Layout
 def _table(place: Path, lines: list[str], first: int, layout: Layout, form: str) -> Table:
     header = read_header(lines[: first + 1], layout)
     # What is damaged among the first rows, below the names, is part of the block.
-    below = range(header.names_at or first, first)
+    below = range(header.names_at if header.names_at and layout.width > 1 else first, first)
     first = next((at for at in below if layout.is_row(layout.split(lines[at]))), first)
     torn = [at for at in below if at < first and _is_torn(lines[at], layout)]
     first = min([first, *torn])

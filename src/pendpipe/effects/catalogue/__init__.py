@@ -1,19 +1,23 @@
 """The catalogue: every effect that is known, each declared once in a module of this package.
 
 A new effect is a function declared by `enters` in one of these modules, or in a module of its
-own: whatever is declared here is found.
+own: whatever is declared here is found. Other packages name theirs under the entry point
+``pendpipe.effects``; one that can't be loaded is named in a line and passed over.
 """
 
 import difflib
 import importlib
 import pkgutil
+import sys
 from collections.abc import Iterator
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Final
 
 from pendpipe.effects.effect import Effect
 from pendpipe.errors import InputError
 
+ENTRY_POINT: Final = "pendpipe.effects"
 _FIRST: Final = ("restoring", "losses", "in_time", "reading")
 """The order of the manual: dynamics, then measurement. Other modules follow by name."""
 
@@ -27,6 +31,14 @@ def _found() -> Iterator[Effect]:
             # A variant of an entry, which only the diagnosis uses, has a key of its own.
             if isinstance(effect, Effect) and effect.key == effect.identifier:
                 yield effect
+    for entry in sorted(entry_points(group=ENTRY_POINT)):
+        try:
+            effect = entry.load()
+        except Exception as fault:
+            said = " ".join(str(fault).split())[:120]
+            print(f"the plugin '{entry.name}' is passed over ({said})", file=sys.stderr)
+        else:
+            yield from [effect] if isinstance(effect, Effect) else []
 
 
 CATALOGUE: Final[tuple[Effect, ...]] = tuple(_found())
