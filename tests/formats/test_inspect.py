@@ -103,7 +103,15 @@ def test_json_has_the_contracts_form(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert told["gaps"] == []
     assert told["markers"][1] == {"sample": 1000, "time_s": 20.0, "comment": ""}
     assert list(told) == [
-        *("schema_version", "format", "channels", "samples", "sample_rate_hz", "uniform"),
+        *(
+            "made_by",
+            "schema_version",
+            "format",
+            "channels",
+            "samples",
+            "sample_rate_hz",
+            "uniform",
+        ),
         *("duration_s", "resolution", "gaps", "markers", "clipped_samples", "warnings"),
         *("chosen", "unit", "level", "weak_guesses"),
     ]
