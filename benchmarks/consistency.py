@@ -28,6 +28,7 @@ from pendpipe.dynamics import Eq8, Release, sample_with_jacobian
 from pendpipe.errors import InputError
 
 MOST_READINGS: Final = 300_000
+FEWEST_CYCLES: Final = 5.0
 _PIECE: Final = 1 << 17
 """Steps of the integrator that are in memory at a time."""
 _BIAS: Final = 0.02
@@ -89,8 +90,10 @@ def draw(number: int, seed: int) -> Truth:
     share = rng.dirichlet(np.ones(4)) if kind == "all" else np.eye(4)[KINDS.index(kind)]
     losses = 0.5 * omega / quality * share
     relative = log(1e-6, 1e-2)
-    per_cycle, cycles = log(12.0, 1000.0), log(5.0, 1000.0)
-    cycles = min(cycles, _lasts(losses, relative) * frequency)
+    # Dry friction stops a pendulum of Q after Q/pi cycles.
+    while (most := _lasts(losses, relative) * frequency) < FEWEST_CYCLES:
+        losses, quality = losses / 1.5, quality * 1.5
+    per_cycle, cycles = log(12.0, 1000.0), min(log(FEWEST_CYCLES, 1000.0), most)
     return Truth(
         number=number,
         sine=number % 4 != 3,

@@ -1,6 +1,6 @@
 """Few readings in a cycle: the swing between them, by which its half cycles can be followed.
 
-Extremes are found among readings, and 4 to 12 in a cycle rarely lie at one. So a wave of the
+Extremes are found among readings, and 4 to 16 in a cycle rarely lie at one. So a wave of the
 motion's frequency, its amplitude and phase as straight lines, is fitted to two and a half cycles
 about each moment. That shows where the half cycles are; the fit of the motion takes the readings
 themselves.
@@ -13,7 +13,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 
-DENSE: Final = 12.0
+DENSE: Final = 16.0
 """Readings in a cycle from which half cycles are followed as they are."""
 HARDLY: Final = 7.0
 """Readings in a cycle below which extremes are not even told from other motion."""
