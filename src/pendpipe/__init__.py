@@ -1,5 +1,8 @@
 """How pendulums lose energy, from the instrument's bytes to the physics that was left out.
 
+`read` a recording from a file of any kind, `fit` period, Q and losses, `diagnose` what physics is
+missing, `simulate` a recording, `acquire` one from an instrument; `help(pp.fit)` tells more.
+
 >>> import pendpipe as pp
 >>> recording = pp.read("examples/rod-pendulum.csv")
 >>> fit = pp.fit(recording)

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
-from pendpipe.errors import refuse_if
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.recording import Recording
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+    from pandas import DataFrame
+
     from pendpipe.acquisition.devices.simulated import Signal
     from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring
     from pendpipe.analysis.free_decay import FreeDecay
@@ -23,6 +26,9 @@ if TYPE_CHECKING:
     from pendpipe.formats import Inspection
 
 Source = Recording | str | Path
+"""What is analysed: a recording, or the path of its file. A DataFrame serves as well, with a
+column ``time_s`` and one of `_COLUMNS`."""
+_COLUMNS: Final = ("angle_rad", "angle_deg", "volts", "displacement_m")
 
 
 def read(
@@ -206,7 +212,8 @@ def turning_points(recording: Source) -> TurningPoints:
 
 
 def fit(
-    recording: Source,
+    recording: Source | ArrayLike | DataFrame,
+    angle_rad: ArrayLike | None = None,
     *,
     method: Method | None = None,
     restoring: Restoring | None = None,
@@ -228,7 +235,10 @@ def fit(
     Parameters
     ----------
     recording
-        A recording, or the path of its file.
+        A recording, the path of its file, a DataFrame with ``time_s`` and ``angle_rad`` (or
+        ``angle_deg``, ``volts``, ``displacement_m``), or times in s with the angles behind them.
+    angle_rad
+        The angles at these times, rad.
     method
         ``"waveform"`` or ``"turning-points"`` to have only that one.
     restoring
@@ -271,6 +281,10 @@ def fit(
     Copy: T0 = (1.1454712 ± 0.0000026) s; Q = 162.27 ± 0.20 at 73.4 mrad; 62 % of the loss there ...
     Next: pendpipe page FILE makes a sheet to hand out; --figure draws it, --json is for programs
     """
+    _check_choice("method", method, ("waveform", "turning-points"))
+    _check_choice("restoring", restoring, ("linear", "sine"))
+    _check_choice("baseline", baseline, ("eq8", "viscous"))
+    recording = _source(recording, angle_rad)
     place, motion = name or _place(recording), _motion(recording, volts_per_radian)
     from dataclasses import replace
 
@@ -441,6 +455,37 @@ def simulate(model: str | Path | Mapping[str, Any], *, seed: int | None = None) 
         described = described.model_copy(update={"seed": seed})
     place = "model" if isinstance(model, Mapping) else str(model)
     return models.simulate(described, f"simulated: {Path(place).name}", place=place)
+
+
+def _check_choice(name: str, value: str | None, choices: Sequence[str]) -> None:
+    """Refuse an option that is none of its values."""
+    from difflib import get_close_matches
+
+    if value is None or value in choices:
+        return
+    near = get_close_matches(str(value), choices, n=1)
+    remedy = f"did you mean {near[0]!r}?" if near else f"give {' or '.join(map(repr, choices))}"
+    raise InputError(name, f"{value!r} is not a valid choice", remedy)
+
+
+def _source(recording: Any, angle_rad: ArrayLike | None = None) -> Source:
+    """Return a recording or a path, from arrays or a DataFrame as well."""
+    if angle_rad is not None:
+        return Recording(time_s=recording, angle_rad=angle_rad)
+    if isinstance(recording, Recording | str | Path):
+        return recording
+    columns = [str(name) for name in getattr(recording, "columns", ())]
+    found = [name for name in _COLUMNS if name in columns]
+    refuse_if(
+        "time_s" not in columns or len(found) != 1,
+        "recording",
+        f"a DataFrame with columns {', '.join(columns)}"
+        if columns
+        else f"a {type(recording).__name__}",
+        f"give columns time_s and one of {', '.join(_COLUMNS)}, or times and angles",
+    )
+    readings: dict[str, Any] = {found[0]: recording[found[0]].to_numpy()}
+    return Recording(time_s=recording["time_s"].to_numpy(), **readings)
 
 
 def _options(**given: Any) -> Any:

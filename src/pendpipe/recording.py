@@ -64,7 +64,7 @@ class Recording:
     radius_excess
         Where the angles are those of positions: the distance from the pivot over its median,
         less 1, shape (n,). A string keeps it, so that it shows the errors of the tracking.
-    angle_rad, volts, displacement_m
+    angle_rad, angle_deg, volts, displacement_m
         The readings by the name of their quantity; exactly one of these or `values`.
     volts_per_radian
         The sensor's constant, kept in the metadata.
@@ -107,10 +107,19 @@ class Recording:
         radius_excess: FloatArray | None = None,
         *,
         angle_rad: ArrayLike | None = None,
+        angle_deg: ArrayLike | None = None,
         volts: ArrayLike | None = None,
         displacement_m: ArrayLike | None = None,
         volts_per_radian: float | None = None,
     ) -> None:
+        if angle_deg is not None:
+            refuse_if(
+                angle_rad is not None,
+                "Recording",
+                "angle_rad and angle_deg are given",
+                "give one of them",
+            )
+            angle_rad = np.radians(_column("angle_deg", angle_deg))
         named: dict[Quantity, ArrayLike | None] = {
             "angle_rad": angle_rad,
             "volts": volts,

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.interpolate import make_interp_spline
 
@@ -418,6 +419,22 @@ def draw_fit(decay: Decay, recording: Recording) -> Figure:
         shares=(1.3, 0.7, 1.0),
         sharex=False,
     )
+
+
+def draw_readings(axes: Axes, decay: Decay, recording: Recording) -> Figure:
+    """Draw a decay with its fitted amplitude on axes that are handed in; return their figure."""
+    own, own_unit = axis_unit(recording.values[recording.usable], recording.unit)
+    look = {"alpha": 0.6, "label": "readings"}
+    marks = [curve(recording.time_s, own * recording.values, BLUE, width=0.5, **look)]
+    if recording.unit == decay.points.unit and decay.fit.light != "red":
+        marks += _fitted(decay, own)
+    for mark in marks:
+        mark(axes)
+    axes.set(xlabel="Time (s)", ylabel=f"{quantity_of(recording.unit)} ({own_unit})")
+    axes.legend()
+    figure = axes.get_figure(root=True)
+    assert isinstance(figure, Figure)
+    return figure
 
 
 @styled

@@ -4,6 +4,7 @@ Colour never carries a meaning alone: branches differ in their symbols too, curv
 dashes. Vermilion is kept for what goes wrong when something is left out.
 """
 
+import io
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from operator import methodcaller
@@ -164,6 +165,25 @@ class Panel(NamedTuple):
     note: str = ""
 
 
+class ShownFigure(Figure):
+    """A figure that shows itself: in a notebook as a picture, elsewhere in a window."""
+
+    def _repr_png_(self) -> bytes:
+        """Return the picture for a notebook."""
+        out = io.BytesIO()
+        self.savefig(out, format="png", dpi=110)
+        return out.getvalue()
+
+    def show(self, warn: bool = True) -> None:  # noqa: ARG002 - matplotlib's signature
+        """Open a window, where matplotlib's backend has any."""
+        import matplotlib.pyplot as plt
+
+        if (manager := plt.figure().canvas.manager) is not None:
+            manager.canvas.figure = self
+            self.set_canvas(manager.canvas)
+        plt.show()
+
+
 def figure_of(
     height_in: float,
     *panels: Panel,
@@ -188,7 +208,7 @@ def figure_of(
     sharex
         Whether panels below each other have one scale.
     """
-    figure = Figure(figsize=(WIDTH_IN, height_in), layout=None if margins else "constrained")
+    figure = ShownFigure(figsize=(WIDTH_IN, height_in), layout=None if margins else "constrained")
     if margins:
         figure.subplots_adjust(**{"left": 0.135, "right": 0.975, **margins})
     rows, columns = (1, len(panels)) if across else (len(panels), 1)

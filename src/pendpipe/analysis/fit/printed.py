@@ -80,6 +80,23 @@ def lines(result: FitResult, *, name: str = "", law: bool = False) -> list[str]:
     ]
 
 
+def html(result: FitResult) -> str:
+    """Return the same for a notebook."""
+    from html import escape
+
+    colour = {"green": "#00664b", "amber": "#8a4b00", "red": "#a3210f"}[result.light]
+    rows = "".join(
+        f"<tr><th style='text-align:left'>{escape(title)}</th>"
+        f"<td style='text-align:left'>{escape(value)}</td></tr>"
+        for title, value in facts(result)
+    )
+    remarks = "".join(f"<p>{escape(line)}</p>" for line in _remarks(result))
+    return (
+        f"<p>{escape(heading(result))} <strong style='color:{colour}'>{result.light}</strong></p>"
+        f"{remarks}<table>{rows}</table><p><strong>{escape(sentence(result))}</strong></p>"
+    )
+
+
 def heading(result: FitResult, name: str = "") -> str:
     """Name the recording and say what was fitted of it, in one line."""
     points, decay = result.points, result.decay

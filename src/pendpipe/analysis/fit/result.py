@@ -14,7 +14,7 @@ from pendpipe.analysis.fit.consequence import PeriodCheck, Widening, judged
 from pendpipe.analysis.fit.decrement import Decrement, Light, check_decrement
 from pendpipe.analysis.fit.goodness import LEVEL, Goodness, combined
 from pendpipe.analysis.fit.least_squares import CHI2_95
-from pendpipe.analysis.fit.printed import lines
+from pendpipe.analysis.fit.printed import html, lines
 from pendpipe.analysis.fit.quality import (
     Quality,
     damping_of,
@@ -32,7 +32,9 @@ from pendpipe.files import read_json, write_json, writing
 from pendpipe.quantities import compact
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
     from pandas import DataFrame
 
     from pendpipe.recording import Recording
@@ -128,6 +130,8 @@ class FitResult:
         The law's period beside that of the turning points: all, large, middle and small swings.
     widening
         By what standard deviations were multiplied for what the law misses.
+    hysteretic_share
+        Part of b that the fitted law has as hysteretic; hardly any recording tells it.
     name
         Of the file that was fitted.
     motion
@@ -168,6 +172,7 @@ class FitResult:
     quotable: tuple[str, ...] = ()
     period_check: tuple[PeriodCheck, ...] = ()
     widening: Widening = field(default_factory=Widening)
+    hysteretic_share: float = 0.5
     name: str = field(default="", compare=False)
     motion: tuple[Eq8, Release] | None = field(default=None, repr=False, compare=False)
     points: TurningPoints | None = field(default=None, repr=False, compare=False)
@@ -240,10 +245,8 @@ class FitResult:
         return f"FitResult({self.light}: {numbers})"
 
     def _repr_html_(self) -> str:
-        """Return the summary for a notebook."""
-        from html import escape
-
-        return f"<pre>{escape(str(self))}</pre>"
+        """Return the answer as a table, for a notebook."""
+        return html(self)
 
     @property
     def equation(self) -> str:
@@ -254,9 +257,10 @@ class FitResult:
 
     @property
     def law(self) -> Eq8:
-        """Eq. 8 with the fitted numbers; b is halved where its parts are not known."""
+        """Eq. 8 with the fitted numbers; b is divided as the readings like it best."""
         b, held = self.value("b"), self.quality_factor_hysteretic
-        share = 0.5 * b if held is None else math.pi * self.value("frequency") / held.value
+        best = self.hysteretic_share * b
+        share = best if held is None else math.pi * self.value("frequency") / held.value
         hysteretic = min(max(share, 0.0), b)
         law = Eq8(
             2.0 * math.pi * self.value("frequency"),
@@ -269,13 +273,67 @@ class FitResult:
         speed = self.drag == "speed"
         return replace(law, drag="speed") if speed else law
 
-    def plot(self) -> Figure:
-        """Draw the decay with its fit, what the fit leaves, and Q against amplitude."""
-        from pendpipe.figures.decays import Decay, draw_fit
+    def plot(self, ax: Axes | None = None) -> Figure:
+        """Draw the decay with its fit, what the fit leaves, and Q against amplitude.
 
+        Parameters
+        ----------
+        ax
+            Axes of your own; on them the decay with its fit alone is drawn.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            It shows itself in a notebook; ``.show()`` opens a window, ``.savefig(path)`` writes.
+        """
+        from pendpipe.figures.decays import Decay, draw_fit, draw_readings
+
+        points, decay = self._readings("plot")
+        if ax is None:
+            return draw_fit(Decay("", points, self), decay)
+        return draw_readings(ax, Decay("", points, self), decay)
+
+    def predict(self, time_s: ArrayLike) -> FloatArray:
+        """Return the fitted motion at some times, in the unit of the amplitude, shape (n,).
+
+        Parameters
+        ----------
+        time_s
+            On the clock of the recording, s. Before the first turning point that was fitted the
+            motion is taken back by its loss there.
+
+        Raises
+        ------
+        InputError
+            If the fit was read from a file, without its turning points.
+        """
+        from pendpipe.analysis.fit.prediction import predicted
+
+        self._readings("predict")
+        return predicted(self, np.asarray(time_s, dtype=np.float64))
+
+    @property
+    def residual(self) -> FloatArray:
+        """Readings less fitted motion, shape (n,), in the unit of the amplitude.
+
+        Raises
+        ------
+        InputError
+            If the fit was read from a file, or its readings are a rate or a position.
+        """
+        _, decay = self._readings("residual")
+        refuse_if(
+            decay.unit != self.parameters["amplitude"].unit,
+            "residual",
+            f"the readings are in {decay.unit}, and the motion is an angle",
+            "use fit.predict",
+        )
+        return np.asarray(decay.values - self.predict(decay.time_s))
+
+    def _readings(self, what: str) -> tuple[TurningPoints, Recording]:
         if self.points is None or self.decay is None:
-            raise InputError("plot", "the readings are not with this fit", "fit the recording anew")
-        return draw_fit(Decay("", self.points, self), self.decay)
+            raise InputError(what, "the readings are not with this fit", "fit the recording anew")
+        return self.points, self.decay
 
     def to_frame(self) -> DataFrame:
         """Return a table with a row a number: value, sd, low95, high95, unit.
@@ -347,6 +405,7 @@ class FitResult:
             **{name: getattr(self, name) and getattr(self, name).as_json() for name in OPTIONAL},
             "light": self.light,
             "light_reason": self.light_reason,
+            "hysteretic_share": self.hysteretic_share,
             "quotable": list(self.quotable),
             "widening": self.widening._asdict(),
             "period_check": [check._asdict() for check in self.period_check],
@@ -404,6 +463,7 @@ class FitResult:
             torque_odds=content.get("torque_log_odds"),
             light=content["light"],
             light_reason=content["light_reason"],
+            hysteretic_share=content.get("hysteretic_share", 0.5),
             quotable=tuple(content.get("quotable", ())),
             widening=Widening(**content.get("widening", {})),
             period_check=tuple(PeriodCheck(**check) for check in content.get("period_check", ())),
@@ -470,6 +530,7 @@ def result_of(
         covariance_order=PARAMETERS,
         covariance=covariance,
         restoring=law.restoring,
+        hysteretic_share=law.hysteretic / b.value if b.value > 0.0 else 0.5,
         drag=getattr(law, "drag", "energy"),
         noise_rms_rad=goodness.noise_rms,
         chi2_per_dof=goodness.chi2_per_dof,

@@ -1,0 +1,44 @@
+"""The fitted motion at any time."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pendpipe.analysis.fit.decrement import loss_of
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Release, sample
+
+if TYPE_CHECKING:
+    from pendpipe.analysis.fit.result import FitResult
+
+
+def predicted(result: FitResult, time_s: FloatArray) -> FloatArray:
+    """Return the law's motion; see `FitResult.predict`."""
+    points = result.points
+    assert points is not None
+    omega, y0 = 2.0 * math.pi * result.value("frequency"), result.value("amplitude")
+    side = float(points.side[0])
+    # The phase at the first reading counts from a turning point on the positive side.
+    late = result.value("phase") - (0.0 if side > 0.0 else math.pi)
+    turned_s = points.start_s - late / omega
+    period_s = 2.0 * math.pi / omega
+    turned_s += period_s * round((float(points.time_s[0]) - turned_s) / period_s)
+    level = np.full(len(time_s), result.value("offset"))
+    if result.zero_drift is not None:
+        level += result.zero_drift.value * (time_s - 0.5 * (points.start_s + points.stop_s))
+    order = np.argsort(time_s, kind="stable")
+    ordered = time_s[order]
+    before = ordered < turned_s
+    motion = np.empty(len(time_s))
+    early = turned_s - ordered[before]
+    loss = loss_of(result.law, y0)
+    swing = np.cos(omega * early) - loss / omega * np.sin(omega * early)
+    motion[before] = side * y0 * np.exp(loss * early) * swing
+    if not before.all():
+        motion[~before] = sample(result.law, Release(turned_s, side * y0), ordered[~before])
+    found = np.empty(len(time_s))
+    found[order] = motion
+    return np.asarray(found + level)
