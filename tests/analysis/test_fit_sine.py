@@ -14,12 +14,14 @@ from scipy.special import ellipe, ellipk
 
 from pendpipe import cli
 from pendpipe.analysis.fit import fit_recording
-from pendpipe.analysis.fit.by_points import fit_energies, start_of
+from pendpipe.analysis.fit.by_points import fit_energies, restoring_of, sine_coefficient
+from pendpipe.analysis.fit.by_waveform import start_values
 from pendpipe.analysis.fit.least_squares import covariance
 from pendpipe.analysis.fit.period import elliptic
 from pendpipe.analysis.turning_points import TurningPoints, find_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, turning_points
+from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.files import read_json
 from pendpipe.recording import Recording
 
@@ -71,38 +73,38 @@ def test_the_energies_of_turning_points_tell_a_b_and_c(release: float, torque: s
 
 @pytest.mark.parametrize("torque", ["linear", "sine"])
 @pytest.mark.parametrize("release", [0.5, 2.9])
-def test_a_start_is_near_each_law_before_any_motion_is_fitted(release: float, torque: str) -> None:
-    law = Eq8(OMEGA, 0.02, 0.005, 0.005, 0.01, torque)  # type: ignore[arg-type]
-    start = start_of(points_of(law, release, 50))
-    assert start.favoured == torque
-    found = start.sine if torque == "sine" else start.linear
-    assert found is not None
-    assert found.angular_frequency == pytest.approx(OMEGA, rel=2e-3)
-    a, b, c = found.rates
+def test_a_start_is_near_each_law_before_any_motion_is_fitted(
+    release: float, torque: Restoring
+) -> None:
+    points = points_of(Eq8(OMEGA, 0.02, 0.005, 0.005, 0.01, torque), release, 50)
+    assert restoring_of(points) == torque
+    start = start_values(points, {}, {}, "eq8", torque)
+    a, b, c, _, omega, angle, time, _ = start.value[:8].tolist()
+    assert omega == pytest.approx(OMEGA, rel=2e-3)
     loss = 0.01 * release**2 + 0.01 * release + 0.01
     assert 0.5 * a * release**2 + b * release + c == pytest.approx(loss, rel=0.1)
-    assert found.angle_rad == pytest.approx(release, abs=1e-3)
-    assert found.time_s == pytest.approx(0.3, abs=0.15 / OMEGA)
-    # Within it a fit of all readings converges.
-    assert found.slip_rad < 0.3
+    law = Eq8(omega, a, 0.5 * b, 0.5 * b, c, torque)
+    turns = turning_points(law, Release(time, angle), count=start.before + 50)
+    assert turns.angle_rad[start.before] == pytest.approx(release, rel=0.03)
+    assert turns.time_s[start.before] == pytest.approx(0.3, abs=0.3 / OMEGA)
 
 
 def test_the_free_coefficient_of_sin_x_tells_pendulums_from_other_torques() -> None:
     sine = Eq8(OMEGA, 0.02, 0.005, 0.005, 0.001, "sine")
-    coefficient = start_of(points_of(sine, 1.0, 60)).coefficient
+    coefficient = sine_coefficient(points_of(sine, 1.0, 60))
     assert coefficient.value == pytest.approx(1.0, abs=4.0 * coefficient.sd + 0.02)
     assert coefficient.agrees
     # A torsion wheel turns as far, with a torque that is linear.
-    wheel = start_of(points_of(Eq8(OMEGA, 0.0, 0.0, 0.01, 0.005), 2.5, 60))
-    assert abs(wheel.coefficient.value) < 0.02
-    assert wheel.coefficient.excludes_sine
-    assert wheel.favoured == "linear"
+    wheel = points_of(Eq8(OMEGA, 0.0, 0.0, 0.01, 0.005), 2.5, 60)
+    assert abs(sine_coefficient(wheel).value) < 0.02
+    assert sine_coefficient(wheel).excludes_sine
+    assert restoring_of(wheel) == "linear"
     # Swings so small that nobody can tell stay linear, and so do torques that harden.
     small = Eq8(OMEGA, viscous=0.01, restoring="sine")
-    assert start_of(points_of(small, 0.01, 60)).favoured == "linear"
+    assert restoring_of(points_of(small, 0.01, 60)) == "linear"
     hard = shifted(points_of(Eq8(OMEGA, viscous=0.02), 0.5, 60), lambda y: -0.05 * y**2)
-    assert start_of(hard).coefficient.value < -0.5
-    assert start_of(hard).favoured == "linear"
+    assert sine_coefficient(hard).value < -0.5
+    assert restoring_of(hard) == "linear"
 
 
 def shifted(points: TurningPoints, longer: Callable[[FloatArray], FloatArray]) -> TurningPoints:
@@ -112,9 +114,8 @@ def shifted(points: TurningPoints, longer: Callable[[FloatArray], FloatArray]) -
 
 
 def test_a_wheel_beyond_pi_has_no_sine() -> None:
-    start = start_of(points_of(Eq8(OMEGA, 0.0, 0.0, 0.01, 0.005), 9.0, 60))
-    assert (start.sine, start.favoured) == (None, "linear")
-    assert start.linear.angular_frequency == pytest.approx(OMEGA, rel=1e-3)
+    points = points_of(Eq8(OMEGA, 0.0, 0.0, 0.01, 0.005), 9.0, 60)
+    assert restoring_of(points) == "linear"
 
 
 def test_a_pendulum_whose_frequency_drifts_is_still_a_pendulum() -> None:
@@ -122,27 +123,26 @@ def test_a_pendulum_whose_frequency_drifts_is_still_a_pendulum() -> None:
     points = points_of(Eq8(OMEGA, viscous=0.015, restoring="sine"), 0.4, 100)
     drift = 0.25 * np.cumsum(np.linspace(-0.01, 0.01, 100)) * math.pi / OMEGA
     points = replace(points, time_s=points.time_s + drift)
-    assert start_of(points).favoured == "sine"
-    assert not start_of(points).coefficient.agrees
-    assert start_of(points, stated=False).favoured == "linear"
+    assert restoring_of(points) == "sine"
+    assert not sine_coefficient(points).agrees
+    assert restoring_of(points, stated=False) == "linear"
 
 
 def test_half_periods_that_alternate_change_no_coefficient() -> None:
     points = points_of(Eq8(OMEGA, 0.02, 0.0, 0.01, 0.0, "sine"), 1.0, 60)
     uneven = replace(points, time_s=points.time_s + 0.1 / OMEGA * points.side)
-    one, other = start_of(points), start_of(uneven)
-    assert other.coefficient.value == pytest.approx(one.coefficient.value, abs=0.01)
-    assert other.sine is not None
-    assert other.sine.angular_frequency == pytest.approx(OMEGA, rel=2e-3)
+    one, other = sine_coefficient(points), sine_coefficient(uneven)
+    assert other.value == pytest.approx(one.value, abs=0.01)
+    omega = start_values(uneven, {}, {}, "eq8", "sine").value[4]
+    assert omega == pytest.approx(OMEGA, rel=2e-3)
 
 
 def test_gaps_leave_the_start_where_it_was() -> None:
     points = points_of(Eq8(OMEGA, 0.02, 0.0, 0.01, 0.0, "sine"), 1.5, 80)
     index = np.arange(80)
-    start = start_of(points.chosen((index < 10) | (index > 25)))
-    assert start.favoured == "sine"
-    assert start.sine is not None
-    assert start.sine.angular_frequency == pytest.approx(OMEGA, rel=5e-3)
+    left = points.chosen((index < 10) | (index > 25))
+    assert restoring_of(left) == "sine"
+    assert start_values(left, {}, {}, "eq8", "sine").value[4] == pytest.approx(OMEGA, rel=5e-3)
 
 
 @pytest.mark.parametrize("release", [1.5, 2.5, 2.9])

@@ -41,8 +41,6 @@ _SCORE_MARGIN: Final = 0.3
 """Part of the best score that a refit may catch up."""
 _SCORE_MARGIN_AT_BOUND: Final = 0.6
 """The same where a value at its bound lowers the scores."""
-LOST_PHASE_RAD: Final = 1.0
-"""Phase error in rad from which a model has lost the motion."""
 
 
 def refit_leads(

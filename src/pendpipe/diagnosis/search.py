@@ -16,7 +16,6 @@ from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Detection, more_leads, pr
 from pendpipe.diagnosis.evidence import Rival, Scale
 from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.held_out import predicts_worse
-from pendpipe.diagnosis.known_first import second_mode_first
 from pendpipe.diagnosis.moves import describe, improve, prefer_rare, refit_without
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit, fitted_from
@@ -24,6 +23,7 @@ from pendpipe.diagnosis.refits import refit_leads
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import Remainder, remainder_of, with_errors
 from pendpipe.diagnosis.result import BASELINES
+from pendpipe.diagnosis.second_mode import second_mode_first
 from pendpipe.diagnosis.state import Fault, State, Step, first_noise, is_gross, loses_phase, price
 from pendpipe.diagnosis.task import Task, undrawn
 from pendpipe.dynamics.any_law import NoMotionError

@@ -70,6 +70,7 @@ def equation_of_motion(campaign: Campaign, record: Record) -> Eq8:
         hysteretic=-root.real - viscous,
         viscous=viscous,
         coulomb=float(friction),
+        restoring="sine",
     )
 
 

@@ -383,41 +383,6 @@ class Coefficient(NamedTuple):
         return abs(self.value - 1.0) > SEEN * self.sd
 
 
-class LawStart(NamedTuple):
-    """Eq. 8 with one torque, from half periods and energies; the motion itself is not fitted."""
-
-    rates: FloatArray
-    """a, b, c of Eq. 13, shape (3,)."""
-    angular_frequency: float
-    """omega, rad/s: with sin x that of small amplitudes."""
-    angle_rad: float
-    """Signed angle of the first turning point, about the offset."""
-    time_s: float
-    """When that is."""
-    offset_rad: float
-    slip_rad: float
-    """Largest phase by which the law's turning points and the measured ones part."""
-
-    @property
-    def value(self) -> FloatArray:
-        """The same in the order of `eq8.BASELINE`, b half hysteretic; shape (8,)."""
-        return np.array(
-            [*self.rates, 0.5, self.angular_frequency, self.angle_rad, self.time_s, self.offset_rad]
-        )
-
-
-class Starts(NamedTuple):
-    """What half periods and energies tell before any motion is fitted."""
-
-    linear: LawStart
-    sine: LawStart | None
-    """None where the readings are no angles, or the half cycles are too few."""
-    favoured: Restoring
-    """The torque that the half cycles favour."""
-    coefficient: Coefficient
-    """Of sin x, set free: a torque (1 - eta) x + eta sin x, as far as the period goes."""
-
-
 GRAVITY: Final = 9.80665
 """Standard, m/s^2."""
 
@@ -499,49 +464,14 @@ def told_apart(points: TurningPoints, readings: int, noise: float) -> float:
     return 0.5 * in_half_cycle * float(left @ left) / noise**2
 
 
-def start_of(points: TurningPoints, *, stated: bool = True) -> Starts:
-    """Find where fits of the linear and of the sine law begin, and which the half cycles favour.
-
-    Parameters
-    ----------
-    points
-        The turning points; gaps between them are allowed.
-    stated
-        Whether it is known that the readings are angles. If so, swings beyond 0.25 rad are a
-        pendulum's unless the half cycles exclude sin x; else the half cycles must ask for it.
-
-    Returns
-    -------
-    Starts
-        For each law a, b, c, omega, angle and time of the first turning point, and the offset;
-        the favoured law; the coefficient of sin x, set free, with its standard deviation.
-
-    Notes
-    -----
-    A half swing from A to A' takes [K(A) + K(A')]/omega and loses omega^2 (cos A' - cos A); with
-    the linear law pi/omega and omega^2 (A^2 - A'^2)/2. An error of the level alternates from side
-    to side and is fitted too. omega and the first time come from the
-    straight line through the times against the half swings counted so; the losses from
-    non-negative least squares (`fit_energies`).
-
-    Examples
-    --------
-    >>> from pendpipe import turning_points
-    >>> points = turning_points("examples/rod-pendulum.csv")
-    >>> start = start_of(points)
-    >>> start.favoured, round(start.linear.angular_frequency, 3)
-    ('sine', 5.484)
-    """
-    coefficient = sine_coefficient(points)
-    sine = _law_start(points, "sine") if may_be_sine(points) else None
-    favoured = restoring_of(points, coefficient, stated=stated)
-    return Starts(_law_start(points, "linear"), sine, favoured, coefficient)
-
-
 def restoring_of(
     points: TurningPoints, coefficient: Coefficient | None = None, *, stated: bool = True
 ) -> Restoring:
-    """Which torque the half cycles favour; see `start_of`."""
+    """Which torque the half cycles favour.
+
+    Where it is `stated` that the readings are angles, swings beyond 0.25 rad are a pendulum's
+    unless the half cycles exclude sin x; else the half cycles must ask for it.
+    """
     if not may_be_sine(points):
         return "linear"
     coefficient = coefficient or sine_coefficient(points)
@@ -554,22 +484,6 @@ def may_be_sine(points: TurningPoints) -> bool:
     """Whether these are angles below the top, enough of them clear of the noise."""
     inside = points.unit == "rad" and float(np.max(points.amplitude_rad)) < math.pi
     return inside and len(clear(points)) >= 3
-
-
-def _law_start(points: TurningPoints, restoring: Restoring) -> LawStart:
-    """The start of one law: its energies, and times on a straight line against its phase."""
-    part = clear(points) if restoring == "sine" else points
-    found = fit_energies(part, restoring=restoring)
-    rates = found.value[:3]
-    period = fit_period(part, found.amplitude, rates.tolist(), share=0.5, restoring=restoring)
-    return LawStart(
-        rates,
-        period.angular_frequency,
-        float(part.angle_rad[0]),
-        period.time_s,
-        float(np.mean(points.level_rad)),
-        float(np.max(np.abs(period.late_rad))),
-    )
 
 
 def sine_coefficient(points: TurningPoints) -> Coefficient:
