@@ -371,7 +371,8 @@ def _changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
     found += [
         Change(name, before[name], after[name])
         for name in "abc"
-        if name in before and name in after
+        # What is held in both says nothing.
+        if name in before and name in after and before[name].sd + after[name].sd > 0.0
     ]
     fit = diagnosis.fit
     if fit is not None and fit.light != "red":

@@ -211,7 +211,8 @@ class Waveform:
             times = [self.time_s[first : first + _PIECE] for first in pieces]
             found = np.concatenate([self.read(value, each)[0] for each in times])
             return np.asarray(self.values - found)
-        angle = sample(model, release, self.time_s)
+        # Before it is let go it is held; a search that got there is no minimum, but has a residual.
+        angle = sample(model, release, np.maximum(self.time_s, release.time_s))
         read = self.length_m * np.sin(angle) if self.seen == "position" else angle
         return np.asarray(self.values - read - self._zero(value, self.time_s))
 
