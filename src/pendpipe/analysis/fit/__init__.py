@@ -19,7 +19,6 @@ from pendpipe.analysis.fit.by_points import (
 from pendpipe.analysis.fit.by_waveform import (
     ODDS,
     Fitted,
-    fit_waveform,
     fitted_waveform,
     waveform_result,
 )
@@ -39,6 +38,8 @@ Forms = tuple[tuple[Fitted, Goodness], ...]
 
 _STEP: Final = 1.25
 """By which the least amplitude grows, where the smaller ones contradict every law tried."""
+_SURE: Final = 1e9
+"""Logarithm of a likelihood ratio beyond which it has no meaning."""
 _MISSED: Final = 0.3
 """Of the first amplitude: a misfit beyond is that of another motion."""
 _LEAST: Final = 0.6
@@ -167,9 +168,7 @@ def _fit(
         reason = f"don't quote a, b, c: of all readings {why}; period and Q are the turning points'"
         return replace(_amber(by_points, reason), quotable=kept)
     for part in _larger_amplitudes(points):
-        larger = fit_waveform(
-            samples, part, baseline=baseline, fixed=fixed, restoring=restoring, length_m=length_m
-        )
+        larger = _waveform(samples, part, baseline, fixed, restoring, length_m, stated=stated)
         if not _stands(larger):
             larger = fit_points(part, baseline=baseline, fixed=fixed, restoring=restoring)
         if _stands(larger):
@@ -195,32 +194,41 @@ def _waveform(
             samples, points, baseline=baseline, fixed=fixed, restoring=torque, length_m=length_m
         )
 
-    def result(forms: Forms) -> FitResult:
-        return waveform_result(forms, samples, points, baseline, fixed or {})
+    def result(forms: Forms, torque: Restoring) -> FitResult:
+        if forms:
+            return waveform_result(forms, samples, points, baseline, fixed or {})
+        # No motion of the law comes near the readings.
+        lost = fit_points(points, baseline=baseline, fixed=fixed, restoring=torque)
+        return replace(lost, method="waveform", settled=False)
 
     if restoring is None and not may_be_sine(points):
         restoring = "linear"
     if restoring is None and not stated:
         restoring = restoring_of(points, stated=False)
     if restoring is not None:
-        return result(fitted(restoring))
+        return result(fitted(restoring), restoring)
     sine = fitted("sine")
+    if not sine:
+        return result(fitted("linear"), "linear")
     swung, goodness = sine[0]
     plain = swung.minimum.converged and goodness.enlarged == 1.0
     if plain and told_apart(points, len(samples), goodness.noise_rms) > _CERTAIN:
-        return result(sine)
+        return result(sine, "sine")
     linear = fitted("linear")
+    if not linear:
+        return result(sine, "sine")
     odds, converged = swung.better_by(linear[0][0]), linear[0][0].minimum.converged
+    odds = min(max(odds, -_SURE), _SURE)
     if converged and (odds < -ODDS or not swung.minimum.converged):
-        found, words = result(linear), f"10^{-odds / math.log(10.0):.0f}"
+        found, words = result(linear, "linear"), f"10^{-odds / math.log(10.0):.0f}"
         said = (
             f"x fits better than sin x by a likelihood ratio of {words}: a spring or torsion wheel"
         )
         return replace(found, torque_odds=-odds, warnings=(*found.warnings, said))
-    found = replace(result(sine), torque_odds=odds)
+    found = replace(result(sine, "sine"), torque_odds=odds)
     if odds > ODDS or not converged:
         return found
-    other = result(linear)["frequency"]
+    other = result(linear, "linear")["frequency"]
     own = found["frequency"]
     if abs(other.value - own.value) <= own.sd:
         return found

@@ -190,11 +190,11 @@ class Waveform:
 
     @property
     def bounds(self) -> Bounds:
-        """Of the nine parameters: with sin x the start lies below the top."""
-        if self.restoring == "linear":
-            return BOUNDS
+        """Of the nine parameters: the start is before all readings, with sin x below the top."""
         low, high = BOUNDS.lower.copy(), BOUNDS.upper.copy()
-        low[START], high[START] = -TOP, TOP
+        high[TIME] = self.time_s[0]
+        if self.restoring == "sine":
+            low[START], high[START] = -TOP, TOP
         return Bounds(low, high)
 
     def _zero(self, value: FloatArray, time_s: FloatArray) -> FloatArray | float:
@@ -529,23 +529,6 @@ class Fitted:
         return 0.5 * (others - square) / noise**2
 
 
-def fit_waveform(
-    samples: Samples,
-    points: TurningPoints,
-    *,
-    baseline: Baseline = "eq8",
-    fixed: Mapping[str, float] | None = None,
-    restoring: Restoring = "linear",
-    length_m: float | None = None,
-) -> FitResult:
-    """Fit Eq. 8 to the readings, starting from the turning points; see `fitted_waveform`."""
-    fixed = fixed or {}
-    fitted = fitted_waveform(
-        samples, points, baseline=baseline, fixed=fixed, restoring=restoring, length_m=length_m
-    )
-    return waveform_result(fitted, samples, points, baseline, fixed)
-
-
 def fitted_waveform(
     samples: Samples,
     points: TurningPoints,
@@ -575,7 +558,8 @@ def fitted_waveform(
     Returns
     -------
     tuple of Fitted with its Goodness
-        With the drag's energy form and with v|v|, the likelier first; one where there is no drag.
+        With the drag's energy form and with v|v|, the likelier first; one where there is no drag,
+        none where no motion of the law comes near the readings.
 
     Notes
     -----
@@ -601,12 +585,12 @@ def fitted_waveform(
     )
     first = np.append(start.value, 0.0)
     found = _settled(problem, start, first, (*held, DRIFT), samples)
+    if not math.isfinite(found.chi2):
+        return ()
     level = _judged(found, samples, points)
     if OFFSET not in held and combined(level.p_values[:2]) < _DRIFTS:
         drifting = _settled(found.problem, start, found.value, held, samples)
-        sd = math.sqrt(_over_shares(drifting).covariance[DRIFT, DRIFT])
-        clear = abs(drifting.value[DRIFT]) > _CLEAR_DRIFT * sd
-        if drifting.minimum.converged and clear:
+        if drifting.minimum.converged and _drifts(drifting):
             found, level = drifting, _judged(drifting, samples, points)
     without = found.value[A] <= 0.0
     if A in held or not found.minimum.converged or (without and level.enlarged == 1.0):
@@ -618,6 +602,12 @@ def fitted_waveform(
     if speed.better_by(found) < 0.0:
         return (found, level), (speed, level)
     return (speed, _judged(speed, samples, points)), (found, level)
+
+
+def _drifts(fitted: Fitted) -> bool:
+    """Whether the zero's drift is clear."""
+    sd = math.sqrt(_over_shares(fitted).covariance[DRIFT, DRIFT])
+    return abs(float(fitted.value[DRIFT])) > _CLEAR_DRIFT * sd
 
 
 def _minimised(problem: Waveform, value: FloatArray, held: tuple[int, ...]) -> Minimum:
@@ -747,7 +737,7 @@ def _at_shares(fitted: Fitted, shares: FloatArray, noise_rms: float, enlarged: f
     whole[[A, B, C], [A, B, C]] = np.array([y, 1.0, 1.0 / y]) ** 2 / max(loss, 1e-300) ** 2
     free = [j for j in range(9) if j not in held]
     grid = np.ix_(range(len(shares)), free, free)
-    size = 1.0 / np.sqrt(np.maximum(np.einsum("kpp->kp", own[grid]), 1e-300))
+    size = 1.0 / np.sqrt(np.maximum(np.einsum("kpp->kp", own[grid]), 1e-60))
     outer = size[:, :, None] * size[:, None]
     scaled = own[grid] * outer + _HAIR * np.eye(len(free))
     step = np.zeros_like(first)
