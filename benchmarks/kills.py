@@ -42,6 +42,8 @@ GUARDS: Final = (
     "pendpipe.manifest",
     "pendpipe.commands.doctor",
     "pendpipe.stages.refusal",
+    "pendpipe.stages.chunks",
+    "pendpipe.commands.stage",
     "pendpipe.stages.acquire",
     "workflow/rules/*.smk",
     "workflow/Snakefile",
@@ -281,10 +283,13 @@ class Trial:
 def record(project: Project, name: str) -> Any:
     """A manifest without what was repaired; nothing that is like another, if it is none."""
     path = project.results / name
-    if path.parent.name != "manifest" or not path.is_file():
+    if path.parent.name not in ("manifest", "chunks") or not path.is_file():
         return object()
     content = json.loads(path.read_text(encoding="utf-8"))
-    return {key: value for key, value in content.items() if key not in ("repaired", "check")}
+    for each in (content, *content.get("records", {}).values()):
+        each.pop("repaired", None)
+        each.pop("check", None)
+    return content
 
 
 Part = Callable[[Trial, Project, random.Random], list[Case]]

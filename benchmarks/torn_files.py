@@ -31,6 +31,8 @@ RESULTS = FOLDER / "results"
 GUARDS = (
     "pendpipe.manifest",
     "pendpipe.stages.refusal",
+    "pendpipe.stages.chunks",
+    "pendpipe.commands.stage",
     "workflow/rules/*.smk",
     "workflow/Snakefile",
     "./Snakefile",

@@ -114,7 +114,7 @@ def test_init_replaces_nothing(
         ([], "pendpipe init writes one"),
         (["--config", "none.yaml"], "there is no such configuration"),
         (["--record", "rd"], "did you mean 'rod'?"),
-        (["--profile", "nowhere"], "known are default"),
+        (["--profile", "nowhere"], "known are default, slurm"),
     ],
 )
 def test_what_is_wrong_is_said_before_snakemake_starts(

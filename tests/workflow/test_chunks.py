@@ -208,8 +208,11 @@ def test_what_a_chunk_says_when_it_is_torn_is_made_again(campaign: Campaign) -> 
     acquire, records = STAGES["acquire"], chunks_of(campaign)["all"]
     path = acquire.path(campaign, "all")
     whole = path.read_bytes()
+    sound = plan(campaign, acquire, "all", records)
     path.write_bytes(whole[:100])
-    assert plan(campaign, acquire, "all", records).lines == ()
+    found = plan(campaign, acquire, "all", records)
+    assert "acquire-all.json: it is torn" in found.lines[0]
+    assert found.repaired != sound.repaired, "a changed parameter runs the job"
     write_chunk(campaign, acquire, records, path)
     assert path.read_bytes() == whole
 

@@ -6,6 +6,8 @@ rule acquire:
     conda:
         "../envs/pendpipe.yaml"
     resources:
+        mem_mb=doubled(1000),
+        runtime=doubled(30),
         configuration=CONFIGURATION,
     params:
         settings=planned("acquire", "settings"),

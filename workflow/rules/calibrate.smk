@@ -10,6 +10,8 @@ rule caliper:
     conda:
         "../envs/pendpipe.yaml"
     resources:
+        mem_mb=doubled(1000),
+        runtime=doubled(30),
         configuration=CONFIGURATION,
     params:
         arm=option("arm-m", CALIPER and CALIPER.arm_m),
@@ -36,6 +38,8 @@ rule calibrate:
     conda:
         "../envs/pendpipe.yaml"
     resources:
+        mem_mb=doubled(1000),
+        runtime=doubled(10),
         configuration=CONFIGURATION,
     params:
         settings=planned("calibrate", "settings"),

@@ -159,6 +159,11 @@ def figure_files():
     )
 
 
+def doubled(number):
+    """A resource, MB or minutes, that is doubled where a cluster ended the first attempt."""
+    return lambda wildcards, attempt: number * attempt
+
+
 def option(name, value):
     """An option of the command line, or nothing."""
     return "" if value is None else f"--{name} {shlex.quote(str(value))}"

@@ -10,6 +10,8 @@ rule compare:
     conda:
         "../envs/pendpipe.yaml"
     resources:
+        mem_mb=doubled(1000),
+        runtime=doubled(30),
         configuration=CONFIGURATION,
     params:
         depends=jobs.theory(CAMPAIGN),

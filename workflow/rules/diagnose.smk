@@ -10,6 +10,8 @@ rule diagnose:
     conda:
         "../envs/pendpipe.yaml"
     resources:
+        mem_mb=doubled(2000),
+        runtime=doubled(240),
         configuration=CONFIGURATION,
     params:
         settings=planned("diagnose", "settings"),

@@ -8,6 +8,8 @@ rule diagnose_campaign:
     conda:
         "../envs/pendpipe.yaml"
     resources:
+        mem_mb=doubled(2000),
+        runtime=doubled(30),
         configuration=CONFIGURATION,
     params:
         folder=subpath(output[0], parent=True),

@@ -8,6 +8,9 @@ rule diagnose_pendulum:
         f"{RESULTS}/pendulums/{{pendulum}}/logs/diagnose.log",
     conda:
         "../envs/pendpipe.yaml"
+    resources:
+        mem_mb=doubled(2000),
+        runtime=doubled(120),
     params:
         recordings=of_pendulum("recording.csv"),
         calibrations=of_pendulum("calibration.json"),

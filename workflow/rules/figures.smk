@@ -17,6 +17,8 @@ rule figures:
         "../envs/pendpipe.yaml"
     threads: 2
     resources:
+        mem_mb=doubled(3000),
+        runtime=doubled(60),
         configuration=CONFIGURATION,
     params:
         folder=subpath(output.drawn, parent=True),

@@ -10,6 +10,8 @@ rule fit:
     conda:
         "../envs/pendpipe.yaml"
     resources:
+        mem_mb=doubled(1000),
+        runtime=doubled(30),
         configuration=CONFIGURATION,
     params:
         settings=planned("fit", "settings"),

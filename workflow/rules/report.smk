@@ -16,6 +16,8 @@ rule report:
     conda:
         "../envs/pendpipe.yaml"
     resources:
+        mem_mb=doubled(2000),
+        runtime=doubled(20),
         configuration=CONFIGURATION,
     params:
         repaired=repaired("", "report"),

@@ -8,6 +8,8 @@ rule separate:
     conda:
         "../envs/pendpipe.yaml"
     resources:
+        mem_mb=doubled(1000),
+        runtime=doubled(20),
         configuration=CONFIGURATION,
     params:
         depends=jobs.theory(CAMPAIGN),

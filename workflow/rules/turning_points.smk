@@ -9,6 +9,8 @@ rule turning_points:
     conda:
         "../envs/pendpipe.yaml"
     resources:
+        mem_mb=doubled(1000),
+        runtime=doubled(20),
         configuration=CONFIGURATION,
     params:
         settings=planned("turning-points", "settings"),

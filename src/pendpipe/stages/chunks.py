@@ -21,7 +21,7 @@ from pendpipe import manifest
 from pendpipe.configuration import jobs
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.errors import InputError
-from pendpipe.files import read_json, write_json
+from pendpipe.files import read_json, sha256, write_json
 from pendpipe.provenance import code_version
 from pendpipe.version import __version__
 
@@ -230,11 +230,19 @@ def plan(campaign: Campaign, stage: Stage, chunk: str, records: Iterable[Record]
 
     One `stat` a file: it is hashed only where length or time of change speak.
     """
-    made = _read_chunk(stage.path(campaign, chunk))
-    said, repaired, lines, damaged = [], [], [], []
+    said: list[str] = []
+    repaired: list[str] = []
+    lines: list[str] = []
+    damaged: list[Path] = []
+    path = stage.path(campaign, chunk)
+    made = _read_chunk(path)
+    if made is None and path.is_file():
+        torn = manifest.Damage(path, "it is torn or altered", sha256(path)[:8])
+        repaired.append(torn.mark)
+        lines.append(f"{path}: {torn.problem}; a run makes it again")
     for record in records:
         home = campaign.folder / record.record
-        content = made.get(record.record)
+        content = None if made is None else made.get(record.record)
         if content is not None:
             one = manifest.of_content(home, stage.name, content)
         elif home.exists():
@@ -251,14 +259,12 @@ def plan(campaign: Campaign, stage: Stage, chunk: str, records: Iterable[Record]
     return Plan(jobs.digest(said), " ".join(repaired), tuple(damaged), tuple(lines))
 
 
-def _read_chunk(path: Path) -> dict[str, Any]:
-    """Read what a chunk's job left; nothing where it is missing or torn: the job then runs."""
-    if not path.is_file():
-        return {}
+def _read_chunk(path: Path) -> dict[str, Any] | None:
+    """Read what a chunk's job left; None where it is missing or torn: the job then runs."""
     try:
         return dict(read_json(path)["records"])
     except (InputError, KeyError, TypeError, ValueError):
-        return {}
+        return None
 
 
 def forced() -> set[str]:
