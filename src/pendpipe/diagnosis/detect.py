@@ -34,6 +34,8 @@ FEW_DRAWS: Final = 64
 """Draws for a first look: they determine the number of trials to 20 %."""
 _DRAWS_AT_ONCE: Final = 32
 """Draws computed together: few enough for the processor's cache."""
+_NUMBERS_AT_ONCE: Final = 1 << 21
+"""Numbers of white residuals computed together, for memory's sake."""
 _TAIL_SHARE: Final = 0.4
 """Part of the draws, those of the smallest p-values, that determines the number of trials."""
 _TRIALS_EXPONENT: Final = 0.5
@@ -199,12 +201,14 @@ def draw_chance(scanner: Scanner, seed: int, draws: int = DRAWS) -> Chance:
     rows = bank.rows()
     largest: list[list[FloatArray]] = []
     loudest: list[FloatArray] = []
-    for _ in range(math.ceil(draws / _DRAWS_AT_ONCE)):
-        white = generator.standard_normal((_DRAWS_AT_ONCE, len(bank.basis))).T
+    at_once = max(min(_DRAWS_AT_ONCE, _NUMBERS_AT_ONCE // len(bank.basis)), 1)
+    for first in range(0, draws, at_once):
+        some = min(at_once, draws - first)
+        white = generator.standard_normal((some, len(bank.basis))).T
         white -= bank.basis @ (bank.basis.T @ white)
         scores = bank.scores(white)
         largest.append([scores[indices].max(axis=0) for indices in rows.values()])
-        tone = np.zeros(_DRAWS_AT_ONCE)
+        tone = np.zeros(some)
         for scores in scanner.tones(white):
             tone = np.maximum(tone, scores.max(axis=0))
         loudest.append(tone)

@@ -6,6 +6,7 @@ rest, at unit length, with the whitened residual: the locally most powerful test
 effect's shape is many such columns.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
@@ -37,7 +38,8 @@ _MANY = 16_000
 """Readings from which on the cosines about the harmonics are asked alone."""
 _HARMONICS = 12
 _BESIDE_HARMONIC = 1.0 / 16.0
-"""Half width of their bands, over the motion's frequency: in so many readings 40 cosines."""
+"""Half width of their bands in so many readings, over the motion's frequency: some 80 cosines. It
+falls, and their number grows, with the root of the number of readings."""
 _KNOWN = 1e-6
 """Variance of ln S below which it is known."""
 
@@ -77,6 +79,10 @@ class Bands:
         white = rows if self.cosines else dct(rows[..., :-1], norm="ortho")
         return np.concatenate([white[..., self.chosen], rows[..., -1:]], axis=-1)
 
+    def span(self, basis: FloatArray) -> FloatArray:
+        """Return an orthonormal basis of what a space's basis, shape (n + 1, p), is in them."""
+        return basis if self.chosen is None else _span(self.of(basis.T).T)
+
 
 WHOLE: Final = Bands(None, cosines=False)
 """Of a record that is not long: all readings."""
@@ -93,7 +99,8 @@ def bands_of(fit: Fit, noise: Noise) -> Bands:
     # Of each frequency that the motion has: over a hundredth of the record each.
     some = np.linspace(0, count - 1, 101).astype(np.int64)
     pace = np.abs(np.diff(phase[some]) / np.diff(some)) / np.pi
-    cosine, beside = np.arange(count) / count, _BESIDE_HARMONIC * pace.max()
+    cosine = np.arange(count) / count
+    beside = _BESIDE_HARMONIC * pace.max() * math.sqrt(_MANY / count)
     order = np.arange(_HARMONICS + 1)[:, None]
     near = (cosine > order * pace.min() - beside) & (cosine < order * pace.max() + beside)
     return Bands(np.flatnonzero(near.any(axis=0)), noise.coloured)
@@ -179,7 +186,7 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
     shapes = [_shapes(effect, fit.at.span) for effect in effects]
     most = sum(max(e.sizes, 1) * len(rows) for e, rows in zip(effects, shapes, strict=True))
     basis, bands, filled = tangent_basis(fit), bands_of(fit, noise), 0
-    known = basis if bands.chosen is None else _span(bands.of(basis.T).T)
+    known = bands.span(basis)
     columns = np.empty((most, len(known)), dtype=np.float32)
     candidates, unsure = [], [np.zeros(0)]
     at_once = max(min(_COLUMNS_AT_ONCE, _NUMBERS_AT_ONCE // len(basis)), 1)

@@ -140,12 +140,12 @@ def tone_scan(data: Data, noise: Noise, basis: FloatArray, decay_s: float, band:
     g11 = power * (1.0 + lines.real)
     g22 = power * (1.0 - lines.real)
     g12 = -power * lines.imag
-    rows = np.multiply(noise.adjoint(basis[:-1]).T, envelope, order="C")
-    known = np.fft.rfft(rows, n=size).T[keep]
-    real, imaginary = known.real, -known.imag
-    h11 = g11 - np.sum(real**2, axis=1)
-    h22 = g22 - np.sum(imaginary**2, axis=1)
-    h12 = g12 - np.sum(real * imaginary, axis=1)
+    h11, h22, h12 = g11.copy(), g22.copy(), g12
+    for row in noise.adjoint(basis[:-1]).T:
+        known = np.fft.rfft(row * envelope, n=size)[keep]
+        h11 -= known.real**2
+        h22 -= known.imag**2
+        h12 += known.real * known.imag
     determinant = h11 * h22 - h12**2
     seen = (
         (determinant > (_VISIBLE * 0.25 * (g11 + g22) ** 2))

@@ -5,6 +5,7 @@ the pendulum's frequency; the density of coloured noise there differs from its m
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -19,7 +20,7 @@ from pendpipe.diagnosis.forensics.tails import tail_of_squares, upper_tail
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Finding, Location, nothing
-from pendpipe.diagnosis.scores import tangent_basis
+from pendpipe.diagnosis.scores import bands_of, tangent_basis
 from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, compact
@@ -185,28 +186,32 @@ def _fluctuations(data: Data, fit: Fit, noise: Noise) -> tuple[Shapes, Shapes, f
     spacing = float(edges[1] - edges[0])
     instants = edges[:-1] + 0.5 * spacing
     growth = sampled.at_nodes(fit.at.tangent.of_start()[0])
-    # A kick's random steps are spread over its window.
-    after = np.clip((time[:, None] - edges[:-1]) / spacing, 0.0, 1.0)
     there = np.interp(instants, time, sampled.amplitude)
     grown = there * np.interp(instants, time, growth)
-    basis = tangent_basis(fit)
-    residual = np.append(noise.whiten(residual_of(data, fit)), fit.residual[-1])
+    bands = bands_of(fit, noise)
+    basis = bands.span(tangent_basis(fit))
+    residual = bands.of(np.append(noise.whiten(residual_of(data, fit)), fit.residual[-1]))
     residual -= basis @ (basis.T @ residual)
     quadratures = (
         (sampled.amplitude * sampled.cosine * growth, grown),
         (sampled.amplitude * sampled.sine, there),
     )
+
+    def columns(quadrature: FloatArray, scale: FloatArray) -> Iterator[FloatArray]:
+        for edge, size in zip(edges[:-1], scale, strict=True):
+            # A kick's random steps are spread over its window.
+            after = np.clip((time - edge) / spacing, 0.0, 1.0)
+            # The last entry is the prior's.
+            yield bands.of(np.append(noise.whiten(after * quadrature / size), 0.0))
+
     amplitude, phase = (
-        _shapes(noise.whiten(after * quadrature[:, None] / scale), basis, residual)
-        for quadrature, scale in quadratures
+        _shapes(np.stack([*columns(*pair)], axis=1), basis, residual) for pair in quadratures
     )
     return amplitude, phase, spacing / (4.0 * sampled.motion.angular_frequency**2)
 
 
-def _shapes(whitened: FloatArray, basis: FloatArray, residual: FloatArray) -> Shapes:
-    # The last row is the prior's.
-    columns = np.pad(whitened, ((0, 1), (0, 0)))
-    columns -= basis @ (basis.T @ columns)
+def _shapes(columns: FloatArray, basis: FloatArray, residual: FloatArray) -> Shapes:
+    columns = columns - basis @ (basis.T @ columns)
     weight, vectors = np.linalg.eigh(columns.T @ columns)
     keep = weight > _SMALLEST_EIGENVALUE * weight[-1]
     weight, vectors = weight[keep][::-1], vectors[:, keep][:, ::-1]

@@ -8,6 +8,7 @@ third harmonic where these are significant).
 
 import math
 from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement
 from typing import Final
 
 import numpy as np
@@ -166,7 +167,7 @@ def _windows(phase: FloatArray) -> IntArray:
 
 
 def _columns(phase: FloatArray, window: IntArray, harmonics: int) -> FloatArray:
-    """Return the smooth functions: offset, fundamental and its slope, harmonics; shape (n, p)."""
+    """Return the smooth functions: offset, fundamental and its slope, harmonics; shape (p, n)."""
     starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
     ends = np.append(starts[1:], len(phase)) - 1
     middle = 0.5 * (phase[starts] + phase[ends])
@@ -176,7 +177,7 @@ def _columns(phase: FloatArray, window: IntArray, harmonics: int) -> FloatArray:
     parts = [np.ones(len(phase)), cosine, sine, along * cosine, along * sine]
     for harmonic in range(2, harmonics + 1):
         parts += [np.cos(harmonic * phase), np.sin(harmonic * phase)]
-    return np.stack(parts, axis=1)
+    return np.stack(parts)
 
 
 def _fitted(
@@ -184,17 +185,25 @@ def _fitted(
 ) -> Local:
     """Least squares in every window at once."""
     starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
-    kept = columns * part[:, None]
-    size = columns.shape[1]
-    matrix = np.add.reduceat(kept[:, :, None] * columns[:, None, :], starts)
+    lengths = np.diff(starts, append=len(window))
+    kept, size = columns * part, len(columns)
+    matrix = np.empty((len(starts), size, size))
+    # A pair of columns at a time: all products of all readings would take gigabytes.
+    for i, j in combinations_with_replacement(range(size), 2):
+        matrix[:, i, j] = matrix[:, j, i] = np.add.reduceat(kept[i] * columns[j], starts)
     # Regularised for windows with few readings.
     matrix += 1e-9 * np.eye(size) * np.maximum(matrix[:, :1, :1], 1.0)
-    right = np.add.reduceat(kept * values[:, None], starts)
+    right = np.add.reduceat(kept * values, starts, axis=1).T
     inverse = np.linalg.inv(matrix)
     solved = (inverse @ right[..., None])[..., 0]
-    left = (values - np.sum(columns * solved[window], axis=1)) * used
-    turned = np.matmul(columns[:, None, :], inverse[window])[:, 0, :]
-    hat = np.sum(turned * columns, axis=1)
+    left, hat = values.astype(np.float64), np.zeros(len(values))
+    for i in range(size):
+        left -= columns[i] * np.repeat(solved[:, i], lengths)
+        turned = np.zeros(len(values))
+        for j in range(size):
+            turned += np.repeat(inverse[:, i, j], lengths) * columns[j]
+        hat += turned * columns[i]
+    left *= used
     leverage = np.where(part, -np.minimum(hat, 1.0), np.minimum(hat, 10.0))
     freedom = max(float(np.sum(1.0 + leverage[part])), 1.0)
     return Local(left, _rms(left[part], freedom), leverage, used)
