@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import pendpipe as pp
 from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import silent
@@ -410,3 +411,20 @@ def test_a_stale_reading_in_heavy_tails_is_wrong_since_it_repeats_the_one_before
     finding = TESTS["glitches"](record.data, record.fit, record.noise, record.samples)
     assert (finding.p_value < 1e-4) == stale
     assert ("repeats the one before" in finding.summary) == stale
+
+
+def test_a_short_record_of_coloured_noise_is_tested_for_glitches_without_a_filter() -> None:
+    """Too few readings lie far enough from both ends for the whitening filter."""
+    random = np.random.default_rng(1)
+    for _ in range(37):
+        cycles, count = random.uniform(3, 10), int(random.integers(80, 260))
+        quality, amplitude = float(random.uniform(2, 12)), float(10 ** random.uniform(-2, 0.2))
+        noise, dry = 10 ** random.uniform(-5, -1.5), float(random.choice([0, 1e-2 * amplitude]))
+        phase, hertz = random.uniform(0, 6.28), 10 ** random.uniform(-1, 1)
+        angle = 2 * np.pi * cycles * np.arange(count) / count
+        envelope = np.maximum(amplitude * np.exp(-angle / 2 / quality) - dry * angle, 0)
+        swing = envelope * np.cos(angle + phase) + noise * amplitude * random.normal(size=count)
+        if random.random() < 0.4:
+            swing = np.round(swing / (amplitude / 200)) * (amplitude / 200)
+    recording = pp.Recording(time_s=angle / (2 * np.pi * hertz), angle_rad=swing)
+    assert pp.diagnose(recording).verdict == "consistent"

@@ -33,6 +33,8 @@ _MOST_ROUNDS: Final = 20
 _FAR_SD: Final = 8.0
 _WINDOW_RAD: Final = 4.0 * math.pi
 _NOT_RANDOM: Final = 1e-3
+_FEWEST: Final = 60
+"""Readings that show the tail of their noise."""
 _EXPECTED_BY_CHANCE: Final = 0.05
 """A reading is left out if chance would give fewer than this in the whole record."""
 
@@ -50,7 +52,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     are too small at the extremes of the motion are left to the tests for saturation. Where a misfit
     of the motion remains in the windows, the test is the one that needs no model.
     """
-    if data.used < 60:
+    if data.used < _FEWEST:
         return nothing("glitches")
     residual, used = error_of(data, fit), data.weight > 0.0
     local = _errors(fit, noise, residual, ~used)
@@ -60,6 +62,8 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         # The whitening filter lacks neighbours at the ends: errors there are larger by themselves.
         used = used.copy()
         used[:TAPS] = used[-TAPS:] = False
+        if np.count_nonzero(used) < _FEWEST:
+            return find_in_misfit(data, fit, noise, samples)
     error, repeats = np.abs(local.scaled), _chance_of_repeats(data, residual)
     count, step = int(np.count_nonzero(used)), _rounding_in(data, noise.white_rms * local.rms)
     apart = used
@@ -109,7 +113,7 @@ def find_in_misfit(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
     standard deviations count, and only without deviating neighbours: lost samples, a jump or a
     corner of the motion displace several readings.
     """
-    if data.used < 60 or data.time_noise:
+    if data.used < _FEWEST or data.time_noise:
         return nothing("glitches")
     used, phase = data.weight > 0.0, fit.at.sampled.phase
     values = data.values - float(np.median(data.values[used]))
