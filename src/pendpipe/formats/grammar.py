@@ -173,10 +173,7 @@ def layouts(lines: Sequence[str], options: ReadOptions, *, strict: bool = True) 
     strict
         Whether numbers in words and brackets are left to those who undress them.
     """
-    full = [line for line in lines if line and not line.isspace() and not is_comment(line)]
-    starts = np.linspace(0, max(0, len(full) - _TOGETHER), _SAMPLES).astype(int).tolist()
-    chosen = {at for start in starts for at in range(start, min(start + _TOGETHER, len(full)))}
-    sample = [full[at] for at in sorted(chosen)]
+    sample = _some(lines) or _some([line for line in lines if not is_comment(line)])
     # "0,025","0,5": the same sign twice, separated by the quotes alone.
     quoted = any('"' in line for line in sample)
     candidates = [
@@ -192,6 +189,14 @@ def layouts(lines: Sequence[str], options: ReadOptions, *, strict: bool = True) 
     # Blanks part a date from its time of day as well.
     kept.sort(key=lambda each: (each[0][1], each[1].delimiter != " ", each[0][0]), reverse=True)
     return [layout for _, layout in kept]
+
+
+def _some(lines: Sequence[str]) -> list[str]:
+    """Choose lines that follow one another, at several places; none that is blank or a remark."""
+    starts = np.linspace(0, max(0, len(lines) - _TOGETHER), _SAMPLES).astype(int).tolist()
+    chosen = {at for start in starts for at in range(start, min(start + _TOGETHER, len(lines)))}
+    some = (lines[at] for at in sorted(chosen))
+    return [line for line in some if line and not line.isspace() and not is_comment(line)]
 
 
 def _score(sample: Sequence[str], layout: Layout, *, strict: bool) -> tuple[float, int, int]:

@@ -207,7 +207,7 @@ def _without_cut_row(
     It has fewer cells than every other row; or no end of line, and its last number has fewer
     letters, or fewer decimals, than that of every other row.
     """
-    last = max((row for row, line in enumerate(lines) if line.strip()), default=0)
+    last = _last_filled(lines)
     others = [line for line in lines[max(first, last - 500) : last] if line.strip()]
     if last <= first + 2 or not others or is_comment(lines[last]):
         return lines, ()
@@ -225,6 +225,10 @@ def _without_cut_row(
     return lines[:last], (f"line {last + 1} is cut short: not taken for a sample",)
 
 
+def _last_filled(lines: Sequence[str]) -> int:
+    return next((row for row in range(len(lines) - 1, -1, -1) if lines[row].strip()), 0)
+
+
 def _size(cell: str, layout: Layout) -> tuple[int, int]:
     """Letters of a number without its sign, and those behind its decimal sign."""
     bare = cell.lstrip("+-") if not is_blank(cell) else ""
@@ -238,7 +242,7 @@ def _at_once(
 
     (By NumPy: to import pandas takes longer than to read a million rows.)
     """
-    last = max(row for row, line in enumerate(lines, start=1) if line.strip())
+    last = _last_filled(lines) + 1
     rows = lines[first:last]
     if layout.joined:
         return None
