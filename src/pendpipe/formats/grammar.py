@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice, pairwise
+from itertools import islice
 from typing import Final
 
 import numpy as np
@@ -40,6 +40,8 @@ _NAMES: Final = {
 }
 _SIGN_WORDS: Final = {"\t": "tabs", ",": "commas", ";": "semicolons", " ": "blanks", "|": "bars"}
 _DECIMALS: Final = {"comma": ",", "point": ".", "dot": "."}
+_ROUGHER: Final = 0.7
+"""By so much less rough, as a logarithm, is the true one of two ways to read commas."""
 _MOST_WAYS: Final = 5000
 """Ways to read a row of commas that are tried."""
 _BLANK: Final = re.compile(
@@ -294,11 +296,13 @@ def joined_commas(lines: Sequence[str], layout: Layout, names: int) -> list[tupl
     # Where one number has a decimal comma for certain, the others have it too.
     fewest = min(map(len, ways))
     ways = ways if plain in ways else [way for way in ways if len(way) == fewest]
-    ranks = [_evenness(_first_numbers(columns, way)) for way in ways]
     # Whole numbers under no names are whole numbers, unless that leaves no time.
-    if not names and plain in ways and _evenness(_first_numbers(columns, plain)):
+    if not names and plain in ways and _evenness(_numbers(columns, plain)):
         return [plain]
-    return [way for way, rank in zip(ways, ranks, strict=True) if rank == max(ranks)]
+    ranks = [_evenness(_numbers(columns, way)) for way in ways]
+    ways = [way for way, rank in zip(ways, ranks, strict=True) if rank == max(ranks)]
+    rough = [_roughness(_numbers(columns, way)) for way in ways]
+    return [way for way, each in zip(ways, rough, strict=True) if each < min(rough) + _ROUGHER]
 
 
 def _is_whole(way: Sequence[int], columns: Sequence[Sequence[str]]) -> bool:
@@ -313,9 +317,10 @@ def _often(pattern: str, cells: Sequence[str]) -> float:
 
 
 def _parts_change(way: Sequence[int], columns: Sequence[Sequence[str]]) -> bool:
-    """Say whether no decimal part is the same in all rows, but for zeros."""
+    """Say whether decimal parts end in many a digit (a flag does not), or are all zeros."""
     parts = [columns[at + 1] for at, many in _placed(way) if many == 2]
-    return all(len(set(part)) > 1 or not part[0].strip("0") for part in parts)
+    ends = [{cell[-1:] for cell in part} for part in parts]
+    return all(len(end) > 4 or end == {"0"} for end in ends)
 
 
 def _ways(pairs: Sequence[bool], cells: int, at: int = 0) -> Iterator[tuple[int, ...]]:
@@ -334,23 +339,39 @@ def _placed(way: Sequence[int]) -> list[tuple[int, int]]:
     return list(zip(starts, way, strict=True))
 
 
-def _first_numbers(columns: Sequence[Sequence[str]], way: Sequence[int]) -> FloatArray:
-    """Give the first column as it is read in this way; none where it is the only one."""
-    if len(way) < 2:
-        return np.empty(0)
-    texts = columns[0] if way[0] == 1 else map(".".join, zip(*columns[:2], strict=True))
-    try:
-        return np.array([float(text) for text in texts])
-    except ValueError:  # times of day
-        return np.arange(len(columns[0]), dtype=np.float64)
+def _numbers(columns: Sequence[Sequence[str]], way: Sequence[int]) -> list[FloatArray]:
+    """Give the columns as they are read in this way; times of day and words by their rows."""
+    found: list[FloatArray] = []
+    for at, many in _placed(way):
+        texts = columns[at] if many == 1 else map(".".join, zip(*columns[at : at + 2], strict=True))
+        values = np.array([float(text) if _NUMBER.fullmatch(text) else np.nan for text in texts])
+        lost = np.isnan(values)
+        values[lost] = (
+            np.interp(np.flatnonzero(lost), np.flatnonzero(~lost), values[~lost])
+            if not lost.all()
+            else np.flatnonzero(lost)
+        )
+        found.append(values)
+    return found
 
 
-def _evenness(values: FloatArray) -> int:
-    """Say whether a column rises in even steps, but for a clock that begins again; or rises."""
-    steps = np.diff(values)
-    middle = float(np.median(steps)) if len(steps) else 0.0
+def _evenness(numbers: Sequence[FloatArray]) -> int:
+    """Say whether the first of several columns rises evenly (2), but for a clock that begins again.
+
+    1 where it rises at all.
+    """
+    steps = np.diff(numbers[0])
+    middle = float(np.median(steps)) if len(steps) and len(numbers) > 1 else 0.0
     even = middle > 0.0 and float(np.mean(np.abs(steps / middle - 1.0) < 0.1)) > 0.9
-    return 2 * even or int(len(steps) > 0 and float(np.mean(steps >= 0.0)) > 0.99 and steps.any())
+    rises = len(numbers) > 1 and float(np.mean(steps >= 0.0)) > 0.98 and steps.any()
+    return 2 if even else int(rises)
+
+
+def _roughness(numbers: Sequence[FloatArray]) -> float:
+    """Sum the logarithms of how rough the columns are: what is torn from a number is noise."""
+    turns = [float(np.median(np.abs(np.diff(values, 2)))) for values in numbers]
+    spans = [float(np.ptp(values)) or 1.0 for values in numbers]
+    return float(np.sum(np.log(np.array(turns) / np.array(spans) + 1e-6)))
 
 
 def named(way: Sequence[int], row: str, layout: Layout) -> str:
@@ -362,8 +383,3 @@ def named(way: Sequence[int], row: str, layout: Layout) -> str:
 def short_of(cells: Sequence[str], layout: Layout) -> bool:
     """Say whether a row may be one whose last cells are empty: not between blanks."""
     return 0 < len(cells) < layout.width and layout.delimiter != " " and layout.is_number(cells[0])
-
-
-def rises(values: Sequence[float]) -> bool:
-    """Say whether every value is above the one before it."""
-    return all(a < b for a, b in pairwise(values))
