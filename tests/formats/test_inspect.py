@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pendpipe.cli import main
+from pendpipe.errors import InputError
 from pendpipe.formats import inspect, read
 from pendpipe.formats.table import clipped_samples, find_gaps, is_uniform, sample_rate, swing_of
 from pendpipe.recording import find_step, read_plain
@@ -156,3 +157,28 @@ def test_a_drive_that_is_switched_on_and_off_is_not_graded(off: float) -> None:
     cycle = np.arange(20000) / 100.0
     size = np.where(cycle % 50.0 < 25.0, 1.0, off)
     assert swing_of(size * np.cos(2.0 * np.pi * cycle)).graded < 0.03
+
+
+def test_why_prints_a_line_a_decision(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.csv"
+    rows = "".join(f"{t:.2f};{x:.5f};21\n" for t, x in zip(TIME, ANGLE, strict=True))
+    path.write_text(("t [s];theta;temperature\n" + rows).replace(".", ","))
+    assert main(["inspect", "--why", str(path)]) == 0
+    told = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    assert "column 1 't': time, in s" in told
+    assert "column 2 'theta': angle, no unit stated" in told
+    assert "columns separated by semicolons, decimal commas" in told
+    assert any(line.startswith("'theta' is in radians: its period") for line in told)
+    assert told[-1] == "so 2000 readings of theta, in rad"
+
+
+@pytest.mark.parametrize("head", ["Frequency,Amplitude", "f (Hz),Amplitude (rad)"])
+def test_a_spectrum_is_told_as_one(tmp_path: Path, head: str) -> None:
+    path = tmp_path / "a.csv"
+    frequency = np.arange(1.0, 200.0) / 50.0
+    size = 1.0 / (1.0 + (20.0 * (frequency - 1.0)) ** 2)
+    rows = "".join(f"{f:.3f},{x:.5f}\n" for f, x in zip(frequency, size, strict=True))
+    path.write_text(head + "\n" + rows)
+    for look in (inspect, read):
+        with pytest.raises(InputError, match="a spectrum, no recording of the swing"):
+            look(path)

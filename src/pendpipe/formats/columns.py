@@ -148,12 +148,19 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
     named = [c for c in table.columns if not readings and plain(c.name).startswith("period")]
     lasting = [c.label for c in (*named, *filter(_lasts, table.columns))]
     names = listed([column.label for column in table.columns])
+    counted = time is None or time.role != "time"
+    spectrum = [c.label for c in table.columns if counted and _counts_frequencies(c)]
     swing = "give the recording of the swing: "
     for wrong, problem, remedy in (
         (
             lasting and (named or time is None or counts or time.label in lasting),
             f"'{''.join(lasting[:1])}' holds periods, not a recording of the swing",
             f"{swing}periods alone tell no loss",
+        ),
+        (
+            spectrum,
+            f"'{''.join(spectrum[:1])}' counts frequencies: a spectrum, no recording of the swing",
+            "give the recording that it was made from",
         ),
         (
             falling and len(falling) == len(readings or falling),
@@ -199,6 +206,12 @@ def _only_falls(values: FloatArray) -> bool:
     # Of a swing as many sizes rise as fall; of a list few rise, but some may be alike.
     falls, rises = float(np.mean(steps < 0.0)), float(np.mean(steps > 0.0))
     return falls > max(0.4, 3.0 * rises)
+
+
+def _counts_frequencies(column: Column) -> bool:
+    """Whether a column of frequencies rises from row to row."""
+    named = plain(column.name).startswith(("freq", "f(hz")) or plain(column.unit) in ("hz", "khz")
+    return named and one_way(column.values) == 1.0
 
 
 def _lasts(column: Column) -> bool:
