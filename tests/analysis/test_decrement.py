@@ -291,7 +291,7 @@ def test_fit_and_diagnosis_print_the_same_baseline(
     time = np.arange(0.0, 60.0, 0.05)
     recording = recorded(decay(time), time, noise)
     points, part = measure_recording(recording, "recording")
-    fitted = fit_recording(part, points=points, restoring="linear")
+    fitted = fit_recording(part, points=points)
     assert fitted.method == method
     diagnosed = diagnose_recording(recording).diagnosis.baseline
     for name, estimate in fitted.parameters.items():

@@ -522,6 +522,12 @@ def result_of(
     b = parameters["b"]
     limit = quality_of_rate(parameters["frequency"].value, b) if b.value > 0.0 else None
     checks = check_decrement(points, law)
+    if len(goodness.p_values) > 1 and goodness.p_value >= LEVEL:
+        # Turning points that contradict a law whose residual is white are off themselves.
+        checks = tuple(
+            each._replace(seen_sd=abs(each.fitted - each.seen)) if each.contradicts else each
+            for each in checks
+        )
     p_values = (*goodness.p_values, *(check.p_value for check in checks))
     rest |= {name: Estimate(fixed[name], 0.0, "") for name in PARTS if name in fixed}
     result = FitResult(
