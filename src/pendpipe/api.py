@@ -221,6 +221,7 @@ def fit(
     fixed: Mapping[str, float] | None = None,
     volts_per_radian: float | None = None,
     points: TurningPoints | None = None,
+    clock_ppm: float | None = None,
     length_m: float | None = None,
     name: str | None = None,
 ) -> FitResult:
@@ -251,6 +252,8 @@ def fit(
         The sensor's constant, where the readings are volts and do not carry it.
     points
         Turning points measured before (`turning_points`): they name the decay.
+    clock_ppm
+        What the clock may be off by, in parts per million; it enters the errors.
     length_m
         Length of the pendulum whose displacement is read as L sin x (with ``restoring="sine"``).
     name
@@ -273,12 +276,13 @@ def fit(
     >>> print(result)  # doctest: +ELLIPSIS
     rod-pendulum.csv: angle, 50 Hz, 59.6 s, 52 swings from 4.94° to 1.51°   GREEN
       period, small swings  1.1454712(26) s  (1.1459 s at 4.21°)
+      clock                 one off by 50 ppm adds 6 × 10⁻⁵ s, which is not in the error ...
       Q                     162.27(20) at 4.21° (73.4 mrad), 138.39(12) at 2.73° (47.6 mrad), ...
       damping               to 1/e in 59.186(73) s, to 1/2 in 41.025(51) s, decrement ...
       energy goes to        62 % viscous or internal (b), 34 % dry friction (c), at 4.21°; no ...
       law                   −dy/dt = a y² + b y + c: a 0.0088(50) rad⁻¹ s⁻¹, b 0.01043(54) s⁻¹, ...
       misfit                the fit follows the swings to 0.3 %; nothing but noise is left
-    Copy: T0 = (1.1454712 ± 0.0000026) s; Q = 162.27 ± 0.20 at 73.4 mrad; 62 % of the loss there ...
+    Copy: T0 = (1.1454712 ± 0.0000026) s; Q = 162.27 ± 0.20 at 73.4 mrad; 62 % of the loss ...
     Next: pendpipe page FILE makes a sheet to hand out; --figure draws it, --json is for programs
     """
     _check_choice("method", method, ("waveform", "turning-points"))
@@ -290,6 +294,7 @@ def fit(
 
     from pendpipe.analysis.fit import fit_recording
     from pendpipe.analysis.fit.by_points import as_angles
+    from pendpipe.analysis.fit.result import with_clock
     from pendpipe.analysis.free_decay import measure_recording
 
     if points is None:
@@ -306,6 +311,14 @@ def fit(
         length_m=length_m,
         place=place,
     )
+    if clock_ppm is not None:
+        refuse_if(
+            not 0.0 <= clock_ppm < 1e6,
+            "clock_ppm",
+            f"{clock_ppm!r} is no part of a million",
+            "give a number from 0 on",
+        )
+        result = with_clock(result, clock_ppm)
     if points.unit != result["amplitude"].unit:
         # Of its rate, or of a position, the angle was fitted.
         points, _ = as_angles(points, position=points.unit == "m")

@@ -96,3 +96,12 @@ def test_damping_time_half_life_and_decrement_are_q_in_other_words() -> None:
     assert found["damping_time_s"].value == pytest.approx(1.0 / LOSS, rel=2e-3)
     assert found["half_life_s"].value == pytest.approx(math.log(2.0) / LOSS, rel=2e-3)
     assert found["logarithmic_decrement"].value == pytest.approx(LOSS * PERIOD, rel=2e-3)
+
+
+def test_what_the_clock_leaves_out_is_said_or_enters_the_error() -> None:
+    fit = fitted(viscous(TIME))
+    assert "one off by 50 ppm adds" in str(fit)
+    known = fitted(viscous(TIME), clock_ppm=20.0)
+    both = math.hypot(fit["period"].sd, 2e-5 * PERIOD)
+    assert known["period"].sd == pytest.approx(both, rel=1e-3)
+    assert "50 ppm" not in str(known)

@@ -56,6 +56,11 @@ _OWN: Final[Flags] = {
         "metavar": "M",
         "help": "length of a simple pendulum, m, as 0.600 or 0.600(1): prints g",
     },
+    "--clock-ppm": {
+        "type": number_within(0),
+        "metavar": "PPM",
+        "help": "what the clock may be off by, parts per million: it enters the errors",
+    },
     "--gravity": {
         "type": number_within(0),
         "metavar": "G",
@@ -154,6 +159,7 @@ def _fit(arguments: Arguments, say: Callable[[str], None] = tell) -> FitResult:
         baseline=arguments.baseline,
         fixed=fixed,
         length_m=arguments.length.value if arguments.length else None,
+        clock_ppm=arguments.clock_ppm,
         name=arguments.file,
     )
     return replace(

@@ -29,6 +29,8 @@ _KINDS: Final = {
     "1": "readings of unknown unit",
 }
 SHORT: Final = {"a": "drag ~ speed²", "b": "viscous or internal", "c": "dry friction"}
+_CLOCK: Final = 50e-6
+"""By what part a laboratory's clock may well be off."""
 _SLIGHT: Final = 0.05
 """Share of a loss below which it is not named."""
 _DIAGNOSE: Final = "pendpipe diagnose FILE says what the law lacks"
@@ -141,6 +143,9 @@ def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
         large = qualities[0]
         text += f"  ({large.period_s:.5g} s at {short_size(large.amplitude_rad, unit)})"
     yield small, text + _widened(wide.period if result.light != "red" else 1.0)
+    if result.clock_ppm is None and period.sd < _CLOCK * period.value:
+        moved = with_error(float(f"{_CLOCK * period.value:.1g}"), None, "s")
+        yield "clock", f"one off by 50 ppm adds {moved}, which is not in the error (--clock-ppm)"
     if qualities:
         found = ", ".join(
             f"{_number(each.quality_factor)} at {size(each.amplitude_rad, unit)}"

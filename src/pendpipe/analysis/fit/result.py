@@ -132,6 +132,9 @@ class FitResult:
         By what standard deviations were multiplied for what the law misses.
     hysteretic_share
         Part of b that the fitted law has as hysteretic; hardly any recording tells it.
+    clock_ppm
+        What the clock may be off by, in parts per million, where that is in the error of the
+        period.
     name
         Of the file that was fitted.
     motion
@@ -173,6 +176,7 @@ class FitResult:
     period_check: tuple[PeriodCheck, ...] = ()
     widening: Widening = field(default_factory=Widening)
     hysteretic_share: float = 0.5
+    clock_ppm: float | None = None
     name: str = field(default="", compare=False)
     motion: tuple[Eq8, Release] | None = field(default=None, repr=False, compare=False)
     points: TurningPoints | None = field(default=None, repr=False, compare=False)
@@ -406,6 +410,7 @@ class FitResult:
             "light": self.light,
             "light_reason": self.light_reason,
             "hysteretic_share": self.hysteretic_share,
+            "clock_ppm": self.clock_ppm,
             "quotable": list(self.quotable),
             "widening": self.widening._asdict(),
             "period_check": [check._asdict() for check in self.period_check],
@@ -464,6 +469,7 @@ class FitResult:
             light=content["light"],
             light_reason=content["light_reason"],
             hysteretic_share=content.get("hysteretic_share", 0.5),
+            clock_ppm=content.get("clock_ppm"),
             quotable=tuple(content.get("quotable", ())),
             widening=Widening(**content.get("widening", {})),
             period_check=tuple(PeriodCheck(**check) for check in content.get("period_check", ())),
@@ -579,6 +585,25 @@ def _warnings(result: FitResult, stretched: float) -> list[str]:
         ),
     )
     return [warning for is_so, warning in warnings if is_so]
+
+
+def with_clock(result: FitResult, clock_ppm: float) -> FitResult:
+    """Add to the errors what a clock that may be off by `clock_ppm` parts in a million adds.
+
+    Every time is stretched alike: the frequency, and the rates b (1/s), a and c, by the same part.
+    """
+    part = 1e-6 * clock_ppm
+    names = ("frequency", "a", "b", "c")
+    slope = np.array([result.value(n) if n in names else 0.0 for n in result.covariance_order])
+    covariance = result.covariance + part**2 * np.outer(slope, slope)
+    parameters = dict(result.parameters)
+    for name in names:
+        old = parameters[name]
+        sd = math.hypot(old.sd, part * old.value)
+        factor = sd / old.sd if old.sd > 0.0 else 1.0
+        low, high = (old.value + factor * (end - old.value) for end in old.bounds95)
+        parameters[name] = replace(old, sd=sd, interval95=(low, high))
+    return replace(result, parameters=parameters, covariance=covariance, clock_ppm=clock_ppm)
 
 
 def read_fit(path: str | Path) -> FitResult:
