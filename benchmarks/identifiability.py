@@ -12,6 +12,7 @@ each outside the wall family.
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -58,8 +59,7 @@ def patterns(design: Design, fit: JointFit) -> dict[str, NDArray[np.float64]]:
     number = [run.record for run in design.runs].index(RECORD)
     nothing = np.zeros(len(design.nuisances))
     plain = predict(design, (), nothing)
-    frequency = plain[number, 0]
-    viscous = plain[number, 1] - np.pi / (design.coefficient_s2 * frequency)
+    viscous = predict(replace(design, coefficient_s2=np.inf), (), nothing)[number, 1]
     found = {}
     for letter, (identifier, shape) in CAUSES.items():
         one = Candidate(named(identifier)[0].effect, shape)
@@ -124,7 +124,7 @@ def excess(design: Design) -> str:
     index = [[run.record for run in design.runs].index(name) for name in records]
     nothing = np.zeros(len(design.nuisances))
     plain = predict(design, (), nothing)
-    viscous = (plain[:, 1] - np.pi / (design.coefficient_s2 * plain[:, 0]))[index]
+    viscous = predict(replace(design, coefficient_s2=np.inf), (), nothing)[index, 1]
     lines = ["| cause | " + " | ".join(records) + " |", "|---|---|---|---|---|"]
     for letter, (identifier, shape) in CAUSES.items():
         one = Candidate(named(identifier)[0].effect, shape)

@@ -664,8 +664,7 @@ def causes(search: CampaignSearch) -> dict[str, Any]:
     free = np.where(design.has_prior, 0.0, fit.unknowns[:count])
     wet = np.flatnonzero(design.wet > 0.0)
     plain = predict(design, (), free)
-    solid = np.exp(-design.inputs(free).log_coefficient) * np.pi / plain[:, 0]
-    viscous = (plain[:, 1] - solid)[wet]
+    viscous = predict(replace(design, coefficient_s2=math.inf), (), free)[wet, 1]
     measured = fit.data.values[wet, 1]
     excess = (measured - plain[wet, 1]) / viscous
     sd = 1.0 / np.linalg.norm(fit.data.whitening[wet, :, 1], axis=-1) / viscous
