@@ -3,7 +3,8 @@
     python -m benchmarks.hostile             every row of the table
     python -m benchmarks.hostile pipe YAML   the rows with one of these words
 
-A row is right when its process ends within 10 s (of the processor, since others may be at work)
+A row is right when its process ends within 10 s (of the processor, since others may be at work;
+a diagnosis within 20)
 and 1 GB without a traceback, with the exit status that it should have and, where that is 2, one
 line of standard error that is the fault (notes on what was guessed may stand before it), and when
 what it left is as it should be. All rows together write the table in docs/integrity.md.
@@ -31,6 +32,7 @@ from pathlib import Path
 import yaml
 
 from benchmarks import journal
+from benchmarks.hostile_recordings import recordings
 from benchmarks.kills import Project
 from pendpipe.files import read_json, write_json
 from pendpipe.recording import read_plain
@@ -38,6 +40,7 @@ from pendpipe.report.page import BUDGET_BYTES
 
 ROOT = Path(__file__).resolve().parents[1]
 MOST_SECONDS = 10.0
+MOST_DIAGNOSIS_SECONDS = 20.0
 MOST_MB = 1000.0
 RIGHT = ((2,), (0, 2))
 """Statuses of an input that must be refused, and of one that may also be read."""
@@ -59,6 +62,8 @@ class Row:
         Says what is wrong with what the command has left in the folder.
     end
         A signal that the process gets once it has recorded something.
+    most_cpu_s
+        Seconds of the processor within which it must end.
     """
 
     name: str
@@ -66,6 +71,7 @@ class Row:
     statuses: tuple[int, ...] = RIGHT[0]
     left: Callable[[Path], str] = lambda _: ""
     end: signal.Signals | None = None
+    most_cpu_s: float = MOST_SECONDS
 
 
 def rows() -> Iterator[Row]:
@@ -124,6 +130,14 @@ def rows() -> Iterator[Row]:
         yield Row(f"{number.name} while recording", _recorder, (0,), _no_recording, number)
     for count in (100, 300):
         yield Row(f"page of {count} records", lambda f, n=count: _page(f, n), (0,), _too_large)  # type: ignore[misc]
+    for name, write in recordings():
+        yield Row(
+            f"diagnose: {name}",
+            lambda f, w=write: ["diagnose", str(w(f)), "--out", str(f / "out")],  # type: ignore[misc]
+            RIGHT[1],
+            _large_figure,
+            most_cpu_s=MOST_DIAGNOSIS_SECONDS,
+        )
 
 
 def main() -> None:
@@ -148,7 +162,7 @@ def main() -> None:
             )
             left = row.left(Path(folder)) if used.status in row.statuses else ""
         right = (
-            used.cpu_s < MOST_SECONDS
+            used.cpu_s < row.most_cpu_s
             and used.megabytes < MOST_MB
             and used.status in row.statuses
             and "Traceback" not in said
@@ -197,7 +211,7 @@ def _measured(words: list[str], folder: Path, end: signal.Signals | None) -> Use
             stdout=subprocess.DEVNULL,
             stderr=errors,
         )
-        stop = threading.Timer(6 * MOST_SECONDS, running.kill)
+        stop = threading.Timer(60 * MOST_SECONDS, running.kill)
         stop.start()
         if end is not None:
             while running.poll() is None and not any(
@@ -383,6 +397,11 @@ def _page(folder: Path, count: int) -> list[str]:
     call += ["--comparison", str(folder / "comparison.json")]
     call += ["--summary", str(folder / "campaign.json"), "--figures", f"{project.results}/figures"]
     return [*call, "--out", str(folder / "page.html")]
+
+
+def _large_figure(folder: Path) -> str:
+    large = [path.name for path in folder.glob("out/*.svg") if path.stat().st_size > 1e6]
+    return f"more than 1 MB: {', '.join(large)}" if large else ""
 
 
 def _too_large(folder: Path) -> str:
