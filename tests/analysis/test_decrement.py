@@ -242,6 +242,7 @@ def test_a_fit_that_did_not_settle_is_no_result(monkeypatch: pytest.MonkeyPatch)
         "jlefebvre-phy180/q2_data.csv",
         "martin8ner-pohl-eddy/1.3_100mA.csv",
         "martin8ner-pohl-eddy/1.3_200mA.csv",
+        "martinrobomaze-eulers-rod/d_4mm_l_100mm_50deg.txt",
         "kvlcc2-roll-decay/model_test_21337.csv",
     ],
 )

@@ -126,6 +126,9 @@ def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
     scale = 1.0 / np.sqrt(np.maximum(part.diagonal(), 1e-300))
     scales = scale[:, None] * scale
     result = np.zeros_like(normal)
+    if not np.isfinite(part).all():
+        # A search that got to where nothing moves has no errors, and does not count as settled.
+        return np.full_like(result, np.nan)
     result[np.ix_(free, free)] = scales * np.linalg.pinv(part * scales, rcond=1e-14, hermitian=True)
     return result
 
