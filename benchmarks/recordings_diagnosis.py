@@ -147,7 +147,7 @@ ANSWERED = (
     *("8050", "lab1_data", "damping_angle", "adip", "data2_14"),
     *("data32", "1.3_100mA", "21337", "filo0509", "dataset4"),
 )
-"""Recordings whose paragraph is printed."""
+"""Recordings whose answers are printed."""
 VISCOUS = ("1.3_100mA", "data32", "adip", "lab1_data")
 
 HEAD = """## What Eq. 8 lacks in them
@@ -170,7 +170,7 @@ beside the motion's 1.345 Hz: the beats come every 2.95 s. Amplitudes taken ever
 (4.46 s) alternate, with a period of 8.9 s.
 """
 
-ANSWERS_HEAD = """### Ten answers as they are printed
+ANSWERS_HEAD = """### Answers as they are printed
 
 What `pendpipe fit` and `pendpipe diagnose` print, for string pendulums (8050, lab1_data,
 damping_angle), rods (adip, data2_14, data32), a torsion wheel (1.3_100mA), a ship's roll (21337),
@@ -215,7 +215,8 @@ def answers(results: Path) -> list[str]:
         if fit.is_file() and "refused" not in read_json(fit):
             lines += [f"**{name}**, `pendpipe fit`:", "", "```", str(read_fit(fit)), "```", ""]
         if diagnosis.is_file():
-            lines += [f"**{name}**, `pendpipe diagnose`: {read_json(diagnosis)['statement']}", ""]
+            statement = str(read_json(diagnosis)["statement"])
+            lines += [f"**{name}**, `pendpipe diagnose`:", "", "```", statement, "```", ""]
     return lines
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.decrement import TOLERANCE, Decrement, Light
+from pendpipe.analysis.fit.decrement import TOLERANCE, Decrement, Light, is_off
 from pendpipe.analysis.fit.period import fit_period
 from pendpipe.analysis.fit.quality import relative_loss_sd
 from pendpipe.analysis.turning_points import TurningPoints
@@ -227,14 +227,20 @@ def _quotable(
         )
     else:
         quotable.append("period")
-    unseen = [each for each in checks if not each.confirms]
+    off = [each for each in checks if is_off(each)]
+    unseen = [each for each in checks if not each.confirms and each not in off]
     if len(checks) < 3:
         problems.append("Q: too few turning points confirm it")
-    elif unseen:
+    problems += [
+        f"Q at {compact(each.amplitude_rad, unit)}: the turning points show one that is"
+        f" {abs(100.0 * each.excess):.0f} % {'higher' if each.excess > 0.0 else 'lower'}"
+        for each in off
+    ]
+    if unseen:
         where = ", ".join(compact(each.amplitude_rad, unit) for each in unseen)
         known = max(each.seen_sd / abs(each.seen) for each in unseen)
         problems.append(f"Q at {where}: the turning points show it to {100.0 * known:.0f} % only")
-    else:
+    if len(checks) >= 3 and not (off or unseen):
         quotable.append("Q")
         if all(each.dominant for each in result.quality_factors):
             quotable += ["losses"] if refuted else ["losses", "a", "b", "c"]

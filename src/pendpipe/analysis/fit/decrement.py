@@ -202,3 +202,13 @@ def _slow_loss(law: Eq8, amplitude: float) -> float:
     """Eq. 13: a y + b + c/y."""
     b = law.hysteretic + law.viscous
     return law.quadratic * amplitude + b + law.coulomb / amplitude
+
+
+_OFF: Final = 2.0
+"""Standard deviations of the turning points beyond which a loss is off."""
+
+
+def is_off(check: Decrement) -> bool:
+    """Whether a loss misses the turning points' by more than 5 % and by more than their errors."""
+    missed = abs(check.fitted - check.seen)
+    return missed > TOLERANCE * abs(check.seen) and missed > _OFF * check.seen_sd

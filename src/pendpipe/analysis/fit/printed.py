@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendpipe.analysis.fit.decrement import is_off
 from pendpipe.analysis.fit.quality import LOSSES, Quality
 from pendpipe.analysis.turning_points import BEAT
 from pendpipe.dynamics import Eq8, Release, turning_points
@@ -245,7 +246,8 @@ def sentence(result: FitResult) -> str:
 
 
 def _unseen(result: FitResult) -> set[float]:
-    return {each.amplitude_rad for each in result.decrement_check if not each.confirms}
+    checks = result.decrement_check
+    return {each.amplitude_rad for each in checks if is_off(each) or not each.confirms}
 
 
 def following(result: FitResult) -> str:
