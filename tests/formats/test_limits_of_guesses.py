@@ -337,6 +337,14 @@ def order(time: np.ndarray, **given: float) -> guess.TimeBase:
     return guess._in_order(table, choice, base(time), 1.0, ReadOptions(**given))
 
 
+@pytest.mark.parametrize("start", [0.0, 1e16])
+def test_blocks_under_one_stamp_are_counted_where_the_clock_has_digits_left(start: float) -> None:
+    stamps = guess.TimeBase(start + np.repeat(2.0 * np.arange(40), 5), np.arange(200))
+    guess._count_rows(guess.Choice(None, False, (), ()), stamps)
+    even = np.ptp(np.diff(stamps.time_s)) < 1e-9
+    assert even == (start == 0.0)
+
+
 @pytest.mark.parametrize("wrong", [30, 77])
 def test_a_lone_stamp_out_of_order_is_interpolated(wrong: int) -> None:
     time = 0.5 * np.arange(100.0)

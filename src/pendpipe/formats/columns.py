@@ -781,9 +781,10 @@ def _count_rows(_choice: Choice, base: TimeBase) -> None:
     last = int(np.max(np.flatnonzero(np.diff(base.time_s) == 0.0), initial=-2)) + 2
     for rows in sorted({whole, last}, reverse=True):
         even = _rounded(base.time_s[:rows], base.lines)
-        if even is None:
+        # So far from its zero a clock has no digits left between the rows.
+        interval = 0.0 if even is None else float(np.diff(even).min())
+        if even is None or not interval > 0.0:
             continue
-        interval = np.diff(even).min()
         frames = round((even[-1] - even[0]) / interval) + 1 - len(even)
         lost = f", with {frames} missing" if frames else ""
         until = f" until {even[-1]:.6g} s" if rows < whole else ""
