@@ -36,14 +36,14 @@ _MARKS: Final = re.compile(
     rb'|<meta name="generator" content="pendpipe '
     rb"|<(?:dc:title|desc)>pendpipe\b"  # SVG
     rb"|\A\x89PNG(?s:.){0,200}tEXtSoftware\0pendpipe"
-    rb"|\A%PDF(?s:.)*/(?:Creator|Producer) \(pendpipe"
+    rb"|/Creator \(pendpipe\)(?s:.)*%%EOF\s*\Z"  # PDF
     rb"|\0made by pendpipe [^\0]*\0\Z"  # WinDaq: behind its last comment
     rb"|\x07made_by\x18.pendpipe (?s:.)*PAR1\Z"
     rb'|\A"record","fluid","branch","pendulum","T0_s",'  # for spreadsheets, which know no remarks
     rb"|\A(?:\xef\xbb\xbf)?file,light,T0_s,T0_sd_s,"
     rb"|\A% made_by: pendpipe "  # LaTeX
 )
-_ENDS: Final = 1 << 13
+_ENDS: Final = 1 << 15
 """So many bytes at either end are searched for marks."""
 _RAW: Final = re.compile(rb'\A\{"format": "pendpipe-raw"')
 _OUT: Final = ("-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")

@@ -38,6 +38,7 @@ COMMANDS: dict[str, list[str]] = {
     "calibrate": ["calibrate", "{table}", "--out", "{out}"],
 }
 """Commands with an output, each with its own input."""
+FORM = {"page": "mine.html"}
 INPUT = {"simulate": "model", "calibrate": "table"}
 
 
@@ -116,7 +117,7 @@ def test_a_file_of_others_is_replaced_only_with_force(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    out = tmp_path / "mine.csv"
+    out = tmp_path / FORM.get(command, "mine.csv")
     out.write_bytes(content)
     words = call(command, out, given)
     assert main(words) == 2
@@ -135,10 +136,10 @@ def test_what_a_command_has_written_it_may_write_again(
     given: dict[str, Path], command: str, tmp_path: Path
 ) -> None:
     for _ in range(2):
-        assert main(call(command, tmp_path / "result.csv", given)) == 0
+        assert main(call(command, tmp_path / FORM.get(command, "mine.csv"), given)) == 0
 
 
-@pytest.mark.parametrize("form", ["svg", "png"])
+@pytest.mark.parametrize("form", ["svg", "png", "pdf"])
 def test_a_figure_replaces_a_figure_of_ours_and_no_other(
     given: dict[str, Path], tmp_path: Path, form: str
 ) -> None:

@@ -36,11 +36,11 @@ class Sheet(NamedTuple):
 
 def run(arguments: Arguments) -> int:
     """Fit, diagnose, and write the page, or a page each."""
-    from pendpipe.files import check_output, write_whole
+    from pendpipe.files import check_output, is_stream, write_whole
 
     out = arguments.out
     refuse_if(
-        out and out != "-" and Path(out).suffix.lower() not in (".html", ".htm"),
+        out and not is_stream(out) and Path(out).suffix.lower() not in (".html", ".htm"),
         f"--out {out}",
         "its form is unknown",
         "end its name in .html",

@@ -295,6 +295,7 @@ def save(
     metadata: dict[str, dict[str, Any]] = {
         "svg": {"Date": None, "Creator": "pendpipe"},
         "png": {"Software": "pendpipe"},
+        "pdf": {"Creator": "pendpipe", "CreationDate": None},
     }
     with mpl.rc_context(saving):
         for path in written:
