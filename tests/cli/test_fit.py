@@ -128,6 +128,12 @@ def test_the_files_of_a_class_that_agree_are_put_together(
     assert together["T0"]["p_value"] > 1e-3
 
 
+def test_different_pendulums_have_no_mean(capsys: pytest.CaptureFixture[str]) -> None:
+    """1.15 and 2.01 s: of two values none is the class's."""
+    assert cli.main(["fit", ROD, STRING]) == 0
+    assert "mean" not in capsys.readouterr().out
+
+
 def test_a_length_with_its_error_makes_g_with_its_error(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

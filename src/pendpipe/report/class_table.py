@@ -30,6 +30,8 @@ COLUMNS: Final = (
 FORMS: Final = (".json", ".csv", ".xlsx", ".html", ".tex")
 _AGREES: Final = 5.0
 """Standard deviations, or robust ones of the class, within which a file agrees with its median."""
+_ALIKE: Final = {"T0": 0.03, "Q": 0.3}
+"""Part by which those of a class may differ: beyond, they are of different pendulums."""
 _CHANCE: Final = 0.001
 """Probability of a larger chi^2 below which the values differ by more than their errors."""
 
@@ -136,24 +138,36 @@ def record(fitted: Fitted) -> dict[str, Any]:
 def together(fits: Sequence[Fitted]) -> list[Together]:
     """Return mean, scatter and chi^2 of T0 and Q over the files that agree."""
     found = [each.fit for each in fits if each.fit is not None and each.fit.light != "red"]
-    of_q = [fit.quality_factors[0].quality_factor for fit in found if "Q" in fit.quotable]
-    of_t = [fit.period for fit in found if "period" in fit.quotable]
+    timed = [fit for fit in found if "period" in fit.quotable]
+    one = [timed[k] for k in _agreeing("T0", [fit.period for fit in timed])]
+    lossy = [fit.quality_factors[0].quality_factor for fit in one if "Q" in fit.quotable]
+    alike = [lossy[k] for k in _agreeing("Q", lossy)]
+    groups = (("T0", [fit.period for fit in one], len(timed)), ("Q", alike, len(lossy)))
+    return [_together(name, kept, of) for name, kept, of in groups if len(kept) > 1]
+
+
+def _agreeing(name: str, values: Sequence[Estimate]) -> list[int]:
+    """Return which of some values agree with their median."""
+    if not values:
+        return []
+    middle = statistics.median(each.value for each in values)
+    robust = 1.4826 * statistics.median(abs(each.value - middle) for each in values)
+    spread = min(_AGREES * robust, _ALIKE[name] * abs(middle))
     return [
-        _together(name, values) for name, values in (("T0", of_t), ("Q", of_q)) if len(values) > 1
+        k
+        for k, each in enumerate(values)
+        if abs(each.value - middle) <= max(_AGREES * each.sd, spread)
     ]
 
 
-def _together(name: str, values: Sequence[Estimate]) -> Together:
-    middle = statistics.median(each.value for each in values)
-    robust = 1.4826 * statistics.median(abs(each.value - middle) for each in values)
-    kept = [each for each in values if abs(each.value - middle) <= _AGREES * max(each.sd, robust)]
+def _together(name: str, kept: Sequence[Estimate], of: int) -> Together:
     weights = [each.sd**-2 for each in kept]
     mean = sum(w * each.value for w, each in zip(weights, kept, strict=True)) / sum(weights)
     chi2 = sum(w * (each.value - mean) ** 2 for w, each in zip(weights, kept, strict=True))
     scatter = statistics.stdev([each.value for each in kept]) if len(kept) > 1 else 0.0
-    estimate = Estimate(mean, sum(weights) ** -0.5, values[0].unit)
+    estimate = Estimate(mean, sum(weights) ** -0.5, kept[0].unit)
     p_value = chi_square_p_value(chi2, len(kept) - 1)
-    return Together(name, len(kept), len(values), estimate, scatter, chi2, p_value)
+    return Together(name, len(kept), of, estimate, scatter, chi2, p_value)
 
 
 HEAD: Final = ("file", "light", "T0", "Q", "at", "loses most by", "remark")
