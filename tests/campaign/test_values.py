@@ -1,16 +1,21 @@
 """The first table: what every record measures by itself, with what all records share."""
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from pendpipe import physics
+from pendpipe.analysis.fit.result import FitResult
 from pendpipe.campaign.design import Design
 from pendpipe.campaign.effects import DRAG_OF_ONE_RECORD, RATE_EXPONENT
 from pendpipe.campaign.fit import Candidate, Measured, named, only
 from pendpipe.campaign.values import WORST_LINE, Values, campaign_values
+from pendpipe.configuration.load import Record
 from pendpipe.configuration.models import Fluid
+from pendpipe.stages.results import RecordResult, twins
+from pendpipe.stages.separate import is_line, separated
 
 from .campaigns import data, default
 
@@ -232,3 +237,28 @@ def test_a_record_near_balance_is_fitted_from_far() -> None:
     found = values_of(design, measured)
     assert found.fit.chi2 < 2.2**2
     assert found.quantities["frequency"][low_1] == pytest.approx(frequency, rel=1e-5)
+
+
+def test_no_number_is_made_of_a_line_that_the_benchmark_contradicts() -> None:
+    """A loss torque that depends on the rate: no k, no Q_v, and the test of the line stays."""
+    design = default()
+    found = values_of(design, data(design, (Candidate(RATE_EXPONENT),), (0.1,)))
+    assert not is_line(found)
+    assert separated(found, "water-low-7") == {}
+    sound = values_of(design, data(design, seed=1))
+    assert is_line(sound)
+    assert set(separated(sound, "water-low-7")) == {
+        "quality_factor_hysteretic",
+        "quality_factor_viscous",
+    }
+    assert set(separated(sound, "air-03")) == {"quality_factor_hysteretic"}
+
+
+def test_the_same_recording_counts_once() -> None:
+    def result(name: str, frequency: float) -> RecordResult:
+        numbers = {"frequency": frequency, "b": 0.011}
+        return RecordResult(Record(name, "file.csv"), Mock(FitResult, value=numbers.get), {})
+
+    several = [result("one", 0.5), result("two", 0.5), result("three", 0.6), result("four", 0.5)]
+    refused = RecordResult(Record("five", "file.csv"), None, {}, "no motion")
+    assert twins([*several, refused]) == {"two": "one", "four": "one"}
