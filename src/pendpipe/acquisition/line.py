@@ -54,8 +54,8 @@ def check_port(port: str) -> None:
         mode = 0
     for wrong, problem in (
         ("://" in port or port.startswith("simulated:"), "this is no port of an instrument"),
-        (not mode, "there is no such port"),
-        (not stat.S_ISCHR(mode), "this is no serial port"),
+        # Whether there is one at all is told by opening it.
+        (mode and not stat.S_ISCHR(mode), "this is no serial port"),
     ):
         refuse_if(wrong, port, problem, _FORMS if "port of" in problem else _LIST)
 
