@@ -248,7 +248,7 @@ def test_the_commands_write_what_the_contract_asks(
     assert cli.main(["turning-points", str(recording), "--out", str(points)]) == 0
     call = ["fit", str(recording), "--turning-points", str(points), "--out", str(out)]
     assert cli.main([*call, "--seed", "5"]) == 0
-    assert "Q limit" in capsys.readouterr().out
+    assert "πf/b" in capsys.readouterr().out
     content = json.loads(out.read_text())
     assert content["provenance"]["volts_per_radian"] == 3.85
     assert content["provenance"]["seed"] == 5
