@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pendpipe import cli
+from pendpipe import cli, manifest
 
 ROD = str(Path(__file__).parents[2] / "examples/rod-pendulum.csv")
 
@@ -29,7 +29,11 @@ def test_a_commands_answer_is_one_json_object(
     table = tmp_path / "caliper.csv"
     rows = [f"{0.01 * step},{0.0385 * step + 0.001 * (step % 2)}" for step in range(-5, 6)]
     table.write_text("angle_rad,volts\n" + "\n".join(rows) + "\n", encoding="utf-8")
-    (tmp_path / "results").mkdir()
-    words = [word.format(folder=tmp_path / "results", table=table) for word in command]
+    results = tmp_path / "results"
+    results.mkdir()
+    with manifest.job(results, "separate") as running:
+        (results / "separation.json").write_text("{}", encoding="utf-8")
+        running.outputs.append(results / "separation.json")
+    words = [word.format(folder=results, table=table) for word in command]
     assert cli.main([*words, "--json"]) == 0
     assert key in json.loads(capsys.readouterr().out)

@@ -74,14 +74,14 @@ class Together(NamedTuple):
 
 
 def form_of(out: str | Path) -> str:
-    """Return the form that a file's suffix asks for.
+    """Return the form that a file's suffix asks for; JSON where it has none.
 
     Raises
     ------
     InputError
         If nothing is written in that form.
     """
-    suffix = ".json" if is_stream(out) else Path(out).suffix.lower()
+    suffix = ".json" if is_stream(out) else Path(out).suffix.lower() or ".json"
     refuse_if(
         suffix not in FORMS,
         f"--out {out}",
