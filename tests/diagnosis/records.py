@@ -11,7 +11,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from pendpipe.analysis.fit.result import FitResult
+from pendpipe.analysis.fit.result import FitResult, Restoring
 from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.begin import Beginning, begin
@@ -72,13 +72,13 @@ def recording(readings: FloatArray, seed: int) -> Recording:
     return Recording(TIME_S[:count], readings + white(seed, count), "angle_rad")
 
 
-def beginning_of(record: Recording) -> Beginning:
+def beginning_of(record: Recording, restoring: Restoring | None = None) -> Beginning:
     """What a diagnosis starts from, as in `diagnose_recording`."""
     from pendpipe.analysis.fit import fit_recording
     from pendpipe.analysis.free_decay import measure_recording
 
     points, part = measure_recording(record, "the test")
-    fit = fit_recording(part, points=points)
+    fit = fit_recording(part, points=points, restoring=restoring)
     return begin(prepare(part, "the test"), points, fit, baseline="eq8", fixed={})
 
 

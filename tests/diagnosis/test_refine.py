@@ -32,13 +32,13 @@ from .records import (
 )
 
 
-def test_circular_error_of_half_a_radian_is_fitted_from_the_baselines_start() -> None:
-    """Its frequency is off by 1.6 %, more than a turn in the record."""
+def test_circular_error_of_half_a_radian_is_fitted_from_the_start_of_a_law_with_x() -> None:
+    """That law's frequency is off by 1.6 %, more than a turn in the record."""
     effect = by_identifier("circular-error")
     truth = TRUTH.copy()
     truth[START] = 0.5
     readings = Model(TIME_S, INTERVAL_S, (effect,)).reading(np.append(truth, 1.0))
-    start = beginning_of(recording(readings, 2))
+    start = beginning_of(recording(readings, 2), restoring="linear")
     noise = white_noise(start.data, NOISE_RAD)
     turns = abs(start.value[OMEGA] - truth[OMEGA]) * TIME_S[-1] / (2.0 * np.pi)
     assert turns > 0.5

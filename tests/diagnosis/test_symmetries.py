@@ -111,9 +111,13 @@ def fits_agree(name: str, one: View, other: View) -> None:
     assert second.residual_rms_rad == pytest.approx(size * first.residual_rms_rad, rel=1e-6)
     assert len(first.decrement_check) == len(second.decrement_check) > 0
     for before, after in zip(first.decrement_check, second.decrement_check, strict=True):
-        rates = np.array(before[1:]) / change.slower
+        rate = 1.0 / change.slower
         assert after.amplitude_rad == pytest.approx(size * before.amplitude_rad, rel=1e-4)
-        assert after[1:] == pytest.approx(rates, rel=1e-3)
+        assert after.fitted == pytest.approx(rate * before.fitted, rel=1e-3)
+        assert after.seen == pytest.approx(rate * before.seen, rel=1e-3)
+        assert after.seen_sd == pytest.approx(rate * before.seen_sd, rel=1e-3)
+        # A ratio of variances, in any units.
+        assert after.scatter == pytest.approx(before.scatter, rel=1e-3)
 
 
 def diagnoses_agree(name: str, one: View, other: View) -> None:
