@@ -18,8 +18,9 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from pendpipe.acquisition.devices.simulated import Signal
-    from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring
+    from pendpipe.analysis.fit.result import Baseline, FitResult, Method
     from pendpipe.analysis.free_decay import FreeDecay
+    from pendpipe.analysis.torque import Restoring
     from pendpipe.analysis.turning_points import TurningPoints
     from pendpipe.diagnosis.run import Outcome
     from pendpipe.diagnosis.several import JointOutcome

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pendpipe.analysis.fit.by_points import fit_envelope, fit_points
-from pendpipe.analysis.fit.period import fit_period, period_excess
+from pendpipe.analysis.fit.period import fit_period
+from pendpipe.analysis.torque import period_excess
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points

@@ -14,10 +14,10 @@ from scipy.special import ellipe, ellipk
 
 from pendpipe import cli
 from pendpipe.analysis.fit import fit_recording
-from pendpipe.analysis.fit.by_points import fit_energies, restoring_of, sine_coefficient
+from pendpipe.analysis.fit.by_points import fit_energies
 from pendpipe.analysis.fit.by_waveform import start_values
 from pendpipe.analysis.fit.least_squares import covariance
-from pendpipe.analysis.fit.period import elliptic
+from pendpipe.analysis.torque import elliptic, restoring_of, sine_coefficient
 from pendpipe.analysis.turning_points import TurningPoints, find_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, turning_points

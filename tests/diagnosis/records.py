@@ -11,7 +11,8 @@ from unittest.mock import patch
 
 import numpy as np
 
-from pendpipe.analysis.fit.result import FitResult, Restoring
+from pendpipe.analysis.fit.result import FitResult
+from pendpipe.analysis.torque import Restoring
 from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.begin import Beginning, begin

@@ -9,7 +9,7 @@ import pytest
 from scipy.special import ellipj
 
 from pendpipe.effects.catalogue import by_identifier
-from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN, circular_error_of_rate
+from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN
 from pendpipe.effects.model import Model
 
 from .lock_in import Lines, lock_in
@@ -103,12 +103,14 @@ def test_a_mean_of_readings_is_followed_in_all_harmonics() -> None:
 
 
 @pytest.mark.parametrize("amplitude", [0.3, 0.8, 1.4])
-def test_the_angular_velocity_of_a_pendulum_is_a_jacobi_cn(amplitude: float) -> None:
-    """It is 2 omega k cn(omega t, k), k = sin(y/2), from the passage through the middle."""
+def test_the_angular_velocity_of_a_pendulum_is_a_jacobi_sd(amplitude: float) -> None:
+    """From rest at y it is -2 omega k k' sd(omega t, k), k = sin(y/2), k' = cos(y/2)."""
     k = math.sin(0.5 * amplitude)
-    values = np.append(baseline(start=2.0 * OMEGA * k), 1.0)
-    model = Model(TIME, 0.02, (circular_error_of_rate,), order=48)
-    exact = 2.0 * OMEGA * k * ellipj(OMEGA * TIME, k * k)[1]
+    values = np.append(baseline(start=amplitude), 1.0)
+    effects = (by_identifier("circular-error"),)
+    model = Model(TIME, 0.02, effects, order=48, seen="rate")
+    sn, _, dn, _ = ellipj(OMEGA * TIME, k * k)
+    exact = -2.0 * OMEGA * k * math.cos(0.5 * amplitude) * sn / dn
     assert model.reading(values) == pytest.approx(exact, abs=1e-5)
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from pendpipe.analysis.coarse import HARDLY, between
 from pendpipe.analysis.half_cycles import SEEN, HalfCycles, half_cycles, usual_half_period
 from pendpipe.analysis.noise import noise_rms
+from pendpipe.analysis.torque import may_be_sine, sine_coefficient
 from pendpipe.analysis.turning_points.find import find_turning_points
 from pendpipe.analysis.turning_points.table import BEAT, Cut, TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray
@@ -687,8 +688,6 @@ def _as_pendulum(recording: Recording, points: TurningPoints) -> Recording | Non
 
     A step, or a size, tells no unit: only one of them makes the period that of sin x.
     """
-    from pendpipe.analysis.fit.by_points import may_be_sine, sine_coefficient
-
     if recording.unit != "1" or recording.quantity != "reading":
         return None
     agreeing = []

@@ -7,9 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import as_angles, held_values, restoring_of
+from pendpipe.analysis.fit.by_points import as_angles, held_values
 from pendpipe.analysis.fit.by_waveform import start_values, usable_span
-from pendpipe.analysis.fit.result import Baseline, FitResult, Restoring
+from pendpipe.analysis.fit.result import Baseline, FitResult
+from pendpipe.analysis.torque import Restoring, restoring_of
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.analysis.two_modes import two_modes

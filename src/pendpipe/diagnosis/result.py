@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, NamedTuple
 
-from pendpipe.analysis.fit.result import FitResult, Restoring
+from pendpipe.analysis.fit.result import FitResult
+from pendpipe.analysis.torque import Restoring
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.cycles import SmallSwings
 from pendpipe.diagnosis.held_out import HeldOut

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from pendpipe.analysis.fit.by_points import check_fixed
-from pendpipe.analysis.fit.result import Baseline, FitResult, Restoring
+from pendpipe.analysis.fit.result import Baseline, FitResult
+from pendpipe.analysis.torque import Restoring
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.arrays import FloatArray

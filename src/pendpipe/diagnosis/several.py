@@ -17,8 +17,8 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.period import TOP, swing_phase
 from pendpipe.analysis.fit.result import Baseline, units
+from pendpipe.analysis.torque import TOP, swing_phase
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning

@@ -8,14 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import (
-    as_angles,
-    check_fixed,
-    fit_points,
-    may_be_sine,
-    restoring_of,
-    told_apart,
-)
+from pendpipe.analysis.fit.by_points import as_angles, check_fixed, fit_points
 from pendpipe.analysis.fit.by_waveform import (
     ODDS,
     Fitted,
@@ -23,7 +16,8 @@ from pendpipe.analysis.fit.by_waveform import (
     waveform_result,
 )
 from pendpipe.analysis.fit.goodness import LEVEL, Goodness
-from pendpipe.analysis.fit.result import Baseline, FitResult, Method, Restoring, read_fit
+from pendpipe.analysis.fit.result import Baseline, FitResult, Method, read_fit
+from pendpipe.analysis.torque import Restoring, may_be_sine, restoring_of, told_apart
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.find import turning_points_of
 from pendpipe.analysis.turning_points.measure import Samples, prepare

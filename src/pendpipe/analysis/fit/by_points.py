@@ -7,7 +7,7 @@ amplitude: they also tell which torque the half swings favour, and where fits of
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -21,8 +21,9 @@ from pendpipe.analysis.fit.least_squares import (
     minimise,
     moved,
 )
-from pendpipe.analysis.fit.period import TOP, Period, elliptic, fit_period, phases, swing_phase
-from pendpipe.analysis.fit.result import TORQUES, Baseline, FitResult, Restoring, result_of
+from pendpipe.analysis.fit.period import Period, fit_period
+from pendpipe.analysis.fit.result import Baseline, FitResult, result_of
+from pendpipe.analysis.torque import TOP, Restoring, clear, elliptic, swing_phase
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
@@ -190,8 +191,6 @@ def _with_held(
 
 
 _LATE: Final = 3.0
-_CLEAR: Final = 3.0
-"""Standard deviations by which an amplitude stands out of the noise."""
 HELD: Final = ("a", "b", "c", "amplitude", "offset")
 
 
@@ -245,13 +244,6 @@ def envelope_and_period(
         points, envelope.amplitude, rates, share=taken, held=omega, restoring=restoring
     )
     return envelope, period, share
-
-
-def clear(points: TurningPoints, least: float = 0.0) -> TurningPoints:
-    """Take those below the top that stand out of the noise, and above a part of the largest."""
-    amplitude = points.amplitude_rad
-    seen = (amplitude > _CLEAR * points.angle_sd_rad) & (amplitude < TOP)
-    return points.chosen(seen & (amplitude > least * np.max(amplitude, where=seen, initial=0.0)))
 
 
 def fit_points(
@@ -342,47 +334,6 @@ def _numbers(
 
 _ROUNDS: Final = 4
 """In which the frequency of small swings and their angles settle."""
-_LARGE: Final = 0.2
-"""Of the largest amplitude: below, sin x lengthens the period by 4 % of what it does there."""
-_FEWEST: Final = 6
-SEEN: Final = 3.0
-"""Standard deviations from which an amplitude, or a coefficient, is seen, and up to which the
-coefficient may be off."""
-_AGREES: Final = 2.0
-"""Standard deviations within which the coefficient agrees with 1 where it has to tell by itself."""
-_NEAR: Final = 0.2
-"""How near to 1 it must be where sin x removes most of chi^2."""
-_PENDULUM: Final = 0.25
-"""Amplitude in rad from which sin x lengthens the period by 0.4 %, more than frequencies wander:
-what swings so far is taken for a pendulum unless its half cycles speak against it."""
-
-
-class Coefficient(NamedTuple):
-    """How much of sin x the times of the turning points ask for: 0 nothing, 1 all of it."""
-
-    value: float
-    sd: float
-    """From the scatter of the times, and what a drift of the frequency would change."""
-    removed: float
-    """Part of chi^2 of the times that the whole of sin x removes."""
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the times alone ask for sin x.
-
-        The coefficient is seen and agrees with 1; or sin x removes most of chi^2, and the
-        coefficient is within 0.2 of 1, or as near as a drift would bring it.
-        """
-        off = abs(self.value - 1.0)
-        near = off < _AGREES * self.sd and self.value > SEEN * self.sd
-        return near or (self.removed > 0.5 and off < max(_NEAR, self.sd))
-
-    @property
-    def excludes_sine(self) -> bool:
-        """Whether the whole of sin x contradicts the times, a drift of the frequency granted."""
-        return abs(self.value - 1.0) > SEEN * self.sd
-
-
 GRAVITY: Final = 9.80665
 """Standard, m/s^2."""
 
@@ -447,81 +398,6 @@ def as_angles(
         step_rad=points.step_rad / omega,
         unit="rad",
     ), None
-
-
-def told_apart(points: TurningPoints, readings: int, noise: float) -> float:
-    """Chi^2 by which x would miss a pendulum of sin x: what no frequency makes up for."""
-    part = clear(points)
-    if len(part) < 3:
-        return 0.0
-    amplitude = part.amplitude_rad
-    swings = (swing_phase(amplitude, "sine") - math.pi) * np.diff(part.half_cycle)
-    late = np.concatenate([[0.0], np.cumsum(swings)])
-    weight = amplitude[:, None]
-    line = np.stack([np.ones_like(late), part.half_cycle], axis=1)
-    left = amplitude * late - weight * line @ np.linalg.lstsq(weight * line, amplitude * late)[0]
-    in_half_cycle = readings / max(float(np.ptp(points.half_cycle)), 1.0)
-    return 0.5 * in_half_cycle * float(left @ left) / noise**2
-
-
-def restoring_of(
-    points: TurningPoints, coefficient: Coefficient | None = None, *, stated: bool = True
-) -> Restoring:
-    """Which torque the half cycles favour.
-
-    Where it is `stated` that the readings are angles, swings beyond 0.25 rad are a pendulum's
-    unless the half cycles exclude sin x; else the half cycles must ask for it.
-    """
-    if not may_be_sine(points):
-        return "linear"
-    coefficient = coefficient or sine_coefficient(points)
-    wide = abs(float(clear(points).angle_rad[0])) > _PENDULUM
-    pendulum = stated and wide and not coefficient.excludes_sine
-    return "sine" if coefficient.agrees or pendulum else "linear"
-
-
-def may_be_sine(points: TurningPoints) -> bool:
-    """Whether these are angles below the top, enough of them clear of the noise."""
-    inside = points.unit == "rad" and float(np.max(points.amplitude_rad)) < math.pi
-    return inside and len(clear(points)) >= 3
-
-
-def sine_coefficient(points: TurningPoints) -> Coefficient:
-    """Fit the times with a free coefficient of sin x, at the larger amplitudes.
-
-    A half swing lasts [pi (1 + losses) + eta (K + K' - pi)]/omega: the times are linear in
-    1/omega and in eta/omega. The level's error makes them alternate.
-
-    By what the coefficient changes if the frequency may drift in time, it is uncertain too.
-    """
-    part = clear(points, _LARGE)
-    if len(part) < _FEWEST:
-        # Of a strong loss few are large.
-        part = clear(points).first(_FEWEST)
-    if len(part) < _FEWEST or points.unit != "rad":
-        return Coefficient(0.0, math.inf, 0.0)
-    amplitude, omega = part.amplitude_rad, 2.0 * math.pi * part.apparent_frequency_hz
-    losses = (*loss_rates(part.time_s, amplitude, part.angle_sd_rad).tolist(), 0.5)
-    plain, phase = (phases(part, amplitude, losses, omega, torque) for torque in TORQUES)
-    weight = 1.0 / part.time_sd_s
-    right = (part.time_s - part.time_s[0]) * weight
-
-    def fitted(*columns: FloatArray) -> tuple[float, float, float]:
-        """The second factor over the first, its error, and chi^2; the level's error alternates."""
-        design = np.stack([*columns, np.ones_like(plain), part.side], axis=1) * weight[:, None]
-        inverse = np.linalg.pinv(design, rcond=1e-13)
-        values = inverse @ right
-        rest = right - design @ values
-        chi2 = float(rest @ rest)
-        noise = math.sqrt(chi2 / max(len(part) - len(values), 1)) * np.linalg.norm(inverse[1])
-        return float(values[1] / values[0]), float(noise / values[0]), chi2
-
-    drift = np.cumsum(np.linspace(-1.0, 1.0, len(part)) * np.diff(plain, prepend=0.0))
-    value, error, _ = fitted(plain, phase - plain)
-    drifting, *_ = fitted(plain, phase - plain, drift)
-    (*_, linear), (*_, sine) = fitted(plain), fitted(phase)
-    removed = 1.0 - sine / linear if linear > 0.0 else 0.0
-    return Coefficient(value, math.hypot(error, drifting - value), removed)
 
 
 NAMES: Final = (

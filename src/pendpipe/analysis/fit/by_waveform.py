@@ -19,7 +19,6 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.fit.by_points import (
-    clear,
     envelope_and_period,
     held_values,
     loss_rates_of,
@@ -35,8 +34,9 @@ from pendpipe.analysis.fit.least_squares import (
     intervals95,
     minimise,
 )
-from pendpipe.analysis.fit.period import TOP, Period, period_excess, swing_phase
-from pendpipe.analysis.fit.result import Baseline, DragForm, FitResult, Restoring, result_of
+from pendpipe.analysis.fit.period import Period
+from pendpipe.analysis.fit.result import Baseline, DragForm, FitResult, result_of
+from pendpipe.analysis.torque import TOP, Restoring, clear, period_excess, swing_phase
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.torque import Restoring, phases
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 
-if TYPE_CHECKING:
-    from pendpipe.analysis.fit.result import Restoring
-
 _LOUD: Final = 2.0
-TOP: Final = 3.13
-"""Amplitude in rad beyond which a half swing says nothing of the frequency."""
 
 
 class Period(NamedTuple):
@@ -29,71 +25,6 @@ class Period(NamedTuple):
     chi2_per_dof: float
     late_rad: FloatArray
     """Phase by which each turning point is later than the law's, shape (k,)."""
-
-
-def elliptic(m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Complete elliptic integrals K and E of the parameter m = k^2 < 1, by Gauss's means."""
-    a, b = np.ones_like(m), np.sqrt(1.0 - m)
-    total = 0.5 * m
-    # Each step doubles the digits.
-    for step in range(8):
-        a, b, difference = 0.5 * (a + b), np.sqrt(a * b), 0.5 * (a - b)
-        total = total + 2.0**step * difference**2
-    k = 0.5 * math.pi / a
-    return k, k * (1.0 - total)
-
-
-def swing_phase(amplitude: FloatArray, restoring: Restoring) -> FloatArray:
-    """Phase omega t of the half swings between neighbours, without losses: K + K', or pi."""
-    if restoring == "linear":
-        return np.full(len(amplitude) - 1, math.pi)
-    quarter = elliptic(np.sin(0.5 * np.clip(amplitude, 0.0, TOP)) ** 2)[0]
-    return np.asarray(quarter[1:] + quarter[:-1])
-
-
-def period_excess(
-    amplitude: FloatArray | float,
-    angular_frequency: float,
-    a: float,
-    b: float,
-    c: float,
-    share: float,
-) -> FloatArray:
-    """Relative lengthening of a half period by the losses of Eq. 8, to second order.
-
-    ``b_v^2/(2 w^2) + (4/3) b_v (2 a y + b_h)/w^2
-    + (pi^2/8) (2 a y + b_h)(a y^2 + b_h y + c)/(y w^2)``,
-    which is Eq. 6 (1/(8 Q_v^2)) for viscous damping, pi^2/(32 Q_h^2) for hysteretic
-    damping, and nothing for Coulomb friction alone.
-
-    Parameters
-    ----------
-    amplitude
-        y at the turning points, rad.
-    angular_frequency, a, b, c
-        omega and the rates of Eq. 13.
-    share
-        b_h/b, the hysteretic part.
-    """
-    y = np.maximum(amplitude, 1e-300)
-    hysteretic, viscous = share * b, (1.0 - share) * b
-    slope = 2.0 * a * y + hysteretic
-    friction = a * y + hysteretic + c / y
-    excess = 0.5 * viscous**2 + 4.0 / 3.0 * viscous * slope + math.pi**2 / 8.0 * slope * friction
-    return np.asarray(np.minimum(excess / angular_frequency**2, 0.5))
-
-
-def phases(
-    points: TurningPoints,
-    amplitude: FloatArray,
-    losses: tuple[float, float, float, float],
-    angular_frequency: float,
-    restoring: Restoring,
-) -> FloatArray:
-    """Phase omega t of a law's turning points from the first, by a, b, c and the share."""
-    excess = period_excess(amplitude, angular_frequency, *losses)
-    lasts = swing_phase(amplitude, restoring) + 0.5 * math.pi * (excess[1:] + excess[:-1])
-    return np.concatenate([[0.0], np.cumsum(lasts * np.diff(points.half_cycle))])
 
 
 def fit_period(

@@ -23,6 +23,7 @@ from pendpipe.analysis.fit.quality import (
     released_quality,
     small_period,
 )
+from pendpipe.analysis.torque import Restoring
 from pendpipe.analysis.turning_points import TurningPoints, write_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release
@@ -41,9 +42,7 @@ if TYPE_CHECKING:
 
 Method = Literal["waveform", "turning-points"]
 Baseline = Literal["eq8", "viscous"]
-Restoring = Literal["linear", "sine"]
 DragForm = Literal["energy", "speed", "undecided"]
-TORQUES: Final[tuple[Restoring, ...]] = ("linear", "sine")
 PARTS: Final = ("quality_factor_hysteretic", "quality_factor_viscous")
 OPTIONAL: Final = ("zero_drift", "other_frequency")
 PARAMETERS: Final = ("a", "b", "c", "frequency", "amplitude", "phase", "offset")

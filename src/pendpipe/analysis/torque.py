@@ -1,0 +1,207 @@
+"""Which restoring torque the turning points ask for: a pendulum's sin x, or a spring's x."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.analysis.turning_points.measure import loss_rates
+from pendpipe.arrays import FloatArray
+
+Restoring = Literal["linear", "sine"]
+TORQUES: Final[tuple[Restoring, ...]] = ("linear", "sine")
+TOP: Final = 3.13
+"""Amplitude in rad beyond which a half swing says nothing of the frequency."""
+
+
+_CLEAR: Final = 3.0
+"""Standard deviations by which an amplitude stands out of the noise."""
+_LARGE: Final = 0.2
+"""Of the largest amplitude: below, sin x lengthens the period by 4 % of what it does there."""
+_FEWEST: Final = 6
+SEEN: Final = 3.0
+"""Standard deviations from which an amplitude, or a coefficient, is seen, and up to which the
+coefficient may be off."""
+_AGREES: Final = 2.0
+"""Standard deviations within which the coefficient agrees with 1 where it has to tell by itself."""
+_NEAR: Final = 0.2
+"""How near to 1 it must be where sin x removes most of chi^2."""
+_PENDULUM: Final = 0.25
+"""Amplitude in rad from which sin x lengthens the period by 0.4 %, more than frequencies wander:
+what swings so far is taken for a pendulum unless its half cycles speak against it."""
+
+
+class Coefficient(NamedTuple):
+    """How much of sin x the times of the turning points ask for: 0 nothing, 1 all of it."""
+
+    value: float
+    sd: float
+    """From the scatter of the times, and what a drift of the frequency would change."""
+    removed: float
+    """Part of chi^2 of the times that the whole of sin x removes."""
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the times alone ask for sin x.
+
+        The coefficient is seen and agrees with 1; or sin x removes most of chi^2, and the
+        coefficient is within 0.2 of 1, or as near as a drift would bring it.
+        """
+        off = abs(self.value - 1.0)
+        near = off < _AGREES * self.sd and self.value > SEEN * self.sd
+        return near or (self.removed > 0.5 and off < max(_NEAR, self.sd))
+
+    @property
+    def excludes_sine(self) -> bool:
+        """Whether the whole of sin x contradicts the times, a drift of the frequency granted."""
+        return abs(self.value - 1.0) > SEEN * self.sd
+
+
+def elliptic(m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Complete elliptic integrals K and E of the parameter m = k^2 < 1, by Gauss's means."""
+    a, b = np.ones_like(m), np.sqrt(1.0 - m)
+    total = 0.5 * m
+    # Each step doubles the digits.
+    for step in range(8):
+        a, b, difference = 0.5 * (a + b), np.sqrt(a * b), 0.5 * (a - b)
+        total = total + 2.0**step * difference**2
+    k = 0.5 * math.pi / a
+    return k, k * (1.0 - total)
+
+
+def swing_phase(amplitude: FloatArray, restoring: Restoring) -> FloatArray:
+    """Phase omega t of the half swings between neighbours, without losses: K + K', or pi."""
+    if restoring == "linear":
+        return np.full(len(amplitude) - 1, math.pi)
+    quarter = elliptic(np.sin(0.5 * np.clip(amplitude, 0.0, TOP)) ** 2)[0]
+    return np.asarray(quarter[1:] + quarter[:-1])
+
+
+def period_excess(
+    amplitude: FloatArray | float,
+    angular_frequency: float,
+    a: float,
+    b: float,
+    c: float,
+    share: float,
+) -> FloatArray:
+    """Relative lengthening of a half period by the losses of Eq. 8, to second order.
+
+    ``b_v^2/(2 w^2) + (4/3) b_v (2 a y + b_h)/w^2
+    + (pi^2/8) (2 a y + b_h)(a y^2 + b_h y + c)/(y w^2)``,
+    which is Eq. 6 (1/(8 Q_v^2)) for viscous damping, pi^2/(32 Q_h^2) for hysteretic
+    damping, and nothing for Coulomb friction alone.
+
+    Parameters
+    ----------
+    amplitude
+        y at the turning points, rad.
+    angular_frequency, a, b, c
+        omega and the rates of Eq. 13.
+    share
+        b_h/b, the hysteretic part.
+    """
+    y = np.maximum(amplitude, 1e-300)
+    hysteretic, viscous = share * b, (1.0 - share) * b
+    slope = 2.0 * a * y + hysteretic
+    friction = a * y + hysteretic + c / y
+    excess = 0.5 * viscous**2 + 4.0 / 3.0 * viscous * slope + math.pi**2 / 8.0 * slope * friction
+    return np.asarray(np.minimum(excess / angular_frequency**2, 0.5))
+
+
+def phases(
+    points: TurningPoints,
+    amplitude: FloatArray,
+    losses: tuple[float, float, float, float],
+    angular_frequency: float,
+    restoring: Restoring,
+) -> FloatArray:
+    """Phase omega t of a law's turning points from the first, by a, b, c and the share."""
+    excess = period_excess(amplitude, angular_frequency, *losses)
+    lasts = swing_phase(amplitude, restoring) + 0.5 * math.pi * (excess[1:] + excess[:-1])
+    return np.concatenate([[0.0], np.cumsum(lasts * np.diff(points.half_cycle))])
+
+
+def clear(points: TurningPoints, least: float = 0.0) -> TurningPoints:
+    """Take those below the top that stand out of the noise, and above a part of the largest."""
+    amplitude = points.amplitude_rad
+    seen = (amplitude > _CLEAR * points.angle_sd_rad) & (amplitude < TOP)
+    return points.chosen(seen & (amplitude > least * np.max(amplitude, where=seen, initial=0.0)))
+
+
+def told_apart(points: TurningPoints, readings: int, noise: float) -> float:
+    """Chi^2 by which x would miss a pendulum of sin x: what no frequency makes up for."""
+    part = clear(points)
+    if len(part) < 3:
+        return 0.0
+    amplitude = part.amplitude_rad
+    swings = (swing_phase(amplitude, "sine") - math.pi) * np.diff(part.half_cycle)
+    late = np.concatenate([[0.0], np.cumsum(swings)])
+    weight = amplitude[:, None]
+    line = np.stack([np.ones_like(late), part.half_cycle], axis=1)
+    left = amplitude * late - weight * line @ np.linalg.lstsq(weight * line, amplitude * late)[0]
+    in_half_cycle = readings / max(float(np.ptp(points.half_cycle)), 1.0)
+    return 0.5 * in_half_cycle * float(left @ left) / noise**2
+
+
+def restoring_of(
+    points: TurningPoints, coefficient: Coefficient | None = None, *, stated: bool = True
+) -> Restoring:
+    """Which torque the half cycles favour.
+
+    Where it is `stated` that the readings are angles, swings beyond 0.25 rad are a pendulum's
+    unless the half cycles exclude sin x; else the half cycles must ask for it.
+    """
+    if not may_be_sine(points):
+        return "linear"
+    coefficient = coefficient or sine_coefficient(points)
+    wide = abs(float(clear(points).angle_rad[0])) > _PENDULUM
+    pendulum = stated and wide and not coefficient.excludes_sine
+    return "sine" if coefficient.agrees or pendulum else "linear"
+
+
+def may_be_sine(points: TurningPoints) -> bool:
+    """Whether these are angles below the top, enough of them clear of the noise."""
+    inside = points.unit == "rad" and float(np.max(points.amplitude_rad)) < math.pi
+    return inside and len(clear(points)) >= 3
+
+
+def sine_coefficient(points: TurningPoints) -> Coefficient:
+    """Fit the times with a free coefficient of sin x, at the larger amplitudes.
+
+    A half swing lasts [pi (1 + losses) + eta (K + K' - pi)]/omega: the times are linear in
+    1/omega and in eta/omega. The level's error makes them alternate.
+
+    By what the coefficient changes if the frequency may drift in time, it is uncertain too.
+    """
+    part = clear(points, _LARGE)
+    if len(part) < _FEWEST:
+        # Of a strong loss few are large.
+        part = clear(points).first(_FEWEST)
+    if len(part) < _FEWEST or points.unit != "rad":
+        return Coefficient(0.0, math.inf, 0.0)
+    amplitude, omega = part.amplitude_rad, 2.0 * math.pi * part.apparent_frequency_hz
+    losses = (*loss_rates(part.time_s, amplitude, part.angle_sd_rad).tolist(), 0.5)
+    plain, phase = (phases(part, amplitude, losses, omega, torque) for torque in TORQUES)
+    weight = 1.0 / part.time_sd_s
+    right = (part.time_s - part.time_s[0]) * weight
+
+    def fitted(*columns: FloatArray) -> tuple[float, float, float]:
+        """The second factor over the first, its error, and chi^2; the level's error alternates."""
+        design = np.stack([*columns, np.ones_like(plain), part.side], axis=1) * weight[:, None]
+        inverse = np.linalg.pinv(design, rcond=1e-13)
+        values = inverse @ right
+        rest = right - design @ values
+        chi2 = float(rest @ rest)
+        noise = math.sqrt(chi2 / max(len(part) - len(values), 1)) * np.linalg.norm(inverse[1])
+        return float(values[1] / values[0]), float(noise / values[0]), chi2
+
+    drift = np.cumsum(np.linspace(-1.0, 1.0, len(part)) * np.diff(plain, prepend=0.0))
+    value, error, _ = fitted(plain, phase - plain)
+    drifting, *_ = fitted(plain, phase - plain, drift)
+    (*_, linear), (*_, sine) = fitted(plain), fitted(phase)
+    removed = 1.0 - sine / linear if linear > 0.0 else 0.0
+    return Coefficient(value, math.hypot(error, drifting - value), removed)
