@@ -77,15 +77,13 @@ class LiveCampaign:
         Where it is made.
     port, duration_s
         What the live record is recorded from, and for how long.
-    target
-        Which result of both records is asked for.
+    stage
+        Up to which stage both records are asked for.
     """
 
-    def __init__(
-        self, folder: Path, port: str, duration_s: float, target: str = "recording.csv"
-    ) -> None:
+    def __init__(self, folder: Path, port: str, duration_s: float, stage: str = "acquire") -> None:
         self.folder = folder
-        self.target = target
+        self.stage = stage
         self.results = folder / "results"
         self.recording = self.results / "live/recording.csv"
         time_s = np.arange(0.0, 10.0, 1 / 60)
@@ -110,11 +108,12 @@ class LiveCampaign:
         return {path.name: path.read_bytes() for path in self.results.glob("live/raw/*")}
 
     def command(self, *arguments: str) -> list[str]:
-        """The call of Snakemake that makes the target of both records."""
+        """The call of Snakemake that runs the stage of both records."""
+        done = f"{self.results}/chunks/{self.stage}"
         return [
             *(sys.executable, "-m", "snakemake", "--cores", "2", "--nolock"),
             *("--configfile", str(self.folder / "config.yaml"), *arguments, "--"),
-            *(f"{self.results}/{record}/{self.target}" for record in ("live", "file")),
+            *(f"{done}-{chunk}.json" for chunk in ("record.live", "all")),
         ]
 
     def run(self, *arguments: str, library: Path | None = None) -> subprocess.CompletedProcess[str]:
@@ -178,7 +177,7 @@ def live_table(folder: Path, duration_s: float = 20.0) -> str:
 def _live_rows(folder: Path, link: str, duration_s: float) -> Iterator[str]:
     """What happened on one line, a row each."""
     with served_device(folder, link) as port:
-        campaign = LiveCampaign(folder, port, duration_s, "turning_points.csv")
+        campaign = LiveCampaign(folder, port, duration_s, "turning-points")
         status = campaign.run().returncode
     before = campaign.recording.read_bytes(), campaign.raw_files
     yield _row("recorded", status, campaign, "made")

@@ -71,7 +71,7 @@ def test_neither_changed_code_nor_force_records_again(link: str, tmp_path: Path)
 
 def test_a_killed_campaign_uses_what_was_recorded(link: str, tmp_path: Path) -> None:
     with served_device(tmp_path, link) as port:
-        campaign = LiveCampaign(tmp_path, port, 600.0, "turning_points.csv")
+        campaign = LiveCampaign(tmp_path, port, 600.0, "turning-points")
         campaign.kill_at(0.7 * DURATION_S)
         raw = campaign.raw_files
         done = campaign.run()
@@ -140,7 +140,7 @@ def test_a_line_that_is_lost_fails_its_job_and_the_next_run_records_anew(
 
 def test_what_a_lost_line_has_left_is_the_record_once_it_is_accepted(tmp_path: Path) -> None:
     with served_process(tmp_path, "socket") as (device, port):
-        campaign = LiveCampaign(tmp_path, port, LONG_S, "calibration.json")
+        campaign = LiveCampaign(tmp_path, port, LONG_S, "calibrate")
         lost_in_the_midst(campaign, device)
     call = ["acquire", "--campaign", str(tmp_path / "config.yaml"), "--record", "live"]
     assert main([*call, "--accept-short"]) == 0

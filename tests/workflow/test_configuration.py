@@ -274,9 +274,8 @@ def test_a_change_of_the_truth_touches_the_records_it_concerns(content: dict[str
     changed["fluids"]["water"]["viscosity_pa_s"] = 1.1e-3
     after = load_campaign(changed, "config.yaml")
     same = {
-        record.record: jobs.acquisition(before, record.record)
-        == jobs.acquisition(after, record.record)
-        for record in before.records
+        one.record: jobs.acquisition(before, one) == jobs.acquisition(after, other)
+        for one, other in zip(before.records, after.records, strict=True)
     }
     assert {name for name, kept in same.items() if kept} == {
         record.record for record in before.records if record.fluid == "air"

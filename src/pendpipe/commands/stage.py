@@ -2,7 +2,8 @@
 
 A record whose stage is done, with the same settings, code and inputs, is left as it is. One
 record's fault is its own: the others are done, and the command then ends with its status. What a
-record's stage prints goes to RESULTS/<record>/logs/<stage>.log.
+record's stage prints goes to RESULTS/<record>/logs/<stage>.log. What an instrument's record was
+made from, now recorded or kept from before, is said to the user as well.
 """
 
 import traceback
@@ -63,6 +64,8 @@ def _of_record(campaign: Campaign, stage: Stage, record: Record, configuration: 
     for line in lines:
         if line.startswith("pendpipe: "):
             tell(line)
+        elif line.startswith(f"{record.record}: "):
+            print(line)
     made = manifest.read_manifest(home, stage.name)
     made.key = wanted
     made.write()
