@@ -23,6 +23,8 @@ myst_heading_anchors = 4
 html_math_renderer = "mathml"
 
 html_theme = "furo"
+html_static_path = ["_static"]
+html_css_files = ["wrap.css"]
 html_title = f"pendpipe {version}"
 exclude_patterns = ["_build", "_ext"]
 

@@ -1,9 +1,9 @@
 """Directives whose text is made by running the program: a page can't promise what doesn't work.
 
 `run` executes the commands of its body one after another in the page's own scratch folder, which
-begins with a copy of `examples/`, and shows each with what it prints; `run-python` does the same
-with a block of Python, and `made` shows a picture that one of them has written. A status other
-than that of the option `:status:` (0) is an error of the build. `command-help` and
+begins with a copy of `examples/`, and shows each with what it prints (`:silent:` leaves standard
+error out); `run-python` does the same with a block of Python, and `made` shows a picture that one
+of them has written. A command that fails is an error of the build. `command-help` and
 `configuration` print the parser's and the schema's own words.
 """
 
@@ -24,6 +24,8 @@ from sphinx.util.docutils import SphinxDirective
 ROOT = Path(__file__).parents[2]
 LONGEST_S = 300
 """No command of a page may take longer."""
+_SCRATCH: list[tempfile.TemporaryDirectory[str]] = []
+"""Folders of the pages, removed when the build ends."""
 
 
 def _environment() -> dict[str, str]:
@@ -36,19 +38,15 @@ class _Executed(SphinxDirective):
     """What both kinds of block share: the page's folder, and how a run is judged."""
 
     has_content = True
-    option_spec: ClassVar[dict[str, Any]] = {
-        "status": directives.nonnegative_int,
-        "hidden": directives.flag,
-        "silent": directives.flag,
-        "lines": directives.nonnegative_int,
-    }
+    option_spec: ClassVar[dict[str, Any]] = {"silent": directives.flag}
 
     @property
     def folder(self) -> Path:
         """The scratch folder of this page, made at its first block."""
         folders = self.env.temp_data.setdefault("scratch", {})
         if "this" not in folders:
-            folders["this"] = Path(tempfile.mkdtemp(prefix="pendpipe-docs-"))
+            _SCRATCH.append(tempfile.TemporaryDirectory(prefix="pendpipe-docs-"))
+            folders["this"] = Path(_SCRATCH[-1].name)
             shutil.copytree(ROOT / "examples", folders["this"], dirs_exist_ok=True)
         return Path(folders["this"])
 
@@ -64,24 +62,15 @@ class _Executed(SphinxDirective):
             timeout=LONGEST_S,
             check=False,
         )
-        asked = self.options.get("status", 0)
-        if ran.returncode != asked:
+        if ran.returncode:
             shown = command if isinstance(command, str) else self.block_text
-            raise self.severe(
-                f"status {ran.returncode} where {asked} is promised: {shown}\n{ran.stderr}"
-            )
-        printed = ran.stdout + (ran.stderr if asked or "silent" not in self.options else "")
-        most = self.options.get("lines")
-        rows = printed.rstrip().splitlines()
-        if most is not None and len(rows) > most:
-            rows = [*rows[:most], "..."]
+            raise self.severe(f"status {ran.returncode}: {shown}\n{ran.stderr}")
+        printed = ran.stdout + ("" if "silent" in self.options else ran.stderr)
         # Where a scratch folder lies is nobody's concern.
-        return "\n".join(rows).replace(f"{self.folder}/", "")
+        return printed.rstrip().replace(f"{self.folder}/", "")
 
     def block(self, text: str, language: str) -> list[nodes.Node]:
         """A literal block of the page."""
-        if "hidden" in self.options:
-            return []
         node = nodes.literal_block(text, text)
         node["language"] = language
         return [node]
@@ -130,15 +119,12 @@ class Picture(_Executed):
 
 
 class CommandHelp(_Executed):
-    """What `pendpipe COMMAND --help` prints, of one command or of all."""
+    """What `pendpipe COMMAND --help` prints, of every command under its heading."""
 
     has_content = False
-    optional_arguments = 1
 
     def run(self) -> list[nodes.Node]:
-        """Show the help, under a heading a command where all are asked for."""
-        if self.arguments:
-            return self.block(self.done(f"pendpipe {self.arguments[0]} --help"), "text")
+        """Show the help of each."""
         from pendpipe.cli import COMMANDS, STAGES
 
         sections: list[nodes.Node] = []

@@ -10,6 +10,7 @@ import numpy as np
 
 from pendpipe.analysis.fit.decrement import is_off
 from pendpipe.analysis.fit.quality import LOSSES, Quality
+from pendpipe.analysis.torque import TOP
 from pendpipe.analysis.turning_points import BEAT
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.errors import refuse_if
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from pendpipe.analysis.fit.result import FitResult
 
 WITHOUT_LAW: Final = "from the turning points alone"
-_TOP: Final = 3.13
-"""Amplitude in rad beyond which no correction is made for sin x."""
 _KINDS: Final = {
     "rad": "angle",
     "m": "displacement",
@@ -290,7 +289,7 @@ def gravity_line(
     if result.restoring == "linear":
         squares = [quality.amplitude_rad**2 for quality in result.quality_factors]
         amplitude = math.sqrt(sum(squares) / len(squares)) / _arm(result, omega, length, gravity)
-        release = Release(0.0, min(amplitude, _TOP))
+        release = Release(0.0, min(amplitude, TOP))
         swing = turning_points(Eq8(1.0, restoring="sine"), release, count=2)
         factor = float(swing.time_s[1]) / math.pi
         omega *= factor
