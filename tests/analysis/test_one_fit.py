@@ -175,3 +175,13 @@ def test_bursts_are_a_refusal_in_words() -> None:
         values[start : start + 3] += 0.6 * random.standard_normal() * abs(values[start])
     with pytest.raises(pp.InputError, match=r"no law follows it|no free decay|did not settle"):
         pp.fit(pp.Recording(time, displacement_m=values))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_torques_are_compared_by_the_readings_that_both_explain(seed: int) -> None:
+    """A pendulum that friction stops: with x and with sin x it is followed to other times."""
+    omega = 2.0 * math.pi * 0.05987
+    law = Eq8(omega, 0.0514, 0.0134, 0.0038, 1.19e-5, "sine")
+    result = pp.fit(clean(law, 0.0572, np.arange(0.0, 251.0, 1.0 / 65.0), 8e-5, seed))
+    assert result.restoring == "sine"
+    assert abs(pull(result, "frequency", 0.05987)) < 4.0

@@ -521,12 +521,30 @@ class Fitted:
         return self.problem.noise_rms * math.sqrt(max(self.chi2, 1e-300) / freedom)
 
     def better_by(self, other: Fitted) -> float:
-        """Logarithm of the likelihood over another law's, the noise being the better fit's."""
+        """Logarithm of the likelihood over another law's, the noise being the better fit's.
+
+        It is that of the readings to which both were fitted: where a law ends, and so what is
+        seen of its motion, is its own.
+        """
+        first = max(each.problem.time_s[0] for each in (self, other))
+        last = min(each.problem.time_s[-1] for each in (self, other))
+        own, others = (each.chi2_between(first, last) for each in (self, other))
         if self.problem.step or other.problem.step:
-            return 0.5 * (other.chi2 - self.chi2)
-        square, others = (each.chi2 * each.problem.noise_rms**2 for each in (self, other))
-        noise = min(self.noise_rms, other.noise_rms)
-        return 0.5 * (others - square) / noise**2
+            return 0.5 * (others - own)
+        own, others = own * self.problem.noise_rms**2, others * other.problem.noise_rms**2
+        return 0.5 * (others - own) / min(self.noise_rms, other.noise_rms) ** 2
+
+    def chi2_between(self, first_s: float, last_s: float) -> float:
+        """Chi^2 of the readings of a span."""
+        problem = self.problem
+        if first_s <= problem.time_s[0] and problem.time_s[-1] <= last_s:
+            return self.chi2
+        inside = (problem.time_s >= first_s) & (problem.time_s <= last_s)
+        left = problem.residual(self.value)[inside]
+        if not problem.step:
+            return float(left @ left) / problem.noise_rms**2
+        unused = np.empty_like(left), np.empty_like(left)
+        return float(rounded(left, 0.5 * problem.step, problem.noise_rms, *unused))
 
 
 def fitted_waveform(
