@@ -30,11 +30,13 @@ bench: .venv/installed-bench
 	$(RUN) python -m benchmarks
 
 evidence: .venv/installed-bench
+	$(RUN) python -m benchmarks.consistency
+	$(RUN) python -m benchmarks.null_families --number 15
+	$(RUN) python -m benchmarks.known_physics
+	$(RUN) python -m benchmarks.campaign_challenge
 	$(RUN) python -m benchmarks.acquisition
-	$(RUN) python -m benchmarks.evidence
-	$(RUN) python -m benchmarks.diagnosis
 
-# What interruptions and hostile input cost (docs/integrity.md): hours; goes on where it was stopped.
+# What interruptions and hostile input cost (docs/evidence.md): hours; goes on where it was stopped.
 integrity: .venv/installed
 	$(RUN) python -m benchmarks.acquisition live kill flips disk
 	$(RUN) python -m benchmarks.kills
@@ -43,11 +45,11 @@ integrity: .venv/installed
 	$(RUN) python -m benchmarks.hostile
 	$(RUN) python -m benchmarks.fuzz --inputs 100000
 
-# Conceal, solve, open, score, and write docs/proof.md; goes on where it was interrupted.
+# Conceal, solve, open, score, and write results/challenge/SET/proof.md; goes on where it was interrupted.
 # A set is made once: SET=another makes another, with a seed of its own.
 proof: .venv/installed
 	$(RUN) PENDPIPE_CHALLENGE_SET=$(SET) PENDPIPE_CHALLENGE_ITEMS=$(ITEMS) \
-		PENDPIPE_CHALLENGE_PAGE=docs/proof.md snakemake --cores $(CORES) challenge
+		snakemake --cores $(CORES) challenge
 
 # What CI asks besides the tests.
 check: .venv/installed

@@ -16,7 +16,6 @@ def main() -> None:
         "long_record",
         "workflow",
         "acquisition_speed",
-        "diagnosis_cost",
         "many_fits",
     )
     there = [name for name in known if (here / f"{name}.py").exists()]

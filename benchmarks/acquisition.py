@@ -1,9 +1,8 @@
 """Evidence of the acquisition: faults by the hundred thousand, kills, full disks, a pulled plug.
 
-``python -m benchmarks.acquisition`` prints the tables and writes them into
-``docs/acquisition.md`` (``make evidence`` does). A part may be named: ``faults``, ``slips``,
-``clock``, ``live``, ``kill``, ``flips``, ``disk``, ``plug``, ``speed``, ``windaq``, ``fuzz``;
-parts not run keep their tables.
+``python -m benchmarks.acquisition`` prints the tables. A part may be named:
+``faults``, ``slips``, ``clock``, ``live``, ``kill``, ``flips``, ``disk``, ``plug``, ``speed``,
+``windaq``, ``fuzz``.
 Kills and fuzzing go on where they were broken off, as long as the code is the same.
 """
 
@@ -549,8 +548,7 @@ def main(arguments: list[str] | None = None) -> int:
     for part in arguments or list(PARTS):
         with tempfile.TemporaryDirectory(prefix="pendpipe-") as folder:
             table = PARTS[part](Path(folder))
-        print(f"\n{part}\n\n{table}", flush=True)
-        journal.put("acquisition.md", part, f"{table}\n\nMade by commit {journal.commit()}.")
+        print(f"\n{part}\n\n{table}\n\nMade by commit {journal.commit()}.", flush=True)
     return 0
 
 

@@ -41,7 +41,7 @@ def faults_of(scores: dict[str, Any]) -> list[str]:
         faults.append("too many false alarms")
     if len(scores["unsolved"]) > 0.1 * scores["items"]:
         faults.append(f"without a diagnosis: {scores['unsolved']}")
-    # What docs/proof.md promises: nine tenths are detected from 1.3 times the oracle's 45 on, and
+    # What the proof promises: nine tenths are detected from 1.3 times the oracle's 45 on, and
     # nine tenths as many have the right class as the oracle's 94 %.
     if is_fewer(large, 0.9):
         faults.append("too few large effects are detected")

@@ -297,7 +297,7 @@ def _first_call(rounds: int) -> Row:
 
 def main() -> None:
     """Measure, and write the part of the page."""
-    write("engine", "The engine of Eq. 8", rows())
+    write("The engine of Eq. 8", rows())
 
 
 if __name__ == "__main__":

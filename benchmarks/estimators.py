@@ -291,7 +291,7 @@ def main() -> None:
     found = speed()
     for method in METHODS:
         found += precision(method, numbers[0] if numbers else 4000)
-    write("estimators", "The estimates: 32768 readings over 300 s, noise 0.1 mrad", found)
+    write("The estimates: 32768 readings over 300 s, noise 0.1 mrad", found)
 
 
 if __name__ == "__main__":

@@ -62,12 +62,3 @@ def keep(name: str, done: Any, sources: tuple[str, ...] = READERS) -> None:
     beside = KEPT / f"{name}.new"
     beside.write_text(json.dumps({"code": code(sources), "done": done}), encoding="utf-8")
     beside.replace(KEPT / f"{name}.json")
-
-
-def put(page: str, part: str, table: str) -> None:
-    """Replace what stands between a part's markers in a page of the documentation."""
-    path = ROOT / "docs" / page
-    begin, end = f"<!-- measured: {part} -->", f"<!-- end: {part} -->"
-    before, _, rest = path.read_text(encoding="utf-8").partition(begin)
-    _, _, after = rest.partition(end)
-    path.write_text(f"{before}{begin}\n{table}\n{end}{after}", encoding="utf-8")

@@ -8,7 +8,7 @@ disturbs the run, does what ``pendpipe doctor`` says about a lock, runs the same
 again and compares every file of the results, byte for byte, with an undisturbed run. One project
 suffers `CHAIN` kills before it may end: after each, what the doctor finds sound is compared. Left
 out are the logs, which carry the dates, and temporary files that a killed process left. The
-table is written into docs/integrity.md. What was done is kept in ``.evidence`` for as long as the
+table is printed. What was done is kept in ``.evidence`` for as long as the
 code is the same.
 """
 
@@ -592,7 +592,7 @@ def try_on(done: dict[str, list[Case]], parts: Sequence[str], more: int | None) 
 
 
 def main() -> int:
-    """Try what is left to try; print the table and write it into the page."""
+    """Try what is left to try; print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}; all, if none is named")
     parser.add_argument("--number", type=int, help="how many cases of each part to run now")
@@ -603,9 +603,7 @@ def main() -> int:
     done: dict[str, list[Case]] = journal.read("kills", {}, GUARDS)
     if not arguments.table:
         try_on(done, arguments.parts or [*PARTS], arguments.number)
-    printed = f"{table(done)}\n\nMade by commit {journal.commit()}."
-    print(printed)
-    journal.put("integrity.md", "kills", printed)
+    print(f"{table(done)}\n\nMade by commit {journal.commit()}.")
     return int(any(case and not case["same"] for cases in done.values() for case in cases))
 
 

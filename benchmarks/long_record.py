@@ -177,7 +177,7 @@ def main() -> None:
     if len(sys.argv) == 3 and sys.argv[2].isdigit():
         contend(sys.argv[1], int(sys.argv[2]))
     else:
-        write("long", "Turning points of a long record", rows())
+        write("Turning points of a long record", rows())
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The page of measured figures: a part a benchmark, each line with what was asked."""
+"""Tables of measured figures, each line with what was asked."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "performance.md"
 _PEERS = ("numpy", "scipy", "numba", "heyoka", "lmfit")
 
 
@@ -103,8 +102,8 @@ def machine() -> str:
     )
 
 
-def write(part: str, title: str, rows: Sequence[Row]) -> None:
-    """Print a part's table, and put it in the place of the one on the page."""
+def write(title: str, rows: Sequence[Row]) -> None:
+    """Print a part's table."""
     words = {None: "", True: "met", False: "**missed**"}
     lines = [
         f"## {title}",
@@ -115,12 +114,4 @@ def write(part: str, title: str, rows: Sequence[Row]) -> None:
         "|---|---|---|---|",
     ]
     lines += [f"| {row.what} | {row.measured} | {row.asked} | {words[row.met]} |" for row in rows]
-    table = "\n".join(lines)
-    print(table, flush=True)
-    begin, end = f"<!-- measured: {part} -->", f"<!-- end: {part} -->"
-    text = PAGE.read_text(encoding="utf-8")
-    before, found, rest = text.partition(begin)
-    _, _, after = rest.partition(end)
-    if not found:
-        before, after = text.rstrip("\n") + "\n\n", "\n"
-    PAGE.write_text(f"{before}{begin}\n{table}\n{end}{after}", encoding="utf-8")
+    print(*lines, sep="\n", flush=True)

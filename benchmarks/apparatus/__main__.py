@@ -14,7 +14,6 @@ from typing import Any
 
 from benchmarks.apparatus.draw import Item, draw
 from benchmarks.apparatus.scores import line, table
-from benchmarks.journal import commit, put
 from benchmarks.null_families import ROOT, code_digest
 
 
@@ -71,7 +70,6 @@ def main() -> None:
     parser.add_argument("--journal", type=Path, default=ROOT / ".evidence/apparatus.jsonl")
     parser.add_argument("--processes", type=int, choices=(1, 2), default=1)
     parser.add_argument("--list", action="store_true", help="print each item")
-    parser.add_argument("--page", action="store_true", help="write what is answered to docs/")
     parser.add_argument("--export", type=Path, metavar="DIR", help="only write files and truths")
     arguments = parser.parse_args()
     name, code = arguments.set, digest()
@@ -89,13 +87,6 @@ def main() -> None:
             kept = json.loads(text) if text.endswith("}") else {}
             if kept.get("code") == code and kept["set"] == name:
                 known[kept["number"]] = kept
-    if arguments.page:
-        answered = [json.loads(json.dumps(known[number])) for number in sorted(known)]
-        head = f"Set `{name}`, {len(known)} of {arguments.number} items, answered by"
-        text = f"{head} {commit()}.\n\n{table(answered)}"
-        put("apparatus.md", "set", text)
-        print(text)
-        return
     left = [number for number in range(arguments.number) if number not in known]
     ask = partial(answer, name)
     with (

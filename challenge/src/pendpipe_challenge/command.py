@@ -3,7 +3,7 @@
     pendpipe challenge make SET --sealed ELSEWHERE --items 600
     pendpipe challenge solve SET
     pendpipe challenge open SET --sealed ELSEWHERE
-    pendpipe challenge score SET --out SCORES --page docs/proof.md
+    pendpipe challenge score SET --out SCORES --page PROOF.md
 
 `make` and `solve` go on where they were interrupted. The seed is drawn at run time unless it
 is given, and is sealed with the truth.
