@@ -38,6 +38,7 @@ COMMANDS: Final = {
     "doctor": "what is wrong with a campaign's results, and what is safe to do",
     "config": "check a configuration, or print its schema",
     "effects": "the catalogue of what may have been left out",
+    "completion": "what makes a shell complete commands, options and files",
     "stage": "one stage of a chunk of a campaign's records, as a job of the workflow",
 }
 """The commands with the line that ``--help`` shows for each."""
@@ -87,7 +88,7 @@ def _descriptions() -> dict[str, str]:
     )
 
 
-def _module_of(name: str) -> Any:
+def module_of(name: str) -> Any:
     """The module of a command; None where there is no such command."""
     if name in COMMANDS:
         return importlib.import_module(f"pendpipe.commands.{name.replace('-', '_')}")
@@ -104,7 +105,7 @@ def _module_of(name: str) -> Any:
 
 def _parse(argv: Sequence[str]) -> argparse.Namespace:
     """Parse the words of one call; argparse ends the program with 2 on bad usage."""
-    module = _module_of(argv[0]) if argv and not argv[0].startswith("-") else None
+    module = module_of(argv[0]) if argv and not argv[0].startswith("-") else None
     if module is not None:
         parser = _Parser(
             prog=f"pendpipe {argv[0]}",

@@ -1,3 +1,11 @@
-"""The version of this release, alone in a file so that reading it imports nothing."""
+"""The version of this installation, of the tag that it was built from; it imports nothing heavy."""
 
-__version__ = "0.1.0"
+try:
+    # Written by the build (setuptools-scm), and kept out of the repository.
+    from pendpipe._version import version
+except ImportError:
+    import importlib.metadata
+
+    version = importlib.metadata.version("pendpipe")
+
+__version__: str = version

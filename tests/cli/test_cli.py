@@ -63,3 +63,23 @@ def test_the_package_itself_can_be_run() -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "did you mean 'pendpipe inspect'?" in done.stderr
+
+
+def test_bash_completes_commands_and_their_options() -> None:
+    complete = (
+        f'source <("{sys.executable}" -m pendpipe completion bash);'
+        " COMP_WORDS=({{}}); COMP_CWORD={{}};"
+        ' _shtab_pendpipe; echo "${{COMPREPLY[@]}}"'
+    )
+    for words, position, expected in (
+        ("pendpipe diagn", 1, "diagnose diagnose-campaign"),
+        ("pendpipe fit --restor", 2, "--restoring"),
+        ("pendpipe completion z", 2, "zsh"),
+    ):
+        done = subprocess.run(
+            ["bash", "-c", complete.format(words, position)],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stdout.split() == expected.split()
