@@ -19,11 +19,7 @@ def retired() -> list[str]:
 
 
 def pages() -> list[Path]:
-    """List what users and contributors read.
-
-    The challenge keeps the labels that stand in its sealed sets, and the page of the last proof
-    quotes the answers of its time.
-    """
+    """List what users and contributors read; the challenge keeps the labels of its sealed sets."""
     suffixes = {".py", ".md", ".smk", ".html", ".j2", ".yaml", ".toml", ".tsv"}
     folders = ["src", "docs", "config", "workflow", "examples", "benchmarks"]
     found = [path for name in folders for path in (ROOT / name).rglob("*")]
@@ -32,7 +28,8 @@ def pages() -> list[Path]:
         for path in [*found, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
         if path.suffix in suffixes
         and path.is_file()
-        and path not in (GLOSSARY, ROOT / "docs" / "proof.md")
+        and path != GLOSSARY
+        and "_build" not in path.parts
     ]
 
 
