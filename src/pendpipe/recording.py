@@ -169,6 +169,15 @@ class Recording:
         return not any("(--unit)" in guess for guess in self.weak_guesses)
 
     @property
+    def holds_amplitudes(self) -> bool:
+        """Whether each reading is the size of a swing at its time, and not the motion itself.
+
+        So read with a ruler, at a gate, or off turning points: y(t) of Eq. 14. Kept in the
+        metadata (``holds: amplitudes``), and with it in the plain form.
+        """
+        return self.metadata.get("holds") == "amplitudes"
+
+    @property
     def unit(self) -> str:
         """The unit of `values`; ``"1"`` where nobody knows it."""
         return UNITS.get(self.quantity) or self.metadata.get("unit") or "1"

@@ -114,7 +114,7 @@ def test_json_has_the_contracts_form(tmp_path: Path, capsys: pytest.CaptureFixtu
             "uniform",
         ),
         *("duration_s", "resolution", "gaps", "markers", "clipped_samples", "warnings"),
-        *("chosen", "unit", "level", "weak_guesses"),
+        *("chosen", "unit", "level", "weak_guesses", "kind"),
     ]
 
 

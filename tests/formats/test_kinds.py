@@ -7,7 +7,6 @@ import gzip
 import io
 import json
 import lzma
-import math
 import os
 import subprocess
 import sys
@@ -537,15 +536,6 @@ def test_what_can_not_be_read_is_refused_for_its_reason(
         read_text(tmp_path, content, name)
 
 
-def test_a_list_of_amplitudes_is_refused_as_that(tmp_path: Path) -> None:
-    """Turning points of one side only fall; the same readings with their swings are read."""
-    rows = [(1.9 * n, 0.25 * math.exp(-0.03 * n)) for n in range(20)]
-    listed = "".join(f"{t:.2f},{x:.5f}\n" for t, x in rows)
-    with pytest.raises(InputError, match="only falls: amplitudes, not a recording of the swing"):
-        read_text(tmp_path, ("time,theta (rad)\n" + listed).encode(), "peaks.csv")
-    same(read_text(tmp_path, text(TIME, ANGLE, head="time,theta (rad)\n").encode(), "swing.csv"))
-
-
 def test_a_project_of_capstone_and_a_zip_without_a_table_are_refused(tmp_path: Path) -> None:
     for member, said in (("main.xml", "PASCO Capstone"), ("a.jpg", "no CSV")):
         archive = io.BytesIO()
@@ -1072,16 +1062,6 @@ def test_inspect_prints_the_number_that_column_takes(
     assert "  channel 2   foo (--column 3)" in told
     assert next(line for line in told if "hangs at" in line).split()[-1] == "899.937"
     assert any(line.endswith("foo, in no known unit") for line in told)
-
-
-@pytest.mark.parametrize("wavers", [0.0, 0.5])
-def test_amplitudes_that_are_alike_or_waver_are_refused_as_amplitudes(
-    tmp_path: Path, wavers: float
-) -> None:
-    rows = np.arange(40)
-    sizes = 33 * np.exp(-0.03 * rows) + wavers * np.sin(2.0 * rows)
-    with pytest.raises(InputError, match="only falls: amplitudes"):
-        read_text(tmp_path, text(np.rint(2 * sizes) / 2, digits=1, head="deg\n"))
 
 
 @pytest.mark.parametrize("runs", [0, 3])

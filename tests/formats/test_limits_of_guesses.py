@@ -10,6 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.special import ellipk
 
+from pendpipe.formats import circle, lists, times, units
 from pendpipe.formats import columns as guess
 from pendpipe.formats.table import (
     Column,
@@ -166,7 +167,7 @@ def test_flat_tops_are_counted_sample_by_sample(top: float, cycles: int) -> None
     st.lists(st.text("abc", min_size=1, max_size=80), max_size=30, unique=True), st.integers(1, 20)
 )
 def test_names_are_listed_up_to_a_number_and_a_length(names: list[str], most: int) -> None:
-    text = guess.listed(names, most)
+    text = guess.listing(names, most)
     assert len(text) <= most * 62 + 20
     shown = text.split(" and ")[0].split(", ")
     assert len(shown) == max(1, min(most, len(names)))
@@ -178,8 +179,8 @@ def test_names_are_listed_up_to_a_number_and_a_length(names: list[str], most: in
 
 @pytest.mark.parametrize(("left", "falls"), [(0.75, True), (0.85, False)])
 def test_sizes_that_fall_by_a_fifth_only_fall(left: float, falls: bool) -> None:
-    assert guess._only_falls(np.linspace(1.0, left, 20)) == falls
-    assert not guess._only_falls(TIME[:200] * np.cos(2 * np.pi * TIME[:200]))
+    assert lists.only_falls(np.linspace(1.0, left, 20)) == falls
+    assert not lists.only_falls(TIME[:200] * np.cos(2 * np.pi * TIME[:200]))
 
 
 @pytest.mark.parametrize(("rise", "falls"), [(4, True), (6, False)])
@@ -188,7 +189,7 @@ def test_of_sizes_that_fall_one_in_four_may_rise(rise: int, falls: bool) -> None
     steps[: 4 * rise : 4][:rise] = 0.001
     if rise > 5:
         steps[1] = 0.001
-    assert guess._only_falls(1.0 + np.cumsum(steps)) == falls
+    assert lists.only_falls(1.0 + np.cumsum(steps)) == falls
 
 
 @given(st.floats(-1e3, 1e3), st.floats(0.02, 0.98), st.booleans())
@@ -197,8 +198,8 @@ def test_one_way_is_the_share_of_steps_that_go_along(
 ) -> None:
     steps = np.where(np.arange(1000) < 1000 * share, 1.0, -1e-4)
     way = np.cumsum(np.append(start, steps)) * (-1.0 if down else 1.0)
-    assert guess.one_way(way) == pytest.approx(np.mean(steps > 0))
-    assert guess.one_way(np.full(20, start)) == 0.0
+    assert lists.one_way(way) == pytest.approx(np.mean(steps > 0))
+    assert lists.one_way(np.full(20, start)) == 0.0
 
 
 @pytest.mark.parametrize(("jitter", "even"), [(0.09, 1.0), (0.11, 0.75)])
@@ -226,9 +227,9 @@ def test_a_swing_does_not_count_on_however_few_its_readings() -> None:
 @pytest.mark.parametrize(("least", "lasts"), [(0.4, True), (0.2, False)])
 def test_durations_are_times_of_which_none_is_near_zero(least: float, lasts: bool) -> None:
     values = np.array([1.0, 1.1, 0.9, 1.05, least, 1.0, 1.1])
-    assert guess._lasts(column(values, role="time")) == lasts
-    assert not guess._lasts(column(values))
-    assert not guess._lasts(column(np.arange(1.0, 9.0), role="time"))
+    assert lists._lasts(column(values, role="time")) == lasts
+    assert not lists._lasts(column(values))
+    assert not lists._lasts(column(np.arange(1.0, 9.0), role="time"))
 
 
 @given(
@@ -242,7 +243,7 @@ def test_rounded_stamps_of_even_rows_are_counted(decimals: int, rate: float, sta
     interval = 10.0**-decimals / rate
     count = np.arange(600.0)
     true = start + interval * count
-    found = guess._rounded(np.round(true, decimals))
+    found = times._rounded(np.round(true, decimals))
     assert found is not None
     assert np.all(np.diff(found) == pytest.approx(interval, rel=0.01))
     assert found == pytest.approx(true, abs=10.0**-decimals)
@@ -251,8 +252,8 @@ def test_rounded_stamps_of_even_rows_are_counted(decimals: int, rate: float, sta
 @given(place=st.integers(0, 5), scale=st.sampled_from([1.0, 180 / np.pi]))
 def test_the_printed_digit_is_the_one_that_was_printed(place: int, scale: float) -> None:
     whole = np.random.default_rng(place).integers(-9000, 9000, 500)
-    assert guess._printed_digit(whole * 10.0**-place / scale, scale) == 10.0**-place
-    assert guess._printed_digit(decay(1.0) * np.pi, scale) is None
+    assert units._printed_digit(whole * 10.0**-place / scale, scale) == 10.0**-place
+    assert units._printed_digit(decay(1.0) * np.pi, scale) is None
 
 
 @pytest.mark.parametrize("turn", [2 * np.pi, 360.0])
@@ -264,7 +265,7 @@ def test_a_turn_over_an_encoder_s_counts_tells_the_unit(
     turn: float, counts: int, is_one: bool
 ) -> None:
     step = turn / counts
-    found = guess._by_lines(np.rint(decay(1.0) * turn / 8 / step) * step)
+    found = units._by_lines(np.rint(decay(1.0) * turn / 8 / step) * step)
     printed = float(f"{step:.3g}") == pytest.approx(step, rel=1e-9)
     assert (found is not None) == (is_one and not printed)
     assert found is None or str(counts) in found.why
@@ -277,11 +278,11 @@ def test_an_encoder_s_counts_go_on_over_its_zero(bits: int, zero: float) -> None
     seen = true % turn
     # So many bits are known by their use alone.
     seen[:2] = [0.0, turn - 1.0]
-    found, notes = guess._over_the_turn(seen.copy())
+    found, notes = units._over_the_turn(seen.copy())
     assert np.diff(found)[2:] == pytest.approx(np.diff(true)[2:])
     assert notes
     slow = 1000.0 + np.rint(100 * np.cos(TIME))
-    assert np.array_equal(guess._over_the_turn(slow.copy())[0], slow)
+    assert np.array_equal(units._over_the_turn(slow.copy())[0], slow)
 
 
 @settings(settings.get_profile("same"))
@@ -294,18 +295,18 @@ def test_an_encoder_s_counts_go_on_over_its_zero(bits: int, zero: float) -> None
 @example(x=0.5, y=0.5, arm=0.5, wide=0.15)
 def test_the_pivot_is_the_centre_of_the_circle(x: float, y: float, arm: float, wide: float) -> None:
     angle = wide * np.exp(-0.02 * TIME) * np.cos(2 * np.pi * TIME)
-    found = guess._pivot(x + arm * np.sin(angle), y - arm * np.cos(angle))
+    found = circle.pivot_of(x + arm * np.sin(angle), y - arm * np.cos(angle))
     assert found is not None
     assert found == pytest.approx([x, y], abs=1e-6)
     # About (0, 0) nothing has to be found.
-    assert guess._pivot(arm * np.sin(angle), -arm * np.cos(angle)) is None
+    assert circle.pivot_of(arm * np.sin(angle), -arm * np.cos(angle)) is None
 
 
 def test_a_wild_place_moves_no_pivot() -> None:
     angle = np.exp(-0.02 * TIME) * np.cos(2 * np.pi * TIME)
     x, y = 2.0 + np.sin(angle), 3.0 - np.cos(angle)
     x[100], y[200] = 3.5, 1.2
-    assert guess._pivot(x, y) == pytest.approx([2.0, 3.0], abs=1e-6)
+    assert circle.pivot_of(x, y) == pytest.approx([2.0, 3.0], abs=1e-6)
 
 
 def test_hours_minutes_seconds_and_milliseconds_are_one_time() -> None:
@@ -325,22 +326,22 @@ def replace_number(part: Column, number: int) -> Column:
     return Column(part.name, part.unit, part.values, number, role=part.role)
 
 
-def base(time: np.ndarray, rows: np.ndarray | None = None) -> guess.TimeBase:
-    return guess.TimeBase(time, np.arange(len(time)) if rows is None else rows)
+def base(time: np.ndarray, rows: np.ndarray | None = None) -> times.TimeBase:
+    return times.TimeBase(time, np.arange(len(time)) if rows is None else rows)
 
 
-def order(time: np.ndarray, **given: float) -> guess.TimeBase:
+def order(time: np.ndarray, **given: float) -> times.TimeBase:
     """The times of a table of one clock and one reading, in order."""
     reading = column(np.sin(np.arange(float(len(time)))), "angle", "rad", "angle")
     table = Table(Path("made-up"), "text", (reading,))
     choice = guess.Choice(None, False, (reading,), (reading,))
-    return guess._in_order(table, choice, base(time), 1.0, ReadOptions(**given))
+    return times._in_order(table, choice, base(time), 1.0, ReadOptions(**given))
 
 
 @pytest.mark.parametrize("start", [0.0, 1e16])
 def test_blocks_under_one_stamp_are_counted_where_the_clock_has_digits_left(start: float) -> None:
-    stamps = guess.TimeBase(start + np.repeat(2.0 * np.arange(40), 5), np.arange(200))
-    guess._count_rows(guess.Choice(None, False, (), ()), stamps)
+    stamps = times.TimeBase(start + np.repeat(2.0 * np.arange(40), 5), np.arange(200))
+    times._count_rows(guess.Choice(None, False, (), ()), stamps)
     even = np.ptp(np.diff(stamps.time_s)) < 1e-9
     assert even == (start == 0.0)
 

@@ -367,6 +367,9 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     NotAnalysableError
         When there is no free decay of at least three half cycles: one line that says why.
     """
+    if recording.holds_amplitudes:
+        why = "it holds amplitudes, not a recording of the swing"
+        raise NotAnalysableError(place, why, "give the recording that they were read from")
     # A whole recording is not copied.
     usable = slice(None) if recording.usable.all() else recording.usable
     time, values = recording.time_s[usable], recording.values[usable]

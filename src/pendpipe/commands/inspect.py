@@ -30,6 +30,7 @@ def _lines(file: str, found: Inspection) -> list[str]:
     ]
     facts = [
         ("format", found.format),
+        *([("kind", f"{found.kind}: no free decay")] if found.kind != "motion" else []),
         *(
             (
                 f"channel {number}",

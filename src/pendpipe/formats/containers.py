@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe.errors import InputError, refuse_if
+from pendpipe.formats.lists import SETTINGS, STATES, WAVEFORM, holds_settings
 from pendpipe.formats.table import (
     Column,
     NotThisFormatError,
@@ -79,7 +80,7 @@ def _tables(place: Path, archive: zipfile.ZipFile, names: list[str]) -> dict[str
         "this is a project of PASCO Capstone",
         "export its data as CSV or text",
     )
-    wanted = (".csv", ".tsv", ".txt", ".dat", ".trk")
+    wanted = (".csv", ".tsv", ".txt", ".dat", ".trk", *STATES)
     return {
         name: archive.read(name)
         for name in names
@@ -99,6 +100,11 @@ def _of_members(place: Path, members: dict[str, bytes], options: ReadOptions) ->
             tables[name] = reader(place, content, options)
         except (NotThisFormatError, InputError) as fault:
             reason = f"{name}: {getattr(fault, 'problem', fault)}"
+    states = [
+        holds_settings(name, content[:20_000].decode("utf-8", "replace"))
+        for name, content in members.items()
+    ]
+    refuse_if(not tables and states and all(states), place, SETTINGS, WAVEFORM)
     refuse_if(not tables, place, f"the archive has no table ({reason})", "give the file in it")
     best = max(tables, key=lambda name: len(tables[name].columns[0].values))
     return _noted(tables[best], f"'{best}' of the archive", [n for n in tables if n != best])

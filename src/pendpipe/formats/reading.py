@@ -17,7 +17,16 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.formats.columns import TimeBase, choose, readings, refuse_text, time_base
+from pendpipe.formats.columns import choose
+from pendpipe.formats.lists import (
+    NOT_FREE,
+    SETTINGS,
+    WAVEFORM,
+    holds_settings,
+    only_falls,
+    sizes_of,
+    steady,
+)
 from pendpipe.formats.plugin import HEAD
 from pendpipe.formats.table import (
     Column,
@@ -33,6 +42,8 @@ from pendpipe.formats.table import (
     sample_rate,
     without_marks,
 )
+from pendpipe.formats.times import TimeBase, refuse_text, time_base
+from pendpipe.formats.units import readings
 from pendpipe.formats.words import role_of, split_header, unit_of
 from pendpipe.recording import (
     GOOD,
@@ -197,6 +208,10 @@ def table_of(place: Path, data: bytes, options: ReadOptions) -> Table:
     try:
         table = read_table(place, data, options)
     except NotThisFormatError as fault:
+        refuse_if(
+            holds_settings(place.name, data[:HEAD].decode("utf-8", "replace")),
+            *(place, SETTINGS, WAVEFORM),
+        )
         raise InputError(
             place,
             f"no reader knows this file: {fault if reason is None else reason}",
@@ -245,6 +260,10 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
         for number, mark in enumerate(table.markers, start=1)
     }
     metadata = {**kept, **base.metadata, **marks}
+    if choice.listed is not None and choice.listed.kind == "amplitudes":
+        metadata["holds"] = "amplitudes"
+    elif said := steady(base.time_s, values, choice.channels):
+        notes.append(said)
     if found.quantity == "reading":
         metadata["unit"] = found.unit
     own_step = choice.readings[0].resolution
@@ -312,6 +331,11 @@ def read_if_plain(place: Path, data: bytes, options: ReadOptions) -> Recording |
             "name the reading's column, or choose it with --column and --unit",
         )
     recording = read_plain(place, data)
+    if only_falls(recording.values):  # as our own table of turning points
+        values, said = sizes_of(recording.values), "it only falls: amplitudes against time"
+        metadata = {**recording.metadata, "holds": "amplitudes"}
+        notes = (*recording.notes, *([] if recording.holds_amplitudes else [said]))
+        recording = replace(recording, values=values, metadata=metadata, notes=notes)
     return replace(recording, resolution=recording.resolution or find_step(recording.values))
 
 
@@ -384,6 +408,8 @@ class Inspection:
         What was guessed on slender grounds, with the option that overrides it.
     why
         How the file was understood, a line a decision.
+    kind
+        ``motion``, ``steady or driven``, ``amplitudes``, ``periods``, ``spectrum``, ``passages``.
     """
 
     format: str
@@ -403,6 +429,7 @@ class Inspection:
     level: float = 0.0
     weak_guesses: tuple[str, ...] = ()
     why: tuple[str, ...] = ()
+    kind: str = "motion"
 
     def as_json(self) -> dict[str, Any]:
         """Return the object that ``inspect --json`` prints."""
@@ -428,6 +455,7 @@ class Inspection:
             "unit": self.unit,
             "level": self.level if isfinite(self.level) else None,
             "weak_guesses": list(self.weak_guesses),
+            "kind": self.kind,
         }
 
 
@@ -452,11 +480,16 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
     )
     choice = replace(choice, readings=choice.readings or choice.channels[:1])
     column, weak = choice.readings[0], tuple[str, ...]()
+    kind = choice.listed.kind if choice.listed else "motion"
     try:
         recording = recording_of(table, options) if plain is None else plain
         time, values = recording.time_s[recording.usable], recording.values[recording.usable]
         unit, step, weak = recording.unit, recording.resolution, recording.weak_guesses
         notes = list(recording.notes)
+        if recording.holds_amplitudes:
+            kind = "amplitudes"
+        elif any(note.endswith(NOT_FREE) for note in notes):
+            kind = "steady or driven"
     except InputError as fault:
         try:
             base = time_base(table, choice, options)
@@ -501,6 +534,7 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
             f"so {len(time)} readings of {', '.join(c.label for c in choice.readings)}, in "
             + (unit if unit != "1" else "their own unit"),
         ),
+        kind=kind,
     )
 
 

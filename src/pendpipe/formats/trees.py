@@ -24,6 +24,7 @@ from pendpipe.arrays import AnyArray, FloatArray
 from pendpipe.errors import refuse_if
 from pendpipe.formats.clock import column_of_clock_times
 from pendpipe.formats.header import interval_of
+from pendpipe.formats.lists import SETTINGS, WAVEFORM
 from pendpipe.formats.table import (
     Column,
     NotThisFormatError,
@@ -68,7 +69,10 @@ def table_of_tree(
     arrays = dict(_numbers(tree))
     columns = {name: values for name, values in arrays.items() if values.size > 3}
     refuse_if(
-        not columns, place, "there is no array of numbers in it", "save the time and the angle"
+        not columns,
+        place,
+        "there is no array of numbers in it: " + SETTINGS.partition(" ")[2],
+        f"{WAVEFORM}, or save the time and the angle",
     )
     length = _length(columns, options)
     left = [name for name, values in columns.items() if len(values) != length]

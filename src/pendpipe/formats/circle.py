@@ -1,0 +1,138 @@
+"""Positions x, y on a circle about a pivot: whether they are, about which, and the angle."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.formats.lists import one_way
+from pendpipe.formats.table import Column, periods, swing_of
+
+
+def on_a_circle(x: FloatArray, y: FloatArray, *, named: bool) -> bool:
+    """Say whether x, y go to and fro on a circle about the origin, and hang above or below it.
+
+    Pixels counted from an image's corner keep much the same distance from it as well: but
+    there the distance follows x, and the vertical through the origin lies outside the swing.
+    """
+    good = np.isfinite(x) & np.isfinite(y)
+    x, y, sides = x[good], np.abs(y[good]), np.sign(y[good])
+    if len(x) < 8 or max(np.abs(x).max(), y.max()) > 1e100:
+        return False
+    radius, angle = np.hypot(x, y), np.arctan2(x, y)
+    if (
+        not 0.0 < np.std(radius) <= min(0.08 * np.mean(radius), 0.3 * np.std(x))
+        or abs(np.mean(sides)) <= 0.95
+        or abs(np.median(angle)) > min(0.4, 0.5 * np.ptp(angle))
+        or not swing_of(x).clear
+    ):
+        return False
+    # On a circle y falls with x squared; two columns without names must show it.
+    follows = float(np.corrcoef(x**2, y)[0, 1])  # NaN where either stands still
+    shown = follows < -0.5 and np.std(radius) < 0.5 * np.std(y) and one_way(y) < 0.9
+    return not follows >= 0.5 if named else bool(shown)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Angles about the pivot, shape (n,), with the distance over its median, less 1."""
+
+    angle_rad: FloatArray
+    radius_excess: FloatArray
+    notes: tuple[str, ...]
+    weak_guesses: tuple[str, ...] = ()
+
+
+def seen_from_pivot(x: Column, y: Column, time_s: FloatArray) -> Seen:
+    """Turn a position into an angle about the pivot: atan2(x, -y), 0 straight down.
+
+    Positions that are not on a circle about (0, 0) are on one about the pivot. Where both fit
+    nearly, and the other's centre fits better by an F test, the length of the pendulum that has
+    this period under gravity decides; where that agrees with neither, the better circle is a guess.
+    """
+    left, up, seen = x.values, y.values, "the position seen from (0, 0)"
+    pivot, weak = pivot_of(left, up), tuple[str, ...]()
+    if pivot is None and (better := _better_circle(left, up)) is not None:
+        period_s = float(np.median(periods(time_s, left)[0]))
+        length_m = 9.81 * (period_s / (2.0 * np.pi)) ** 2
+        arms = [float(np.nanmedian(np.hypot(left - a, up - b))) for a, b in ((0.0, 0.0), better)]
+        agree = [any(abs(arm * f / length_m - 1.0) < 0.05 for f in _LENGTHS) for arm in arms]
+        if not agree[0]:
+            pivot = better
+        if agree == [False, False]:
+            weak = (
+                f"the pivot is not (0, 0) but ({better[0]:.4g}, {better[1]:.4g}), about which"
+                " the positions lie on a circle (--column x for the position itself)",
+            )
+    if pivot is not None:
+        left, up = left - pivot[0], up - pivot[1]
+        seen = f"about the centre of their circle, ({pivot[0]:.5g}, {pivot[1]:.5g})"
+    down, sign = (-1.0, "-") if float(np.nanmedian(up)) < 0 else (1.0, "")
+    note = f"angle = atan2({x.label}, {sign}{y.label}), {seen}"
+    radius = np.hypot(left, up)
+    excess = radius / np.nanmedian(radius) - 1.0
+    return Seen(np.arctan2(left, down * up), excess, (note,), weak)
+
+
+_LENGTHS: Final = (1.0, 0.01, 1e-3, 0.0254)
+"""Metres of the units in which positions are given."""
+
+
+def _better_circle(x: FloatArray, y: FloatArray) -> FloatArray | None:
+    """Find the centre of a circle that fits positions better than that about (0, 0), by an F test.
+
+    The two further parameters lower the sum of squares by F > 30; the centre is known to 3 % of the
+    radius, and further than a tenth of it from (0, 0).
+    """
+    from scipy.optimize import least_squares
+
+    points = np.column_stack([x, y])[np.isfinite(x) & np.isfinite(y)]
+    if len(points) < 50 or not on_a_circle(x, y, named=True):
+        return None
+
+    def excess(centre: FloatArray) -> FloatArray:
+        radius = np.hypot(*(points - centre).T)
+        return np.asarray(radius - radius.mean())
+
+    fitted = least_squares(excess, np.zeros(2))
+    spread, arm = float(fitted.fun @ fitted.fun), float(np.hypot(*(points - fitted.x).T).mean())
+    test = 0.5 * (float(np.sum(excess(np.zeros(2)) ** 2)) / spread - 1.0) * (len(points) - 3)
+    slopes = np.asarray(fitted.jac)
+    inverse = np.linalg.pinv(slopes.T @ slopes)
+    known = float(np.sqrt(spread / len(points) * np.trace(inverse))) < 0.03 * arm
+    return fitted.x if known and test > 30.0 and math.hypot(*fitted.x) > 0.1 * arm else None
+
+
+def pivot_of(x: FloatArray, y: FloatArray) -> FloatArray | None:
+    """Find the centre of the circle from which positions have the least rms distance.
+
+    It starts from x^2 + y^2 = 2 (a x + b y) + c, which alone is biased by noise, and leaves out
+    positions far from it (a hand, a lost marker). None where they lie on none, its centre is
+    uncertain by 3 % of its radius, or within a tenth of it of (0, 0), and where the swing is
+    below a tenth of a radian.
+    """
+    good = np.isfinite(x) & np.isfinite(y)
+    points = np.column_stack([x[good], y[good]])
+    if len(points) < 8 or np.abs(points).max() > 1e100:
+        return None
+    one, middle = np.ones((len(points), 1)), points.mean(axis=0)
+    inverse = np.linalg.pinv(np.hstack([2.0 * (points - middle), one]))
+    centre = (inverse @ np.sum((points - middle) ** 2, axis=1))[:2] + middle
+    for _ in range(6):
+        arm = points - centre
+        radius = np.hypot(*arm.T)
+        off = np.abs(radius - np.median(radius))
+        # Exact positions are off by rounding alone, which leaves none of them out.
+        far = max(6.0 * float(np.median(off)), 1e-9 * float(np.median(radius)))
+        near = (off <= far) & (radius > 0.0)
+        inverse = np.linalg.pinv(np.hstack([arm / radius[:, None], one])[near])
+        centre = centre + (inverse @ radius[near])[:2]
+    mean, (wide, high) = float(radius[near].mean()), np.abs(arm[near]).T
+    known = float(np.std(radius[near])) * float(np.linalg.norm(inverse[:2])) < 0.03 * mean
+    hangs = high.min() > 0.05 * mean and wide.max() > 0.1 * mean
+    away = math.hypot(*centre) / mean
+    # The farther from (0, 0), the less the circle need show.
+    clear = np.std(radius[near]) < min(max(0.3, 1.5 * away), 0.5) * np.std(points[near, 1])
+    return centre if known and hangs and clear and away > 0.1 else None

@@ -1,0 +1,479 @@
+"""The times of the rows: in seconds, in order, evened out where their stamps are coarse."""
+
+from dataclasses import dataclass, field
+from itertools import product
+from typing import Final
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
+from pendpipe.errors import InputError, refuse_if
+from pendpipe.formats.columns import Choice
+from pendpipe.formats.grammar import MOST_DAMAGED
+from pendpipe.formats.lists import counts_samples, one_way
+from pendpipe.formats.table import Column, ReadOptions, Table, is_uniform, periods
+from pendpipe.formats.words import Unit, plain, unit_of
+
+_EPOCH: Final = 3e8
+"""Seconds beyond which a clock counts from a date (1979 in Unix time), not a start."""
+_LATEST: Final = 1e10
+"""Seconds since 1970 that no recording has reached: the unit in the header is wrong."""
+_EPOCHS: Final = (
+    (3e17, 1e-9, "nanoseconds"),
+    (3e14, 1e-6, "microseconds"),
+    (3e11, 1e-3, "milliseconds"),
+    (_EPOCH, 1.0, "seconds"),
+)
+_LONGEST_S: Final = 300.0
+"""Period beyond which a time without a unit is hardly in seconds: no pendulum is so slow."""
+_SHORTEST_S: Final = 5e-4
+"""Period below which it is hardly in seconds either."""
+
+
+@dataclass
+class TimeBase:
+    """Times of the rows that are kept; which rows those are, in order; what was done.
+
+    Parameters
+    ----------
+    time_s
+        Shape (n,), rising.
+    rows
+        Row of the table that each comes from, shape (n,); a permutation where the file
+        has its newest row first.
+    lines
+        Line of the file that each comes from, where it has lines: a lost row leaves one.
+    """
+
+    time_s: FloatArray
+    rows: IntArray
+    lines: IntArray | None = None
+    notes: list[str] = field(default_factory=list)
+    weak_guesses: list[str] = field(default_factory=list)
+    metadata: dict[str, str] = field(default_factory=dict)
+
+    def keep(self, rows: slice | BoolArray | IntArray, *notes: str) -> None:
+        """Keep some of the rows, or put them into another order, and say so."""
+        self.time_s, self.rows = self.time_s[rows], self.rows[rows]
+        self.lines = None if self.lines is None else self.lines[rows]
+        self.notes.extend(notes)
+
+
+def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
+    """Find the time of every row.
+
+    In this order: the rate that the user gives, the instrument's own clock, the time
+    column (in the unit given, or the one that fits), a column that counts samples with the
+    rate in the header, the rate in the header alone.
+
+    Raises
+    ------
+    InputError
+        When there is no time, or it falls, repeats or is no number: file, line, remedy.
+    """
+    reading = choice.readings[0] if choice.readings else table.columns[0]
+    every = np.arange(len(reading.values))
+    if options.sample_rate is not None:
+        note = f"times are counted at the given {options.sample_rate:g} Hz from the first row"
+        return TimeBase(every.astype(np.float64) / options.sample_rate, every, notes=[note])
+    if reading.time_s is not None:
+        return TimeBase(reading.time_s, every)
+    column = choice.time
+    if column is not None and not choice.counts:
+        return _from_column(table, choice, column, reading, options)
+    counted = f" ('{column.label}' only counts)" if column is not None else ""
+    interval_s = table.interval_s or np.nan
+    refuse_if(
+        table.interval_s is None,
+        table.place,
+        (f"{choice.listed.problem}; " if choice.listed else "")
+        + f"there is no time column and no sample rate{counted}",
+        "give --sample-rate, or name the time with --column TIME:READING",
+    )
+    number = every.astype(np.float64) if column is None else column.values - column.values[0]
+    note = f"no time column: times from the header's {1 / interval_s:g} Hz"
+    note += f" and '{column.label}'" if column is not None else ""
+    base = TimeBase(number * interval_s, every, notes=[note])
+    return _in_order(table, choice, base, interval_s, options)
+
+
+def _from_column(
+    table: Table, choice: Choice, column: Column, reading: Column, options: ReadOptions
+) -> TimeBase:
+    """Read the times off a column."""
+    filled = np.ones(len(column.values), dtype=bool)
+    if len(reading.values) == len(filled):
+        # Of runs side by side one is shorter.
+        filled &= ~(np.isnan(column.values) & ~np.isfinite(reading.values))
+    refuse_text(table, column, "correct or drop the row")
+    lost = ~np.isfinite(column.values) & filled
+    bad = np.flatnonzero(lost)
+    if few := 0 < len(bad) <= MOST_DAMAGED * len(filled):
+        filled &= ~lost
+    refuse_if(
+        bad.size and not few,
+        table.where(int(bad.min(initial=len(filled) - 1))),
+        "the time is missing or NaN",
+        "correct or drop the row",
+    )
+    factor, note, weak = _time_unit(column, reading, options)
+    if weak and table.interval_s is not None:
+        # A clock without a unit ticks in some decimal part of a second.
+        factor = table.interval_s / float(np.median(np.abs(np.diff(column.values[filled]))))
+        factor, rate, weak = 10.0 ** np.rint(np.log10(factor)), 1.0 / table.interval_s, False
+        note = f"'{column.label}' ticks every {factor:g} s, by the header's {rate:g} Hz"
+    rows = np.flatnonzero(filled)
+    lines = None if table.lines is None or len(table.lines) < len(filled) else table.lines[rows]
+    base = TimeBase(column.values[rows] * factor, rows, lines)
+    if few:
+        base.notes.append(f"{len(bad)} row(s) without a time left out")
+    if left := len(filled) - len(rows) - few * len(bad):
+        base.notes.append(f"{left} row(s) with neither time nor reading left out")
+    (base.weak_guesses if weak else base.notes).extend([note] * bool(note))
+    return _in_order(table, choice, base, factor, options)
+
+
+def refuse_text(table: Table, column: Column, remedy: str) -> None:
+    """Refuse a column by the first of its cells that should be a number and is not."""
+    row, text = next(iter(column.garbled.items()), (0, ""))
+    refuse_if(column.garbled, table.where(row), f"'{text}' is no number", remedy)
+
+
+def _time_unit(column: Column, reading: Column, options: ReadOptions) -> tuple[float, str, bool]:
+    """Find the seconds in one unit of the time column, the reason, and whether it is weak."""
+    if (asked := options.units[0]) is not None:
+        given = unit_of(asked) or Unit("none", 1.0)
+        refuse_if(given.kind != "time", "--unit", f"'{asked}' is no unit of time", "give s, ms, us")
+        return given.factor, "", False
+    values = column.values[np.isfinite(column.values)]
+    largest = float(np.abs(values).max(initial=0.0))
+    period = _period(reading, values)
+    for word in filter(unit_of, (column.unit, column.name)):
+        unit = unit_of(word)
+        fits = unit is not None and unit.kind == "time" and largest * unit.factor <= _LATEST
+        if unit and fits and (word == column.unit or plain(word) not in ("t", "h", "min")):
+            return unit.factor, "", False
+    for least, factor, name in _EPOCHS:
+        ticks = factor < 1.0 and float(np.ptp(values)) > 0.1 * largest
+        if largest > least and not ticks and factor * period < _LONGEST_S:
+            return factor, f"'{column.label}' counts {name} since 1970", False
+    return _time_by_size(column, period, values)
+
+
+def _period(reading: Column, values: FloatArray) -> float:
+    """Period of the reading on a clock, in the clock's unit; 0 where nothing swings."""
+    cycle = reading.swing.samples_per_cycle
+    span = float(np.ptp(values)) if len(values) else 0.0
+    return cycle * span / max(1, len(values) - 1)
+
+
+def _time_by_size(column: Column, period: float, values: FloatArray) -> tuple[float, str, bool]:
+    """Take seconds, unless no pendulum would be so slow."""
+    step = float(np.median(np.abs(np.diff(values)))) if len(values) > 1 else 1.0
+    whole = bool(np.all(values[:1000] == np.rint(values[:1000])))
+    taken = f"'{column.label}' is taken to be in"
+    if period > _LONGEST_S or (not period and whole and step >= 500):
+        cycle, seen = period or 50.0 * step, f"a period of {period:.4g}"
+        ticks = ((3e7, 1e-9, "nanoseconds"), (3e4, 1e-6, "microseconds"), (0, 1e-3, "milliseconds"))
+        factor, name = next((size, name) for least, size, name in ticks if cycle > least)
+        seen = seen if period else f"steps of {step:.4g}"
+        note = f"'{column.label}' has no unit: taken to be {name} by {seen} (--unit s: for seconds)"
+        return factor, note, True
+    if 0.0 < period < _SHORTEST_S < 86400.0 * period < _LONGEST_S * 1e3:
+        dated = 2e4 < float(np.abs(values).max(initial=0.0)) < 1e6
+        return 86400.0, f"{taken} days, as spreadsheets count (--unit s: for s)", not dated
+    if period and (whole or not 0.02 < period < 60.0):
+        said = f"{taken} seconds: a period of {period:.4g} s (--unit ms: for milliseconds)"
+        return 1.0, said, True
+    return 1.0, f"{taken} seconds", False
+
+
+def _in_order(
+    table: Table, choice: Choice, base: TimeBase, tick: float, options: ReadOptions
+) -> TimeBase:
+    """Turn times that are out of order, or repeat, into times that rise; or refuse them."""
+    if one_way(base.time_s) > 0.95 and base.time_s[-1] < base.time_s[0]:
+        base.keep(slice(None, None, -1), "the newest row stands first: rows turned round")
+    if len(base.time_s) and abs(base.time_s[0]) > _EPOCH:
+        start = float(base.time_s[0])
+        base.metadata["recorded_at"] = f"{start:.6f} s since 1970"
+        base.notes.append(f"times are counted from the first row ({start:.6f} s on its clock)")
+        base.time_s = base.time_s - start
+    if np.diff(base.time_s).min(initial=1.0) <= 0:
+        # What lies before --start, or behind --stop, need not be in order.
+        start_s, stop_s = options.start_s, options.stop_s
+        late = np.flatnonzero(base.time_s >= (np.inf if stop_s is None else stop_s))
+        base.keep(slice(late.min(initial=len(base.time_s)) + 1))
+        early = np.flatnonzero(base.time_s <= (-np.inf if start_s is None else start_s))
+        base.keep(slice(early.max(initial=0), None))
+    for repaired in (
+        _drop_torn,
+        _count_rows,
+        _keep_last,
+        _drop_repeats,
+        _lone_stamps,
+        _first_of_stacked,
+    ):
+        if np.diff(base.time_s).min(initial=1.0) <= 0:
+            repaired(choice, base)
+    steps = np.diff(base.time_s)
+    if steps.min(initial=1.0) > 0:
+        _count_late_rows(choice, base)
+        _without_lone_ends(base)
+        return base
+    at = int(np.argmax(steps <= 0))
+    verb = "repeats" if steps[at] == 0 else "falls"
+    before, after = base.time_s[at] / tick, base.time_s[at + 1] / tick
+    clocks = (
+        f"take the time from '{column.label}' (--column '{column.label}:READING'), "
+        for column in table.columns
+        if column is not choice.time and not counts_samples(column)
+        if np.diff(column.values).min(initial=np.inf) > 0
+    )
+    end = f"{base.time_s[at]:.10g}"
+    raise InputError(
+        table.where(int(base.rows[at + 1])),
+        f"the time {verb} ({before:.10g} is followed by {after:.10g})",
+        f"{next(clocks, '')}read what lies before it (--stop {end}) or behind it (--start {end}),"
+        " or give --sample-rate if the rows are evenly spaced",
+    )
+
+
+def _count_rows(_choice: Choice, base: TimeBase) -> None:
+    """Count the rows where stamps are rounded and repeat; a logger may slow down behind them."""
+    whole = len(base.time_s)
+    last = int(np.max(np.flatnonzero(np.diff(base.time_s) == 0.0), initial=-2)) + 2
+    for rows in sorted({whole, last}, reverse=True):
+        even = _rounded(base.time_s[:rows], base.lines)
+        # So far from its zero a clock has no digits left between the rows.
+        interval = 0.0 if even is None else float(np.diff(even).min())
+        if even is None or not interval > 0.0:
+            continue
+        frames = round((even[-1] - even[0]) / interval) + 1 - len(even)
+        lost = f", with {frames} missing" if frames else ""
+        until = f" until {even[-1]:.6g} s" if rows < whole else ""
+        exact = min(interval, np.ptp(base.time_s[:rows] - even))
+        base.notes.append(
+            f"time stamps are rounded and repeat{until}: rows are counted at"
+            f" {1.0 / interval:.6g} Hz{lost}, which all stamps agree with: the rate is known to"
+            f" {100.0 * exact / np.ptp(even):.1g} %"
+        )
+        base.time_s = np.append(even, base.time_s[rows:])
+        return
+
+
+def _count_late_rows(choice: Choice, base: TimeBase) -> None:
+    """Count rows that were stamped as they arrived: by rows the periods agree far better."""
+    values = _values(choice, base)
+    if not len(values) or is_uniform(base.time_s):
+        return
+    index = np.arange(len(values))
+    even: FloatArray = np.polynomial.Polynomial.fit(index, base.time_s, 1)(index)
+    stamped, counted = (periods(time, values)[0] for time in (base.time_s, even))
+    if min(len(stamped), len(counted)) < 8:
+        return
+    scatter = [np.median(np.abs(np.diff(found))) / np.median(found) for found in (stamped, counted)]
+    if scatter[1] < min(0.1 * scatter[0], 0.03):
+        late = float(np.std(base.time_s - even))
+        base.weak_guesses.append(
+            f"time stamps scatter by {late:.2g} s, as of arrival: rows are counted at"
+            f" {1.0 / (even[1] - even[0]):.6g} Hz, by which the periods agree"
+            f" {scatter[0] / scatter[1]:.0f} times better; the rate is known"
+            f" to {100.0 * late / np.ptp(even):.1g} % (--sample-rate)"
+        )
+        base.time_s = even
+
+
+def _without_lone_ends(base: TimeBase) -> None:
+    """Leave out a first or last row that a torn stamp has put a long way from the others."""
+    steps = np.diff(base.time_s)
+    usual = float(np.median(steps)) if len(steps) > 99 and is_uniform(base.time_s) else np.inf
+    first, last = (bool(np.any(end > 50.0 * usual)) for end in (steps[:1], steps[-1:]))
+    if first or last:
+        note = f"{first + last} lone row(s) left out, with a stamp far from the others'"
+        base.keep(slice(int(first), len(base.time_s) - last), note)
+
+
+def _values(choice: Choice, base: TimeBase) -> FloatArray:
+    """Give the readings of the rows that are kept; none where there are fewer."""
+    values = choice.readings[0].values if choice.readings else np.empty(0)
+    return values[base.rows] if len(values) > base.rows.max(initial=0) else np.empty(0)
+
+
+def _drop_repeats(choice: Choice, base: TimeBase) -> None:
+    """Leave out rows with the time of an earlier row: a logger that sends what it has sent.
+
+    Whole copies always; with other readings where they are rare, for then the earlier row,
+    which stands where its time belongs, is the true one.
+    """
+    _, first, which = np.unique(base.time_s, return_index=True, return_inverse=True)
+    origin = first[which.reshape(-1)]
+    again = origin < np.arange(len(origin))
+    if again.sum() > max(20, 0.01 * len(again)):
+        for column in choice.channels:
+            if len(column.values) > base.rows.max():
+                values = column.values[base.rows]
+                same = (values == values[origin]) | (np.isnan(values) & np.isnan(values[origin]))
+                again &= same
+    if again.any():
+        base.keep(~again, f"{again.sum()} row(s) that repeat the time of an earlier row left out")
+
+
+def _first_of_stacked(_choice: Choice, base: TimeBase) -> None:
+    """Keep the first of several runs that stand below one another, each from its own start."""
+    starts = np.flatnonzero(np.diff(base.time_s) < 0) + 1
+    lengths = np.diff(np.concatenate(([0], starts, [len(base.time_s)])))
+    again = np.abs(base.time_s[starts] - base.time_s[0]) < 0.05 * np.ptp(base.time_s)
+    if not 0 < len(starts) <= 50 or lengths.min() < 50 or not again.all():
+        return
+    base.weak_guesses.append(
+        f"{len(lengths)} runs stand below one another: the first is read ({lengths[0]} rows);"
+        " put each into a file of its own for the others"
+    )
+    base.keep(slice(starts[0]))
+
+
+def _fallen(time: FloatArray) -> IntArray:
+    """Find stamps that fall out of a time that rises without them."""
+    padded = np.concatenate(([-np.inf], time, [np.inf]))
+    at = np.flatnonzero(np.diff(time) < 0)
+    # Either the stamp before a fall is too late, or the one behind it too early.
+    return np.where(padded[at + 3] >= padded[at + 1], at + 1, at)
+
+
+def _drop_torn(_choice: Choice, base: TimeBase) -> None:
+    """Leave out rows with torn stamps among those that are rounded, up to one in a hundred."""
+    wrong, steps = _fallen(base.time_s), np.diff(base.time_s)
+    good = np.delete(base.time_s, wrong)
+    rare = 0 < len(wrong) <= MOST_DAMAGED * len(steps) and np.mean(steps == 0.0) > 0.02
+    if rare and np.diff(good).min(initial=0.0) >= 0.0:
+        kept = np.delete(np.arange(len(base.time_s)), wrong)
+        base.keep(kept, f"{len(wrong)} row(s) with a stamp that falls out of order left out")
+
+
+def _lone_stamps(_choice: Choice, base: TimeBase) -> None:
+    """Interpolate stamps that fall out of a time that rises without them."""
+    wrong = _fallen(base.time_s)
+    good = np.delete(np.arange(len(base.time_s)), wrong)
+    inside = not {0, len(base.time_s) - 1} & set(wrong.tolist())
+    rows, steps = np.diff(good), np.diff(base.time_s[good])
+    # Behind a clock that was set back the next row comes too soon.
+    soon = np.any(steps[rows > 1] < 0.5 * rows[rows > 1] * np.median(steps))
+    rises = steps.min(initial=1.0) > 0 and not soon
+    if inside and rises and len(wrong) <= 0.05 * len(good):
+        base.time_s = np.interp(np.arange(len(base.time_s)), good, base.time_s[good])
+        base.notes.append(f"{len(wrong)} time stamp(s) that fall out of order interpolated")
+
+
+def _rounded(time: FloatArray, lines: IntArray | None = None) -> FloatArray | None:
+    """Undo the coarseness of the stamps of evenly spaced rows; ``None`` if they are not that.
+
+    One test for stamps that are rounded, cut, or stand for a block of rows: the rows are even
+    within what one stamp stands for (`_coarseness`), which may change on the way. Stamps lie at
+    the middle of it (rounded), or at either end (cut; the arrival of a block).
+
+    Where a stamp shows that frames are missing, each row is counted one interval after the row
+    above, or as many as bring it within its stamp. The interval with which fewest are missing
+    is right.
+    """
+    steps = np.diff(time)
+    if len(time) < 10 or steps.min() < 0 or np.mean(steps == 0) < 0.001:
+        return None
+    # A clock's own jitter comes on top: a tenth of an interval.
+    digit = _coarseness(time) + 0.15 * float(time[-1] - time[0]) / len(time)
+    index: FloatArray = np.arange(len(time), dtype=np.float64)
+    placed = index if lines is None else (lines[: len(time)] - lines[0]).astype(np.float64)
+    if not 0.0 < placed[-1] - index[-1] <= 0.03 * len(time):
+        placed = index
+    places = (placed, index)[placed is index :]
+    for place, late in product(places, (0.0, 0.5, -0.5)):
+        centre = time + late * digit
+        even: FloatArray = np.polynomial.Polynomial.fit(place, centre, 1, w=1.0 / digit)(place)
+        # Of two rows in three the rounding errors have a mean: the line lies midway.
+        even += 0.5 * float(np.max(centre - even) + np.min(centre - even)) * (late == 0.0)
+        if np.all(np.abs(centre - even) <= 0.6 * digit) and even[-1] > even[0]:
+            return even
+    if np.mean(steps == 0) < 0.02:
+        return None
+    # The first stamps are the finest.
+    early = time[: max(10, min(30, int(np.argmax(steps == 0))))]
+    usual = (float(np.median(np.diff(early))), float(np.ptp(time)) / float(placed[-1]))
+    changes = (0.0, 1e-3, -1e-3, 5e-3, -5e-3, 1e-2, -1e-2)
+    for step, place in product(usual, places):
+        tried = [_frames(time, digit, (1.0 + c) * step, place) for c in changes]
+        if found := [even for even in tried if even is not None]:
+            # Fewest frames in all is the longest interval.
+            return max(found, key=lambda even: np.diff(even).min())
+    return None
+
+
+def _coarseness(time: FloatArray) -> FloatArray:
+    """Find what one stamp stands for, shape (n,): its last digit, or the step to the next stamp.
+
+    The step where several rows have one stamp, as whole blocks and arrays do.
+    """
+    digit = _last_digit(time)
+    starts = np.flatnonzero(np.diff(time, prepend=-np.inf) > 0.0)
+    if len(starts) < 9:
+        return digit
+    rows = np.diff(np.append(starts, len(time)))
+    step = np.diff(time[starts])
+    around = sliding_window_view(np.pad(np.append(step, step[-1:]), 4, mode="edge"), 9)
+    usual = np.median(around, axis=1)
+    crowded = np.mean(sliding_window_view(np.pad(rows, 4, mode="reflect"), 9), axis=1) > 1.3
+    blocks: FloatArray = np.repeat(np.where(crowded, usual, 0.0), rows)
+    return np.maximum(digit, blocks)
+
+
+def _last_digit(time: FloatArray) -> FloatArray:
+    """What one in the last printed digit of each stamp is worth.
+
+    Either all have so many decimals, or all so many digits: then it grows with the time.
+    """
+    some = time[:: max(1, len(time) // 1000)]
+    texts = [f"{abs(stamp):.10f}".rstrip("0") for stamp in (*time[:100], *some) if stamp]
+    decimals = max((len(text.partition(".")[2]) for text in texts), default=0)
+    digits = max((len(text.replace(".", "").lstrip("0")) for text in texts), default=1)
+    size = np.floor(np.log10(np.maximum(np.abs(time), 1e-9)) + 1e-9)
+    return np.maximum(10.0**-decimals, 10.0 ** (size - digits + 1))
+
+
+def _frames(
+    time: FloatArray, digit: FloatArray, interval: float, index: FloatArray
+) -> FloatArray | None:
+    """Count the frames from the first row to each, improving their interval on the way.
+
+    Each row is at least as many after the first as `index` says.
+
+    Returns
+    -------
+    time_s
+        ``None`` where some stamp contradicts the count, or more than 2 % are missing: of
+        so many any interval would do.
+    """
+    start, tries = float(time[0]), 8
+    while interval > 0 and tries:
+        # At least one more than the row above, and at least what the stamp asks for.
+        least = np.ceil((time - start - 0.6 * digit) / interval - 1e-9)
+        count = index + np.maximum.accumulate(np.maximum(least - index, 0.0))
+        even: FloatArray = start + interval * count
+        if count[-1] > 1.02 * len(time) + 3:
+            break
+        if np.all(np.abs(even - time) <= 0.6 * digit):
+            return even
+        fitted = np.polynomial.Polynomial.fit(count, time, 1, w=1.0 / digit).convert()
+        start, interval = fitted.coef.tolist()
+        tries -= 1
+    return None
+
+
+def _keep_last(choice: Choice, base: TimeBase) -> None:
+    """For one row a count: of the rows in one tick of the clock keep the last."""
+    jumps = np.abs(np.diff(_values(choice, base)))
+    count = float(np.median(jumps)) if len(jumps) and np.all(np.diff(base.time_s) >= 0) else 0.0
+    if count > 0 and np.mean(np.abs(jumps - count) < 0.01 * count) >= 0.9:
+        last = np.append(np.diff(base.time_s) > 0, True)
+        base.keep(
+            last, f"{np.sum(~last)} count(s) within one tick of the clock merged with the next"
+        )

@@ -1,0 +1,291 @@
+"""The unit of the readings: as the file states it, else as one test of physics shows it."""
+
+import re
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.errors import refuse_if
+from pendpipe.formats.circle import seen_from_pivot
+from pendpipe.formats.columns import Choice
+from pendpipe.formats.table import (
+    Column,
+    ReadOptions,
+    Table,
+    derivative_slope,
+    follows_sine,
+    periods,
+)
+from pendpipe.formats.times import TimeBase
+from pendpipe.formats.words import Unit, unit_of
+from pendpipe.recording import Quantity, find_step, from_below, jumps_of_a_turn
+
+_RADIAN = Unit("angle", 1.0, "rad")
+_DEGREE = Unit("angle", np.pi / 180, "rad")
+_TURN = Unit("angle", 2 * np.pi, "rad")
+_UNKNOWN = Unit("own", 1.0, "1")
+_QUANTITIES: dict[str, Quantity] = {
+    "angle": "angle_rad",
+    "volts": "volts",
+    "length": "displacement_m",
+    "own": "reading",
+}
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Values of all rows, shape (n,), in the unit of `quantity`; scale; what was guessed."""
+
+    values: FloatArray
+    quantity: Quantity
+    factor: float
+    unit: str
+    notes: tuple[str, ...] = ()
+    weak_guesses: tuple[str, ...] = ()
+    radius_excess: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class _Guess:
+    """A unit, its reason, and whether it is a weak guess."""
+
+    unit: Unit
+    why: str = ""
+    weak: bool = False
+
+
+def readings(table: Table, choice: Choice, options: ReadOptions, base: TimeBase) -> Readings:
+    """Turn the chosen column, or the pair x, y, into one of the quantities.
+
+    Raises
+    ------
+    InputError
+        When the columns have fewer rows than the times, or the column is no motion.
+    """
+    rows = len(choice.readings[0].values)
+    refuse_if(
+        any(len(c.values) != rows for c in choice.readings) or base.rows.max(initial=0) >= rows,
+        table.place,
+        "the columns are of unequal length",
+        "choose with --column",
+    )
+    time_s = np.full(rows, np.nan)
+    time_s[base.rows] = base.time_s
+    if len(choice.readings) == 2:
+        seen = seen_from_pivot(*choice.readings, time_s)
+        return Readings(
+            *(seen.angle_rad, "angle_rad", 1.0, "rad", seen.notes, seen.weak_guesses),
+            radius_excess=seen.radius_excess,
+        )
+    column = choice.readings[0]
+    guess = _unit(table, choice, column, options, time_s)
+    unit, values, notes = guess.unit, column.values * guess.unit.factor, tuple[str, ...]()
+    if unit.kind == "angle" and choice.listed is None:
+        values, notes = from_below(values)
+    elif unit.name == "counts":
+        values, notes = _over_the_turn(values)
+    stated = f"'{column.label}' {guess.why}"
+    if guess.why and not guess.weak:
+        notes = (stated, *notes)
+    return Readings(
+        values,
+        _QUANTITIES[unit.kind],
+        unit.factor,
+        unit.name,
+        notes,
+        (f"{stated} (--unit)",) if guess.weak else (),
+    )
+
+
+def _unit(
+    table: Table, choice: Choice, column: Column, options: ReadOptions, time_s: FloatArray
+) -> _Guess:
+    """Find the unit: from the user, from the file, or from the numbers."""
+    if (asked := options.units[1]) is not None:
+        given = unit_of(asked) or Unit("none", 1.0)
+        refuse_if(
+            given.kind not in _QUANTITIES,
+            "--unit",
+            f"'{asked}' is not known",
+            "give rad, deg, V, mV, m, mm, px, counts, rad/s, m/s^2, ...",
+        )
+        return _Guess(given)
+    # "second,Volt,Volt": some programs print the unit for a name.
+    written = unit_of(column.unit or (column.name if len(column.name) > 2 else ""))
+    role = column.role
+    if written is not None and written.kind in _QUANTITIES:
+        if role == "velocity" and written.kind in ("angle", "length"):
+            return _Guess(Unit("own", written.factor, f"{written.name}/s"))
+        return _contradicted(column, written, time_s) or _Guess(written)
+    if column.unit and written is None:
+        return _Guess(Unit("own", 1.0, column.unit), f"is in {column.unit}, analysed as it stands")
+    refuse_if(
+        written is not None or role in ("none", "time", "index"),
+        table.place,
+        f"'{column.label}' ({column.unit or 'by its name'}) is nothing that a pendulum's"
+        " motion is read from",
+        "choose another with --column, or give its unit with --unit",
+    )
+    finite = column.values[np.isfinite(column.values)]
+    headed = [*_UNITS_OF.findall(table.metadata.get("header", "")), ""][0]
+    named = unit_of(headed) or Unit("none", 1.0)
+    if named.kind in ("length", "volts") and role in ("unknown", named.kind):
+        return _Guess(named, f"is in {headed}, by the header")
+    if np.all(finite == np.rint(finite)) and re.search(r"(?i)enc|count|tick|raw|adc", column.name):
+        return _Guess(Unit("own", 1.0, "counts"), "holds whole numbers: analysed as counts", True)
+    if role == "volts":
+        return _Guess(Unit("volts", 1.0, "V"), "has no unit: taken to be volts", True)
+    # A phone's sensor: of a position it knows nothing.
+    names = {other.name.lower() for other in choice.channels if not other.unit}
+    sensed = role == "length" and {"x", "y", "z"} <= names
+    what = " (one of x, y, z)" if sensed else f" ({role})" if role in _OF_SENSORS else ""
+    found = None if what else _angle_unit(table, choice, column, time_s)
+    return found or _Guess(
+        _UNKNOWN, f"{what.strip()} has no unit: analysed in its own".strip(), True
+    )
+
+
+_OF_SENSORS: Final = ("velocity", "acceleration", "signal")
+_UNITS_OF = re.compile(r"(?i)\b(?:vertical|length) units?\W+([a-zµ]+)")
+"""What an oscilloscope, or a system of cameras, says above its table."""
+
+
+def _reach(finite: FloatArray) -> float:
+    """How far the readings go from their middle."""
+    if not len(finite):
+        return 0.0
+    low, middle, high = np.percentile(finite, (0.2, 50, 99.8))
+    return max(float(high - middle), float(middle - low))
+
+
+def _contradicted(column: Column, written: Unit, time_s: FloatArray) -> _Guess | None:
+    """Doubt a header that gives the one unit of angles where the period shows the other."""
+    reach = _reach(column.values[np.isfinite(column.values)])
+    for unit, headed, least, most, other, name in (
+        (_DEGREE, "degrees", 0.3, 3.0, _RADIAN, "radians"),
+        (_RADIAN, "radians", 3.6, 170.0, _DEGREE, "degrees"),
+    ):
+        doubtful = written == unit and least < reach < most
+        slope = follows_sine(time_s, column.values, other.factor) if doubtful else None
+        if slope is not None and abs(slope - 1.0) <= 0.25:
+            why = f"is headed in {headed}, but its period grows as a swing in {name} does"
+            return _Guess(other, f"{why}: taken as such", weak=True)
+    return None
+
+
+def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray) -> _Guess | None:
+    """Find an angle's unit in the header's words, or by a test of physics; ``None`` without either.
+
+    In this order: the derivative beside it in a known unit; the period, which lengthens as that
+    of sin x does in one unit only; numbers that are round in the other unit; jumps of a turn; a
+    step that is a turn over the number of an encoder's lines.
+    """
+    finite = column.values[np.isfinite(column.values)]
+    if not len(finite):
+        return _Guess(_RADIAN)
+    words = " ".join((column.name, *table.metadata, *table.metadata.values())).lower()
+    stated = re.search(
+        r"\b(deg|degs|degrees?|grad|grado|gradi|grados)\b(?! c)|_deg|°(?!\s*[cf])", words
+    )
+    named = column.role == "angle"
+    if stated and column.role != "length" and "rad" not in words.replace("grad", ""):
+        return _Guess(_DEGREE, "is taken to be in degrees (the header names them)")
+    return (
+        _by_rate(choice, column, time_s)
+        or _by_period(column, time_s)
+        or (_by_digits(finite) if column.role != "length" else None)
+        or (_by_lines(finite) if named else None)
+        or (_Guess(_RADIAN, "jumps by 2 pi: it is in radians") if jumps_of_a_turn(finite) else None)
+    )
+
+
+def _by_period(column: Column, time_s: FloatArray) -> _Guess | None:
+    """Take for radians, degrees or turns what is swung through ever faster, just as they are.
+
+    The period goes as K(sin(A/2)^2): to second order as 1 + A^2/16, so that of units which differ
+    by a factor of 39 or more at most one fits.
+    """
+    units = (_RADIAN, "radians"), (_DEGREE, "degrees"), (_TURN, "turns")
+    # Of what is named a position other units may well be pixels, of any length.
+    for unit, name in units[: 1 if column.role == "length" else None]:
+        slope = follows_sine(time_s, column.values, unit.factor)
+        if slope is not None and abs(slope - 1.0) < 0.35:
+            why = f"is in {name}: its period lengthens with the swing as sin x has it"
+            # Of a pendulum 1 m long (2 s) metres look the same.
+            usual = float(np.median(periods(time_s, column.values)[0]))
+            metres = unit == _RADIAN and column.role != "angle" and abs(usual - 2.0) < 0.3
+            return _Guess(unit, why + ", or in metres, with a string of 1 m" * metres, weak=metres)
+    return None
+
+
+def _by_digits(finite: FloatArray) -> _Guess | None:
+    """Read the unit off printed digits: all numbers are multiples of one in the other unit."""
+    if _printed_digit(finite, 1.0) is not None:
+        return None
+    for unit, scale, name, other in (
+        (_RADIAN, 180 / np.pi, "radians", "degrees"),
+        (_DEGREE, np.pi / 180, "degrees", "radians"),
+    ):
+        if digit := _printed_digit(finite, scale):
+            why = f"converted to {other}, its values are multiples of {digit:.4g}"
+            return _Guess(unit, f"is in {name} ({why})")
+    return None
+
+
+def _by_lines(finite: FloatArray) -> _Guess | None:
+    """Compare the step of a column that is named an angle with a turn over an encoder's counts.
+
+    These are 2^k, or 1, 2, 4, 5, 8 times a power of ten: forty numbers, to six digits, are met by
+    chance once in ten thousand times.
+    """
+    step = find_step(finite)
+    for turn, unit, name in ((2 * np.pi, _RADIAN, "radians"), (360.0, _DEGREE, "degrees")):
+        counts = turn / step if step else 0.0
+        whole = round(counts)
+        usual = whole & (whole - 1) == 0 or re.fullmatch("[12458]0+", str(whole))
+        # A step of three digits may as well be one that was printed.
+        printed = not step or abs(float(f"{step:.3g}") / step - 1.0) < 1e-6
+        if 100 <= whole <= 1 << 20 and usual and not printed and abs(counts / whole - 1.0) < 2e-6:
+            return _Guess(unit, f"is in {name} (its step is a turn over {whole})")
+    return None
+
+
+def _printed_digit(finite: FloatArray, scale: float) -> float | None:
+    """Find the decimal place of which all readings, times `scale`, are multiples."""
+    some = finite[:: max(1, len(finite) // 2000)]
+    # Beyond 1e9 a double has no such digits left.
+    if len(some) < 20 or np.abs(some).max() > 1e9:
+        return None
+    some = scale * some
+    for place in range(7):
+        whole = some * 10.0**place
+        # Of readings that have no such digit a few in a hundred are this near to one.
+        if np.ptp(whole) > 20.0 and np.all(np.abs(whole - np.rint(whole)) < 0.03):
+            return 10.0**-place
+    return None
+
+
+def _by_rate(choice: Choice, column: Column, time_s: FloatArray) -> _Guess | None:
+    """Compare its derivative with one in a known unit that stands beside it."""
+    for other in choice.channels:
+        unit = unit_of(other.unit) if other.unit else None
+        if unit is None or unit.name != "rad/s" or len(other.values) != len(column.values):
+            continue
+        slope = derivative_slope(time_s, column.values, other.values) or 0.0
+        for guess, name in ((_RADIAN, "radians"), (_DEGREE, "degrees")):
+            if abs(unit.factor * abs(slope) / guess.factor - 1.0) < 0.25:
+                return _Guess(guess, f"is taken to be in {name} (by '{other.label}' beside it)")
+    return None
+
+
+def _over_the_turn(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
+    """Undo the jumps of an absolute encoder of 2^k counts that hangs near its zero."""
+    finite = np.isfinite(values)
+    low, high = np.min(values[finite], initial=0.0), np.max(values[finite], initial=0.0)
+    turn = 2.0 ** np.ceil(np.log2(high + 1.0)) if high > 0.0 else 1.0
+    if low < 0.0 or turn < 256.0 or not np.any(np.abs(np.diff(values[finite])) > 0.8 * turn):
+        return values, ()
+    values[finite] = np.unwrap(values[finite], period=turn)
+    return values, (f"the counts jump by a turn of {turn:g}: unwrapped",)
