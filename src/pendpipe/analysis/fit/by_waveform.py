@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -26,10 +27,10 @@ from pendpipe.analysis.fit.by_points import (
 )
 from pendpipe.analysis.fit.goodness import Goodness, combined, judge
 from pendpipe.analysis.fit.least_squares import (
+    PREDICTED,
     Bounds,
     Minimum,
     Quadratic,
-    bounded_step,
     covariance,
     intervals95,
     minimise,
@@ -130,8 +131,6 @@ BOUNDS: Final = Bounds(
 )
 _PIECE: Final = 1 << 18
 """Readings whose Jacobian is in memory at a time: 16 MB."""
-_SLIGHT: Final = 0.1
-"""Of chi^2 in a half cycle: a smaller misfit is not seen in the noise."""
 _BY_SHARE: Final = 0.5 - 4.0 / 3.0 + math.pi**2 / 8.0
 """(omega/b)^2 times the relative lengthening of the period by the square of b's hysteretic share
 (`by_points.period_excess`)."""
@@ -249,12 +248,10 @@ class Waveform:
 
         The model is as linear as the motion stays what it was: where the step changes it by a part
         e, rms, it is wrong by about e of itself. And what `curved` makes up for is known to first
-        order in b/omega. Infinite where the residuals from which the step begins would not do for
-        those at its end.
+        order in b/omega. Infinite where the rounding's weights are those of the place.
         """
         omega, b = float(trial[OMEGA]), float(trial[B])
-        half_cycles = omega * float(self.time_s[-1] - self.time_s[0]) / np.pi
-        if self.step != 0.0 or promised > _SLIGHT * half_cycles:
+        if self.step != 0.0:
             return np.inf
         signal = len(self.values) * float(np.var(self.values)) / self.noise_rms**2
         slower = _BY_SHARE * b**3 / omega**2 * float(trial[SHARE] - value[SHARE]) ** 2
@@ -330,15 +327,18 @@ class Waveform:
         start = release.angle_rad, release.time_s, value[OFFSET], value[DRIFT]
         return np.array([*law.rates(), law.angular_frequency, *start])
 
+    def parts_of_b(self, share: float) -> tuple[float, float]:
+        """How a change of b goes to its parts: what is told of one leaves it to the other."""
+        if self.split:
+            share = float("viscous" in self.split)
+        return share, 1.0 - share
+
     def change(self, value: FloatArray) -> FloatArray:
         """Derivative of the engine's parameters by ours, shape (9, 9)."""
-        # What is told of one part of b leaves its changes to the other.
-        told = [part in self.split for part in ("hysteretic", "viscous")]
-        share = float(told[1]) if any(told) else float(value[SHARE])
-        by_share = 0.0 if any(told) else float(value[B])
+        by_share = 0.0 if self.split else float(value[B])
         change = np.zeros((9, 9))
         change[[0, 3, 4, 5, 6, 7, 8], [A, C, OMEGA, START, TIME, OFFSET, DRIFT]] = 1.0
-        change[1:3, B] = share, 1.0 - share
+        change[1:3, B] = self.parts_of_b(float(value[SHARE]))
         change[1:3, SHARE] = by_share, -by_share
         return change
 
@@ -464,11 +464,15 @@ _TOLERANCE: Final = 1e-2
 _ROUNDS: Final = 2
 _SETTLED: Final = 0.1
 """Standard deviations by which the mean share may change when the others have followed it."""
-_SHARES: Final = 9
-"""Shares at which the likelihood is looked at, in a range that narrows until half of them count."""
+_SHARES: Final = 33
+"""Shares at which the likelihood is looked at, in a range that narrows until some of them count."""
+_ENOUGH: Final = 8
 _UNLIKELY: Final = 0.02
 """Of the most likely, below which a share does not count."""
 _LEAST: Final = 1e-300
+_SUBSETS: Final = np.array(list(product((1.0, 0.0), repeat=3)))
+"""Of a, b, c that are not at their bound."""
+_SLACK: Final = 1e-12
 _HAIR: Final = 1e-13
 """For what the readings do not tell apart."""
 _ZOOMS: Final = 12
@@ -648,20 +652,31 @@ def _settled(
     for _ in range(_MOST):
         if not math.isfinite(found.chi2):
             return found
-        moved, minimum = False, found.minimum
-        if found.noise_rms < _OTHER * problem.noise_rms:
-            problem, moved = replace(problem, noise_rms=found.noise_rms), True
-        if SHARE not in held:
-            shared = _over_shares(found)
-            change = float(shared.value[SHARE] - minimum.value[SHARE])
-            if abs(change) > _SETTLED * math.sqrt(shared.covariance[SHARE, SHARE]):
-                step = shared.value - minimum.value
-                at = problem.bounds.clip(problem.curved(minimum.value, step))
-                moved, minimum = True, minimum._replace(value=at)
-        if not moved:
+        quieter, minimum = found.noise_rms < _OTHER * problem.noise_rms, found.minimum
+        if quieter:
+            problem = replace(problem, noise_rms=found.noise_rms)
+        elif SHARE in held or (minimum := _at_mean_share(found)) is None:
             break
-        found = replace(found, problem=problem, minimum=_minimised(problem, minimum.value, held))
+        elif minimum.converged:
+            found = replace(found, minimum=minimum)
+            break
+        found = Fitted(problem, _minimised(problem, minimum.value, held), held, start)
     return _rounded(found, samples)
+
+
+def _at_mean_share(found: Fitted) -> Minimum | None:
+    """Where the share is what the readings expect of it; None where it is so already.
+
+    Converged where the readings are as linear as that; else it is to be minimised from there.
+    """
+    minimum, problem, shared = found.minimum, found.problem, _over_shares(found)
+    step = shared.value - minimum.value
+    if abs(step[SHARE]) <= _SETTLED * math.sqrt(shared.covariance[SHARE, SHARE]):
+        return None
+    at = problem.bounds.clip(problem.curved(minimum.value, step))
+    left = problem.predict_remaining(minimum.value, at, minimum.quadratic, shared.moved)
+    quadratic = minimum.quadratic._replace(chi2=minimum.quadratic.chi2 + shared.chi2)
+    return Minimum(at, quadratic, minimum.converged and left < PREDICTED)
 
 
 def _judged(fitted: Fitted, samples: Samples, points: TurningPoints) -> Goodness:
@@ -696,78 +711,169 @@ class _Shared(NamedTuple):
     """With what the unknown share adds, shape (9, 9)."""
     gradient: FloatArray
     """Of -chi^2/2 at the mean share, shape (9,)."""
+    chi2: float
+    """Above the fit's."""
+    moved: float
+    """Chi^2 between the two motions."""
 
 
 def _over_shares(fitted: Fitted, noise_rms: float | None = None, enlarged: float = 1.0) -> _Shared:
     """Average over the share: at each the others are at their bounded minimum."""
+    losses = _Losses.of(fitted, noise_rms or fitted.noise_rms, enlarged)
     low, high = (0.0, 1.0) if SHARE not in fitted.held else 2 * (float(fitted.value[SHARE]),)
     for _ in range(_ZOOMS):
         shares = np.linspace(low, high, _SHARES if low < high else 1)
-        found = _at_shares(fitted, shares, noise_rms or fitted.noise_rms, enlarged)
+        found = losses.at(shares)
         width = np.sqrt(np.maximum(found.covariance[:, B, B], 0.0))
         # Parts of b are as likely beforehand, so that at a share b counts as b db.
-        likely = np.maximum(np.maximum(found.value[:, B], width) * width, _LEAST)
+        likely = np.maximum(np.maximum(losses.value[B] + found.step[:, B], width) * width, _LEAST)
         likely *= np.exp(0.5 * (found.chi2.min() - found.chi2))
         likely /= likely.max()
         inside = np.flatnonzero(likely > _UNLIKELY)
-        if len(inside) >= len(shares) // 2:
+        if len(inside) >= min(_ENOUGH, len(shares)):
             break
         first, last = max(int(inside[0]) - 1, 0), min(int(inside[-1]) + 1, _SHARES - 1)
         low, high = float(shares[first]), float(shares[last])
     likely[[0, -1]] *= 0.5
     likely /= likely.sum()
-    mean = np.array([float(likely @ shares)])
-    (best,), _, _, (gradient,) = _at_shares(fitted, mean, noise_rms or fitted.noise_rms, enlarged)
-    off = found.value - best
-    spread = np.einsum("k,kpq->pq", likely, found.covariance) + (likely[:, None] * off).T @ off
-    return _Shared(best, spread, gradient)
+    share = float(likely @ shares)
+    return losses.averaged(share, losses.at(np.array([share])), shares, found, likely)
 
 
 class _AtShares(NamedTuple):
-    """Minima at some shares: their values, chi^2 above the fit's, covariances and gradients."""
+    """At k shares: steps of a, b, c to their bounded minimum, and what they leave."""
 
-    value: FloatArray
+    step: FloatArray
+    """Shape (k, 3)."""
+    parts: FloatArray
+    """Steps of a, both parts of b, and c, shape (k, 4)."""
+    change: FloatArray
+    """Of the latter by the former, shape (k, 4, 3)."""
     chi2: FloatArray
+    """Above the fit's, shape (k,)."""
     covariance: FloatArray
+    """Of a, b, c, shape (k, 3, 3)."""
     gradient: FloatArray
+    """Of -chi^2/2, shape (k, 3)."""
 
 
-def _at_shares(fitted: Fitted, shares: FloatArray, noise_rms: float, enlarged: float) -> _AtShares:
-    """Move all other parameters to their bounded minimum at each of some shares."""
-    problem, value, held = fitted.problem, fitted.value, (*fitted.held, SHARE)
-    gradient, normal = problem.by_parts(value)
-    scale = (1.0 if problem.step else (problem.noise_rms / noise_rms) ** 2) / enlarged
-    gradient, normal = gradient * scale, normal * scale
-    first = np.repeat(value[None], len(shares), axis=0)
-    first[:, SHARE] = shares
-    change = np.stack([problem.change(each) for each in first])
-    change[:, :, SHARE] = 0.0
-    # Only the parts of b differ, by as much as each other.
-    off = np.zeros_like(first)
-    off[:, 1] = value[B] * (shares - value[SHARE])
-    off[:, 2] = -off[:, 1]
-    own = change.swapaxes(1, 2) @ normal @ change
-    slope = np.einsum("kqp,kq->kp", change, gradient - off @ normal)
-    y = abs(float(value[START]))
-    loss = float(value[A]) * y + float(value[B]) + float(value[C]) / y
-    # No loss is more than the whole.
-    whole = np.zeros((9, 9))
-    whole[[A, B, C], [A, B, C]] = np.array([y, 1.0, 1.0 / y]) ** 2 / max(loss, 1e-300) ** 2
-    free = [j for j in range(9) if j not in held]
-    grid = np.ix_(range(len(shares)), free, free)
-    size = 1.0 / np.sqrt(np.maximum(np.einsum("kpp->kp", own[grid]), 1e-60))
-    outer = size[:, :, None] * size[:, None]
-    scaled = own[grid] * outer + _HAIR * np.eye(len(free))
-    step = np.zeros_like(first)
-    step[:, free] = np.linalg.solve(scaled, (slope[:, free] * size)[..., None])[..., 0] * size
-    bounds = problem.bounds.about(first)
-    for k in np.flatnonzero(((step < bounds.lower) | (step > bounds.upper)).any(axis=1)).tolist():
-        step[k] = bounded_step(own[k], slope[k], problem.bounds.about(first[k]), held)
-    spread = np.zeros_like(own)
-    spread[grid] = np.linalg.inv(scaled + whole[np.ix_(free, free)] * outer) * outer
-    off += np.einsum("kpq,kq->kp", change, step)
-    chi2 = np.einsum("kp,pq,kq->k", off, normal, off) - 2.0 * off @ gradient
-    return _AtShares(first + step, chi2, spread, slope - np.einsum("kpq,kq->kp", own, step))
+@dataclass(frozen=True)
+class _Losses:
+    """Chi^2 as a function of the losses alone, all else at its minimum."""
+
+    fitted: Fitted
+    value: FloatArray
+    free: FloatArray
+    """Which of a, b, c are fitted, 1 or 0."""
+    normal: FloatArray
+    gradient: FloatArray
+    """Of a, both parts of b, c, all else following, shapes (4, 4) and (4,)."""
+    rest: list[int]
+    """What else is fitted."""
+    following: FloatArray
+    """Derivative of the rest by the four, shape (r, 4)."""
+    own: FloatArray
+    """Covariance of the rest at known losses, shape (r, r)."""
+    settling: FloatArray
+    """What the rest moves by at the same losses, shape (r,)."""
+
+    @classmethod
+    def of(cls, fitted: Fitted, noise_rms: float, enlarged: float) -> _Losses:
+        """Eliminate what is no loss."""
+        problem, value, held = fitted.problem, fitted.value, fitted.held
+        gradient, normal = problem.by_parts(value)
+        scale = (1.0 if problem.step else (problem.noise_rms / noise_rms) ** 2) / enlarged
+        gradient, normal = gradient * scale, normal * scale
+        rest = [j for j in range(OMEGA, DRIFT + 1) if j not in held]
+        size = 1.0 / np.sqrt(np.maximum(normal[rest, rest], 1e-60))
+        within = normal[np.ix_(rest, rest)] * size[:, None] * size + _HAIR * np.eye(len(rest))
+        own = np.linalg.inv(within) * size[:, None] * size
+        following, settling = -own @ normal[rest, :4], own @ gradient[rest]
+        return cls(
+            fitted,
+            value,
+            np.array([float(j not in held) for j in (A, B, C)]),
+            normal[:4, :4] + normal[:4, rest] @ following,
+            gradient[:4] - normal[:4, rest] @ settling,
+            rest,
+            following,
+            own,
+            settling,
+        )
+
+    def at(self, shares: FloatArray) -> _AtShares:
+        """Minimise over a, b, c within their bounds at each share."""
+        value, change = self.value, np.zeros((len(shares), 4, 3))
+        change[:, [0, 3], [A, C]] = 1.0
+        change[:, 1:3, B] = [self.fitted.problem.parts_of_b(share) for share in shares.tolist()]
+        # Only the parts of b differ, by as much as each other.
+        off = np.zeros((len(shares), 4))
+        off[:, 1] = value[B] * (shares - value[SHARE])
+        off[:, 2] = -off[:, 1]
+        normal = change.swapaxes(1, 2) @ self.normal @ change
+        gradient = np.einsum("kqp,kq->kp", change, self.gradient - off @ self.normal)
+        normal += _HAIR * np.eye(3) * normal
+        step = _not_negative(normal, gradient, value[:3], self.free)
+        off += np.einsum("kpq,kq->kp", change, step)
+        chi2 = np.einsum("kp,pq,kq->k", off, self.normal, off) - 2.0 * off @ self.gradient
+        y = abs(float(value[START]))
+        loss = float(value[A]) * y + float(value[B]) + float(value[C]) / y
+        # No loss is more than the whole.
+        whole = np.array([y, 1.0, 1.0 / y]) ** 2 / max(loss, 1e-300) ** 2
+        both = np.outer(self.free, self.free)
+        spread = np.linalg.inv((normal + np.diag(whole)) * both + np.diag(1.0 - self.free)) * both
+        left = gradient - np.einsum("kpq,kq->kp", normal, step)
+        return _AtShares(step, off, change, chi2, spread, left)
+
+    def averaged(
+        self,
+        share: float,
+        mean: _AtShares,
+        shares: FloatArray,
+        found: _AtShares,
+        weight: FloatArray,
+    ) -> _Shared:
+        """All parameters at the mean share, and what theirs at the others scatter."""
+        others = found.parts @ self.following.T + self.settling
+        (own,), (parts,), (settled,) = mean.step, mean.parts, mean.parts @ self.following.T
+        settled = settled + self.settling
+        best, matrix, gradient = self.value.copy(), np.zeros((9, 9)), np.zeros(9)
+        best[:3], best[SHARE], gradient[:3] = best[:3] + own, share, mean.gradient[0]
+        best[self.rest] += settled
+        places = [*range(3), *self.rest]
+        tied = np.zeros((len(shares), len(places), 3))
+        tied[:, :3], tied[:, 3:] = np.eye(3), self.following @ found.change
+        each = (weight[:, None, None] * tied) @ found.covariance @ tied.swapaxes(1, 2)
+        matrix[np.ix_(places, places)] = each.sum(axis=0)
+        matrix[np.ix_(self.rest, self.rest)] += self.own
+        off = np.zeros((len(shares), 9))
+        off[:, :3], off[:, SHARE] = found.step - own, shares - share
+        off[:, self.rest] = others - settled
+        matrix += (weight[:, None] * off).T @ off
+        moved = float(parts @ self.normal @ parts)
+        return _Shared(best, matrix, gradient, float(mean.chi2[0]), moved)
+
+
+def _not_negative(
+    normal: FloatArray, gradient: FloatArray, value: FloatArray, free: FloatArray
+) -> FloatArray:
+    """Steps of a, b, c that minimise ``d' H d/2 - g' d`` and leave none below zero, shape (k, 3).
+
+    The best of those with any of them at its bound.
+    """
+    step = np.zeros_like(gradient)
+    least = np.full(len(gradient), np.inf)
+    for chosen in _SUBSETS[(free >= _SUBSETS).all(axis=1)]:
+        at_zero = (free - chosen) * -value
+        system = normal * np.outer(chosen, chosen) + np.diag(1.0 - chosen)
+        right = (gradient - normal @ at_zero) * chosen + at_zero
+        tried = np.linalg.solve(system, right[..., None])[..., 0]
+        cost = np.einsum("kp,kpq,kq->k", tried, normal, tried) - 2.0 * np.sum(tried * gradient, 1)
+        better = (cost < least) & (tried >= -value - _SLACK * np.abs(value)).all(axis=1)
+        step[better], least[better] = tried[better], cost[better]
+        if np.isfinite(least).all() and chosen.sum() == free.sum():
+            break
+    return np.maximum(step, -value)
 
 
 def _rounded(fitted: Fitted, samples: Samples) -> Fitted:

@@ -135,7 +135,7 @@ def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
 
 FRACTIONS: Final = (1.0, 0.3, 0.1, 0.02)
 """Of a step: the first that lowers chi^2 is taken."""
-_PREDICTED: Final = 1e-2
+PREDICTED: Final = 1e-2
 """Of chi^2: a tenth of a standard deviation, of an estimate of what is left that is high."""
 
 
@@ -195,7 +195,7 @@ def minimise(
         trial = bounds.clip(curved(value, step))
         if promised < tolerance or (
             predict_remaining is not None
-            and predict_remaining(value, trial, now, promised) < _PREDICTED
+            and predict_remaining(value, trial, now, promised) < PREDICTED
         ):
             return Minimum(trial, moved(now, step), True)
         ways = (bounds.clip(curved(value, part * step)) for part in FRACTIONS)
@@ -221,7 +221,8 @@ CHI2_95: Final = 3.841458820694124
 """95 % point of chi^2 with one degree of freedom."""
 _FAR: Final = 8.0
 """Standard deviations from which a bound is out of sight."""
-_ROUNDS: Final = 60
+_HAIR: Final = 1e-13
+"""For what the readings do not tell apart."""
 
 
 def intervals95(
@@ -266,11 +267,11 @@ def intervals95(
         # None can come to a bound, since following another moves it by 1.96 of its own at most.
         return [(float(value[j] - half[j]), float(value[j] + half[j])) for j in indices]
     return [
-        (
-            _profiled_end(value, normal, gradient, bounds, j, held, -_FAR * float(deviations[j])),
-            _profiled_end(value, normal, gradient, bounds, j, held, _FAR * float(deviations[j])),
+        tuple(
+            _profiled_end(value, normal, gradient, bounds, j, held, far)
+            for far in (-far_off, far_off)
         )
-        if deviations[j] > 0.0
+        if (far_off := _FAR * float(deviations[j])) > 0.0
         else (float(value[j]), float(value[j]))
         for j in indices
     ]
@@ -287,16 +288,46 @@ def _profiled_end(
 ) -> float:
     """One end of an interval that a bound takes part in, at most `reach` away.
 
-    chi^2 is a convex function of the distance, the others following within their bounds: Newton's
-    steps come from beyond the end and never pass it.
+    The others follow within their bounds: which of them lie at one changes at some places of the
+    way, and between these chi^2 is a parabola.
     """
-    room = bounds.about(value)
-    end = max(reach, float(room.lower[index])) if reach < 0.0 else min(reach, room.upper[index])
-    for _ in range(_ROUNDS):
-        step = bounded_step(normal, gradient - end * normal[:, index], room, (*held, index))
-        step[index] = end
-        beyond = float(step @ normal @ step - 2.0 * gradient @ step) - CHI2_95
-        if beyond < 1e-9:
+    room, side = bounds.about(value), math.copysign(1.0, reach)
+    others = np.array([j for j in range(len(value)) if j != index and j not in held], dtype=int)
+    low, high = room.lower[others], room.upper[others]
+    part = normal[np.ix_(others, others)]
+    part = part + _HAIR * np.diag(part.diagonal())
+    along = side * normal[others, index]
+    pull, step = gradient[others], np.zeros(len(others))
+    # -1 and 1: at its lower, and at its upper bound.
+    hair = _SLACK / np.sqrt(np.maximum(part.diagonal(), 1e-300))
+    walls = 1.0 * ((high <= hair) & (pull >= 0.0)) - 1.0 * ((low >= -hair) & (pull <= 0.0))
+    pull = pull * np.abs(walls)
+    bend, slope = float(normal[index, index]), side * float(gradient[index])
+    end, risen = 0.0, 0.0
+    most = min(abs(reach), float(room.upper[index] if side > 0.0 else -room.lower[index]))
+    for _ in range(4 * len(others) + 4):
+        free = np.flatnonzero(walls == 0.0)
+        pace = np.zeros(len(others))
+        pace[free] = -np.linalg.solve(part[np.ix_(free, free)], along[free])
+        change = -along - part @ pace
+        curvature = max(bend + float(along @ pace), 0.0)
+        # chi^2 rises by curvature t^2 - 2 slope t; then a follower meets its bound, or leaves it.
+        root = math.sqrt(max(slope**2 + curvature * (CHI2_95 - risen), 0.0))
+        ahead = (slope + root) / curvature if curvature > 0.0 else math.inf
+        with np.errstate(all="ignore"):
+            meets = np.where(pace < 0.0, low - step, high - step) / pace
+            leaves = -pull / change
+        meets = np.where(pace != 0.0, np.maximum(meets, 0.0), math.inf)
+        leaves = np.where(walls * change < 0.0, np.maximum(leaves, 0.0), math.inf)
+        event = np.minimum(meets, leaves)
+        which = int(np.argmin(event)) if len(event) else -1
+        taken = min(ahead, most - end, float(event[which]) if which >= 0 else math.inf)
+        end += taken
+        if which < 0 or taken < event[which]:
             break
-        end -= 0.5 * beyond / float(normal[index] @ step - gradient[index])
-    return float(value[index] + end)
+        risen += curvature * taken**2 - 2.0 * slope * taken
+        slope -= curvature * taken
+        step, pull = step + taken * pace, np.where(walls != 0.0, pull + taken * change, 0.0)
+        walls[which] = 0.0 if walls[which] else math.copysign(1.0, pace[which])
+        pull[which] = 0.0
+    return float(value[index] + side * end)
