@@ -312,7 +312,7 @@ def test_a_step_taken_on_trust_ends_at_the_optimum() -> None:
             problem.evaluate,
             first,
             BOUNDS,
-            predict_remaining=problem.predict_remaining,
+            chi2=problem.chi2,
             curved=problem.curved,
             most=2,
         )

@@ -86,7 +86,7 @@ def period_excess(
     a: float,
     b: float,
     c: float,
-    share: float,
+    share: FloatArray | float,
 ) -> FloatArray:
     """Relative lengthening of a half period by the losses of Eq. 8, to second order.
 
@@ -102,7 +102,7 @@ def period_excess(
     angular_frequency, a, b, c
         omega and the rates of Eq. 13.
     share
-        b_h/b, the hysteretic part.
+        b_h/b, the hysteretic part; of shape (s, 1) for some of them.
     """
     y = np.maximum(amplitude, 1e-300)
     hysteretic, viscous = share * b, (1.0 - share) * b
@@ -115,14 +115,16 @@ def period_excess(
 def phases(
     points: TurningPoints,
     amplitude: FloatArray,
-    losses: tuple[float, float, float, float],
+    losses: tuple[float, float, float, FloatArray | float],
     angular_frequency: float,
     restoring: Restoring,
 ) -> FloatArray:
     """Phase omega t of a law's turning points from the first, by a, b, c and the share."""
     excess = period_excess(amplitude, angular_frequency, *losses)
-    lasts = swing_phase(amplitude, restoring) + 0.5 * math.pi * (excess[1:] + excess[:-1])
-    return np.concatenate([[0.0], np.cumsum(lasts * np.diff(points.half_cycle))])
+    lasts = swing_phase(amplitude, restoring) + 0.5 * math.pi * (excess[..., 1:] + excess[..., :-1])
+    found = np.zeros(excess.shape)
+    np.cumsum(lasts * np.diff(points.half_cycle), axis=-1, out=found[..., 1:])
+    return found
 
 
 def clear(points: TurningPoints, least: float = 0.0) -> TurningPoints:

@@ -27,7 +27,7 @@ from pendpipe.analysis.fit.by_points import (
 )
 from pendpipe.analysis.fit.goodness import Goodness, combined, judge
 from pendpipe.analysis.fit.least_squares import (
-    PREDICTED,
+    AS_PROMISED,
     Bounds,
     Minimum,
     Quadratic,
@@ -134,8 +134,6 @@ _PIECE: Final = 1 << 18
 _BY_SHARE: Final = 0.5 - 4.0 / 3.0 + math.pi**2 / 8.0
 """(omega/b)^2 times the relative lengthening of the period by the square of b's hysteretic share
 (`by_points.period_excess`)."""
-_ENDS: Final = 10.0
-"""By which the square of a phase's change is greater at the record's end than its mean."""
 _BESIDE: Final = 2e-3
 """Phase between the two motions that tell the velocity: 1e-13 of it is lost in the sixth power."""
 
@@ -176,6 +174,9 @@ class Waveform:
     _last: list[tuple[FloatArray, FloatArray, FloatArray]] = field(
         default_factory=list, init=False, repr=False, compare=False
     )
+    _left: list[tuple[FloatArray, FloatArray]] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
 
     def model(self, value: FloatArray) -> tuple[Eq8, Release]:
         """What moves, and from where, for a set of parameters."""
@@ -204,6 +205,11 @@ class Waveform:
 
     def residual(self, value: FloatArray) -> FloatArray:
         """Readings less model, shape (n,)."""
+        if not (self._left and np.array_equal(self._left[0][0], value)):
+            self._left[:] = [(value.copy(), self._residual(value))]
+        return self._left[0][1]
+
+    def _residual(self, value: FloatArray) -> FloatArray:
         model, release = self.model(value)
         if self.seen == "rate":
             pieces = range(0, len(self.time_s), _PIECE)
@@ -214,6 +220,32 @@ class Waveform:
         angle = sample(model, release, np.maximum(self.time_s, release.time_s))
         read = self.length_m * np.sin(angle) if self.seen == "position" else angle
         return np.asarray(self.values - read - self._zero(value, self.time_s))
+
+    def _has_motion(self, value: FloatArray) -> bool:
+        """Whether there is a motion from before the readings on, and one that they can show."""
+        try:
+            model, release = self.model(value)
+        except ValueError:
+            return False
+        turns = model.angular_frequency * (self.time_s[-1] - release.time_s) / np.pi
+        # Of more half cycles than two a reading nothing is seen, and they would never end.
+        seen = turns < 2.0 * len(self.values) and bool(np.isfinite(model.stop_rad))
+        return seen and release.time_s <= self.time_s[0]
+
+    def chi2(self, value: FloatArray) -> float:
+        """What `evaluate` has, without the derivatives."""
+        try:
+            left = self.residual(value) if self._has_motion(value) else None
+        except ValueError:
+            left = None
+        return math.inf if left is None else self.unlikely(left)
+
+    def unlikely(self, left: FloatArray) -> float:
+        """Return -2 ln likelihood of some residuals."""
+        if self.step == 0.0:
+            return float(left @ left) / self.noise_rms**2
+        unused = np.empty_like(left), np.empty_like(left)
+        return float(rounded(left, 0.5 * self.step, self.noise_rms, *unused))
 
     def read(self, value: FloatArray, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Readings of the law, shape (n,), and their derivatives by the engine's parameters.
@@ -241,23 +273,6 @@ class Waveform:
         jacobian[:, -1] = 1.0
         return rate + self._zero(value, time_s), jacobian
 
-    def predict_remaining(
-        self, value: FloatArray, trial: FloatArray, quadratic: Quadratic, promised: float
-    ) -> float:
-        """Predict what chi^2 a Gauss-Newton step leaves to be gained (too high rather than low).
-
-        The model is as linear as the motion stays what it was: where the step changes it by a part
-        e, rms, it is wrong by about e of itself. And what `curved` makes up for is known to first
-        order in b/omega. Infinite where the rounding's weights are those of the place.
-        """
-        omega, b = float(trial[OMEGA]), float(trial[B])
-        if self.step != 0.0:
-            return np.inf
-        signal = len(self.values) * float(np.var(self.values)) / self.noise_rms**2
-        slower = _BY_SHARE * b**3 / omega**2 * float(trial[SHARE] - value[SHARE]) ** 2
-        at_ends = _ENDS * promised**2 / signal
-        return at_ends + float(quadratic.normal[OMEGA, OMEGA]) * slower**2
-
     def curved(self, value: FloatArray, step: FloatArray) -> FloatArray:
         """Return where a step ends: omega makes up for the square of what b's share changes."""
         end = value + step
@@ -268,14 +283,7 @@ class Waveform:
     def evaluate(self, value: FloatArray) -> Quadratic:
         """chi^2, gradient and normal matrix, summed over pieces of the record."""
         refused = Quadratic(np.inf, np.zeros(len(value)), np.eye(len(value)))
-        try:
-            model, release = self.model(value)
-        except ValueError:
-            return refused
-        turns = model.angular_frequency * (self.time_s[-1] - release.time_s) / np.pi
-        # Of more half cycles than two a reading nothing is seen, and they would never end.
-        lost = not turns < 2.0 * len(self.values) or not np.isfinite(model.stop_rad)
-        if release.time_s > self.time_s[0] or lost:
+        if not self._has_motion(value):
             return refused
         chi2, gradient, normal = 0.0, np.zeros(8), np.zeros((8, 8))
         by_drift, drifts = np.zeros(8), np.zeros(2)
@@ -469,7 +477,7 @@ _SHARES: Final = 33
 _ENOUGH: Final = 8
 _UNLIKELY: Final = 0.02
 """Of the most likely, below which a share does not count."""
-_LEAST: Final = 1e-300
+_LEAST: Final = 1e-60
 _SUBSETS: Final = np.array(list(product((1.0, 0.0), repeat=3)))
 """Of a, b, c that are not at their bound."""
 _SLACK: Final = 1e-12
@@ -544,11 +552,7 @@ class Fitted:
         if first_s <= problem.time_s[0] and problem.time_s[-1] <= last_s:
             return self.chi2
         inside = (problem.time_s >= first_s) & (problem.time_s <= last_s)
-        left = problem.residual(self.value)[inside]
-        if not problem.step:
-            return float(left @ left) / problem.noise_rms**2
-        unused = np.empty_like(left), np.empty_like(left)
-        return float(rounded(left, 0.5 * problem.step, problem.noise_rms, *unused))
+        return problem.unlikely(problem.residual(self.value)[inside])
 
 
 def fitted_waveform(
@@ -639,7 +643,7 @@ def _minimised(problem: Waveform, value: FloatArray, held: tuple[int, ...]) -> M
         problem.bounds,
         held=(*held, SHARE),
         tolerance=_TOLERANCE,
-        predict_remaining=problem.predict_remaining,
+        chi2=problem.chi2,
         curved=problem.curved,
     )
 
@@ -648,35 +652,36 @@ def _settled(
     problem: Waveform, start: Start, value: FloatArray, held: tuple[int, ...], samples: Samples
 ) -> Fitted:
     """Minimise until noise, rounding and share are those of the minimum."""
-    found = Fitted(problem, _minimised(problem, value, held), held, start)
+    found, settled = Fitted(problem, _minimised(problem, value, held), held, start), SHARE in held
     for _ in range(_MOST):
         if not math.isfinite(found.chi2):
             return found
-        quieter, minimum = found.noise_rms < _OTHER * problem.noise_rms, found.minimum
-        if quieter:
+        if found.noise_rms < _OTHER * problem.noise_rms:
             problem = replace(problem, noise_rms=found.noise_rms)
-        elif SHARE in held or (minimum := _at_mean_share(found)) is None:
+        elif settled or (shared := _at_mean_share(found)) is None:
             break
-        elif minimum.converged:
-            found = replace(found, minimum=minimum)
-            break
-        found = Fitted(problem, _minimised(problem, minimum.value, held), held, start)
+        else:
+            found, settled = replace(found, minimum=shared), shared.converged
+            if settled:
+                continue
+        found = Fitted(problem, _minimised(problem, found.value, held), held, start)
+        settled = SHARE in held
     return _rounded(found, samples)
 
 
 def _at_mean_share(found: Fitted) -> Minimum | None:
     """Where the share is what the readings expect of it; None where it is so already.
 
-    Converged where the readings are as linear as that; else it is to be minimised from there.
+    Converged where chi^2 is as expected there; else it is to be minimised from there.
     """
     minimum, problem, shared = found.minimum, found.problem, _over_shares(found)
     step = shared.value - minimum.value
     if abs(step[SHARE]) <= _SETTLED * math.sqrt(shared.covariance[SHARE, SHARE]):
         return None
     at = problem.bounds.clip(problem.curved(minimum.value, step))
-    left = problem.predict_remaining(minimum.value, at, minimum.quadratic, shared.moved)
-    quadratic = minimum.quadratic._replace(chi2=minimum.quadratic.chi2 + shared.chi2)
-    return Minimum(at, quadratic, minimum.converged and left < PREDICTED)
+    expected = minimum.quadratic.chi2 + shared.chi2
+    settled = minimum.converged and abs(problem.chi2(at) - expected) < AS_PROMISED
+    return Minimum(at, minimum.quadratic._replace(chi2=expected), settled)
 
 
 def _judged(fitted: Fitted, samples: Samples, points: TurningPoints) -> Goodness:
@@ -713,8 +718,6 @@ class _Shared(NamedTuple):
     """Of -chi^2/2 at the mean share, shape (9,)."""
     chi2: float
     """Above the fit's."""
-    moved: float
-    """Chi^2 between the two motions."""
 
 
 def _over_shares(fitted: Fitted, noise_rms: float | None = None, enlarged: float = 1.0) -> _Shared:
@@ -785,7 +788,7 @@ class _Losses:
         scale = (1.0 if problem.step else (problem.noise_rms / noise_rms) ** 2) / enlarged
         gradient, normal = gradient * scale, normal * scale
         rest = [j for j in range(OMEGA, DRIFT + 1) if j not in held]
-        size = 1.0 / np.sqrt(np.maximum(normal[rest, rest], 1e-60))
+        size = 1.0 / np.sqrt(np.maximum(normal[rest, rest], _LEAST))
         within = normal[np.ix_(rest, rest)] * size[:, None] * size + _HAIR * np.eye(len(rest))
         own = np.linalg.inv(within) * size[:, None] * size
         following, settling = -own @ normal[rest, :4], own @ gradient[rest]
@@ -812,7 +815,7 @@ class _Losses:
         off[:, 2] = -off[:, 1]
         normal = change.swapaxes(1, 2) @ self.normal @ change
         gradient = np.einsum("kqp,kq->kp", change, self.gradient - off @ self.normal)
-        normal += _HAIR * np.eye(3) * normal
+        normal += np.eye(3) * (_HAIR * normal + _LEAST)
         step = _not_negative(normal, gradient, value[:3], self.free)
         off += np.einsum("kpq,kq->kp", change, step)
         chi2 = np.einsum("kp,pq,kq->k", off, self.normal, off) - 2.0 * off @ self.gradient
@@ -835,8 +838,7 @@ class _Losses:
     ) -> _Shared:
         """All parameters at the mean share, and what theirs at the others scatter."""
         others = found.parts @ self.following.T + self.settling
-        (own,), (parts,), (settled,) = mean.step, mean.parts, mean.parts @ self.following.T
-        settled = settled + self.settling
+        (own,), (settled,) = mean.step, mean.parts @ self.following.T + self.settling
         best, matrix, gradient = self.value.copy(), np.zeros((9, 9)), np.zeros(9)
         best[:3], best[SHARE], gradient[:3] = best[:3] + own, share, mean.gradient[0]
         best[self.rest] += settled
@@ -850,8 +852,7 @@ class _Losses:
         off[:, :3], off[:, SHARE] = found.step - own, shares - share
         off[:, self.rest] = others - settled
         matrix += (weight[:, None] * off).T @ off
-        moved = float(parts @ self.normal @ parts)
-        return _Shared(best, matrix, gradient, float(mean.chi2[0]), moved)
+        return _Shared(best, matrix, gradient, float(mean.chi2[0]))
 
 
 def _not_negative(

@@ -135,8 +135,9 @@ def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
 
 FRACTIONS: Final = (1.0, 0.3, 0.1, 0.02)
 """Of a step: the first that lowers chi^2 is taken."""
-PREDICTED: Final = 1e-2
-"""Of chi^2: a tenth of a standard deviation, of an estimate of what is left that is high."""
+AS_PROMISED: Final = 0.03
+"""By which chi^2 behind a step may differ from what its derivatives promise, for the step to be the
+last: what bends the model by e standard deviations makes it differ by about 2 e."""
 
 
 class Quadratic(NamedTuple):
@@ -162,7 +163,7 @@ def minimise(
     *,
     held: Sequence[int] = (),
     tolerance: float = 1e-5,
-    predict_remaining: Callable[[FloatArray, FloatArray, Quadratic, float], float] | None = None,
+    chi2: Callable[[FloatArray], float] | None = None,
     curved: Callable[[FloatArray, FloatArray], FloatArray] = np.add,
     most: int = 60,
 ) -> Minimum:
@@ -179,9 +180,9 @@ def minimise(
     tolerance
         The search ends when the next step would lower chi^2 by less: 1e-5 is 0.003
         standard deviations. That step is still accepted, unverified.
-    predict_remaining
-        What a step leaves to be gained, from its two ends, the quadratic at the first and
-        what that promises. Below 1e-2 the step is accepted unverified.
+    chi2
+        chi^2 at a point, where that costs less than its derivatives: a step behind which it is as
+        promised is the last.
     curved
         Where a step from a point ends, where more is known of the model than its derivatives.
     most
@@ -193,11 +194,11 @@ def minimise(
         step = bounded_step(now.normal, now.gradient, bounds.about(value), held)
         promised = float(2.0 * now.gradient @ step - step @ now.normal @ step)
         trial = bounds.clip(curved(value, step))
+        expected = moved(now, step)
         if promised < tolerance or (
-            predict_remaining is not None
-            and predict_remaining(value, trial, now, promised) < PREDICTED
+            chi2 is not None and abs(chi2(trial) - expected.chi2) < AS_PROMISED
         ):
-            return Minimum(trial, moved(now, step), True)
+            return Minimum(trial, expected, True)
         ways = (bounds.clip(curved(value, part * step)) for part in FRACTIONS)
         tried = ((way, evaluate(way)) for way in ways)
         enough = now.chi2 + 0.1 * tolerance
@@ -266,15 +267,17 @@ def intervals95(
     if at_rest and bool(((room.lower <= -half) & (half <= room.upper)).all()):
         # None can come to a bound, since following another moves it by 1.96 of its own at most.
         return [(float(value[j] - half[j]), float(value[j] + half[j])) for j in indices]
-    return [
-        tuple(
+    found = []
+    for j in indices:
+        reach = _FAR * float(deviations[j])
+        low, high = (
             _profiled_end(value, normal, gradient, bounds, j, held, far)
-            for far in (-far_off, far_off)
+            if reach > 0.0
+            else value[j]
+            for far in (-reach, reach)
         )
-        if (far_off := _FAR * float(deviations[j])) > 0.0
-        else (float(value[j]), float(value[j]))
-        for j in indices
-    ]
+        found.append((float(low), float(high)))
+    return found
 
 
 def _profiled_end(

@@ -56,44 +56,34 @@ def fit_period(
     """
     omega = 2.0 * math.pi * points.apparent_frequency_hz if held is None else held
     a, b, c = rates
-    middle = _line(
-        points, amplitude, (a, b, c, 0.5 if share is None else share), omega, held, restoring
-    )
-    residual = middle[2] / points.time_sd_s
-    chi2 = float(residual @ residual) / max(len(points) - 2, 1)
-    matrix = middle[1] * (chi2 if chi2 > _LOUD else 1.0)
+    shares = np.array([0.5, 0.0, 1.0] if share is None else [share])[:, None]
+    half_cycles = phases(points, amplitude, (a, b, c, shares), omega, restoring) / math.pi
+    weight, first_s = points.time_sd_s**-2.0, float(points.time_s[0])
+    # Straight lines t = first + half period times half cycles, one a share.
+    total, time = float(weight.sum()), points.time_s - first_s
+    centre, middle = half_cycles @ weight / total, float(time @ weight) / total
+    off = half_cycles - centre[:, None]
+    square = off**2 @ weight
+    if held is None:
+        half = (off * weight) @ time / square
+        variance = 1.0 / square[0]
+    else:
+        half, variance = np.full(len(shares), math.pi / omega), 0.0
+    begun = middle - half * centre
+    late = time - begun[0] - half[0] * half_cycles[0]
+    found, matrix = math.pi / half, np.empty((2, 2))
+    slope = -found[0] / half[0]
+    matrix[0, 0] = slope**2 * variance
+    matrix[0, 1] = matrix[1, 0] = -slope * centre[0] * variance
+    matrix[1, 1] = 1.0 / total + centre[0] ** 2 * variance
+    chi2 = float(late**2 @ weight) / max(len(points) - 2, 1)
+    if chi2 > _LOUD:
+        matrix *= chi2
     if share is None:
-        ends = [
-            _line(points, amplitude, (a, b, c, end), omega, held, restoring)[0]
-            for end in (0.0, 1.0)
-        ]
-        off = max((end - middle[0] for end in ends), key=lambda change: abs(change[0]))
-        matrix += np.outer(off, off) / 3.0
+        ends = [(found[end] - found[0], begun[end] - begun[0]) for end in (1, 2)]
+        off_by = max(ends, key=lambda change: abs(change[0]))
+        matrix += np.outer(off_by, off_by) / 3.0
         # All times share what the unknown division of b does to the half cycles' shape.
-        matrix[1, 1] += (b / (4.0 * float(middle[0][0]) ** 2)) ** 2 / 3.0
-    found, first = (float(number) for number in middle[0])
-    return Period(found, first, matrix, chi2, found * middle[2])
-
-
-def _line(
-    points: TurningPoints,
-    amplitude: FloatArray,
-    losses: tuple[float, float, float, float],
-    omega: float,
-    held: float | None,
-    restoring: Restoring,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Angular frequency and first time for one share; their covariance; residuals in s."""
-    reference = float(points.time_s[0])
-    stretched = phases(points, amplitude, losses, omega, restoring) / math.pi
-    columns = np.stack([stretched, np.ones_like(stretched)], axis=1)
-    weighted = columns / points.time_sd_s[:, None] ** 2
-    # The half period, unless it is held, and the first time.
-    free = slice(0 if held is None else 1, 2)
-    line, inverse = np.array([math.pi / omega, 0.0]), np.zeros((2, 2))
-    inverse[free, free] = np.linalg.inv(weighted[:, free].T @ columns[:, free])
-    line += inverse @ weighted.T @ (points.time_s - reference - columns @ line)
-    residual = points.time_s - reference - columns @ line
-    slope, first = line.tolist()
-    jacobian = np.diag([-math.pi / slope**2, 1.0])
-    return np.array([math.pi / slope, reference + first]), jacobian @ inverse @ jacobian, residual
+        matrix[1, 1] += (b / (4.0 * float(found[0]) ** 2)) ** 2 / 3.0
+    omega = float(found[0])
+    return Period(omega, first_s + float(begun[0]), matrix, chi2, omega * late)
