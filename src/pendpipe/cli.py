@@ -103,7 +103,7 @@ def module_of(name: str) -> Any:
     return None
 
 
-def _parse(argv: Sequence[str]) -> argparse.Namespace:
+def parse(argv: Sequence[str]) -> argparse.Namespace:
     """Parse the words of one call; argparse ends the program with 2 on bad usage."""
     module = module_of(argv[0]) if argv and not argv[0].startswith("-") else None
     if module is not None:
@@ -169,7 +169,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")  # a console without Greek letters
     one_thread()
     try:
-        arguments = _parse(sys.argv[1:] if argv is None else argv)
+        arguments = parse(sys.argv[1:] if argv is None else argv)
         status = _run(arguments)
         sys.stdout.flush()
         return status

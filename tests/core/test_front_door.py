@@ -1,5 +1,11 @@
-"""The README's lines of Python, from arrays to numbers, a table, a figure and a paragraph."""
+"""The README's and the pages' lines do what they say, those of Python and those of the shell."""
 
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import matplotlib as mpl
@@ -7,6 +13,7 @@ import numpy as np
 import pytest
 
 import pendpipe as pp
+from pendpipe import cli
 
 README = Path(__file__).parents[2] / "README.md"
 
@@ -34,3 +41,35 @@ def test_the_lines_of_the_readme_answer(capsys: pytest.CaptureFixture[str], tmp_
     pp.diagnose(names["recording"]).save(tmp_path / "fit")
     made = {path.name for path in (tmp_path / "fit").iterdir()}
     assert {"fit.json", "turning_points.csv", "fit.svg", "diagnosis.json"} <= made
+
+
+SET_UP = re.compile(r"\.venv|pip install|\bmake ")
+PAGES = [README, *sorted((README.parent / "docs").glob("*.md"))]
+INSTRUMENT = re.compile(r"--port|--anew")
+
+
+@pytest.mark.parametrize(
+    "page", [README, *sorted((README.parent / "docs").glob("*.md"))], ids=lambda page: page.name
+)
+def test_the_commands_of_the_pages_run(page: Path, tmp_path: Path) -> None:
+    """Those that need an instrument have options that there are; CI does what the set-up says."""
+    blocks = re.findall(r"```sh\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    shutil.copytree(README.parent / "examples", tmp_path / "examples")
+    shutil.copy(tmp_path / "examples/string-pendulum.csv", tmp_path / "swing.csv")
+    angles = "\n".join(f"{0.4 * step:g},{0.1 * step:g}" for step in range(-4, 5))
+    (tmp_path / "caliper.csv").write_text(f"volts,angle_rad\n{angles}\n", encoding="utf-8")
+    tools = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    for block in blocks:
+        lines = [line for line in block.splitlines() if line.strip() and not SET_UP.search(line)]
+        for line in filter(INSTRUMENT.search, lines):
+            command = cli.parse(shlex.split(line, comments=True)[1:])
+            assert command.declared
+        done = subprocess.run(
+            ["bash", "-ec", "\n".join(line for line in lines if not INSTRUMENT.search(line))],
+            cwd=tmp_path,
+            env=os.environ | {"PATH": tools, "MPLBACKEND": "Agg"},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, f"{block}\n{done.stderr}"
