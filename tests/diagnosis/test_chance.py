@@ -23,12 +23,19 @@ from .records import null_fit
 WHITE = Noise(np.ones(60), np.ones(60))
 
 
+NOTHING = np.zeros((60, 0))
+
+
 def bank_of(columns: FloatArray) -> Bank:
     """One effect of as many shapes as there are columns, with nothing fitted."""
     effect, count = by_identifier("offset-drift"), columns.shape[1]
     candidates = tuple(Candidate(effect, (float(k),), k, 1) for k in range(count))
-    nothing = np.zeros((len(columns), 0))
-    return Bank(nothing, columns.astype(np.float32), candidates, np.zeros(count))
+    return Bank(NOTHING, columns.astype(np.float32), candidates, np.zeros(count))
+
+
+def scanner_of(bank: Bank) -> Scanner:
+    """A scan of it without tones."""
+    return Scanner(bank, WHITE, NOTHING)
 
 
 @pytest.mark.parametrize("number", [1, 7, 100])
@@ -51,7 +58,7 @@ def test_looking_at_more_makes_nothing_rarer(local: float, trials: float, growth
 def test_independent_shapes_are_counted(shapes: int) -> None:
     """The p-values of fresh noise are uniform then."""
     bank = bank_of(np.eye(60)[:, :shapes])
-    chance = draw_chance(Scanner(bank, WHITE), seed=1, draws=2000)
+    chance = draw_chance(scanner_of(bank), seed=1, draws=2000)
     fresh = np.random.default_rng(99).standard_normal((60, 600))
     smallest = local_p_values(bank.scores(fresh), bank.freedom).min(axis=0)
     found = [chance.everywhere.global_p_value(float(local)) for local in smallest]
@@ -61,17 +68,17 @@ def test_independent_shapes_are_counted(shapes: int) -> None:
 def test_more_shapes_are_more_trials_but_the_same_shape_again_is_none() -> None:
     found = []
     for shapes in (2, 8, 32):
-        chance = draw_chance(Scanner(bank_of(np.eye(60)[:, :shapes]), WHITE), seed=2)
+        chance = draw_chance(scanner_of(bank_of(np.eye(60)[:, :shapes])), seed=2)
         found.append(chance.own["offset-drift"].global_p_value(1e-4))
     assert found[0] < found[1] < found[2]
-    same = draw_chance(Scanner(bank_of(np.repeat(np.eye(60)[:, :1], 32, axis=1)), WHITE), seed=2)
+    same = draw_chance(scanner_of(bank_of(np.repeat(np.eye(60)[:, :1], 32, axis=1))), seed=2)
     assert same.own["offset-drift"].global_p_value(1e-4) < found[0]
 
 
 def test_the_draws_follow_their_seed() -> None:
     bank = bank_of(np.eye(60)[:, :5])
-    assert draw_chance(Scanner(bank, WHITE), seed=3) == draw_chance(Scanner(bank, WHITE), seed=3)
-    assert draw_chance(Scanner(bank, WHITE), seed=3) != draw_chance(Scanner(bank, WHITE), seed=4)
+    assert draw_chance(scanner_of(bank), seed=3) == draw_chance(scanner_of(bank), seed=3)
+    assert draw_chance(scanner_of(bank), seed=3) != draw_chance(scanner_of(bank), seed=4)
 
 
 def test_false_alarms_of_the_whole_catalogue_are_as_frequent_as_the_p_value() -> None:

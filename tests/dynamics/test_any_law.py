@@ -234,3 +234,16 @@ def test_just_before_it_starts_a_motion_is_as_just_after(amplitude: float, early
     model = Model(time_s, 0.02, (by_identifier("circular-error"),), order=24)
     before, after = model.evaluate(value).reading[:2]
     assert before == pytest.approx(after, rel=1e-6)
+
+
+@pytest.mark.parametrize("every", [3, 11])
+def test_one_cycle_of_several_stands_for_all(every: int) -> None:
+    """What grows slowly along the phase is summed over the cycles between, to 1e-4."""
+    whole = Clock(4000)
+    motion = Motion(whole, 1.0, -1e-4 * whole.psi, whole.psi)
+    part = motion.thinned(every)
+    for rate in (lambda m: m.amplitude**2 * m.clock.sine**2, lambda m: m.time_s * m.clock.cosine):
+        complete = whole.integral(rate(motion))
+        there = complete[part.clock.half_cycles]
+        scale = np.abs(complete).max()
+        assert part.clock.integral(rate(part)) == pytest.approx(there, abs=1e-4 * scale)

@@ -1,7 +1,7 @@
 """Detection: the best score of every effect on a fit's residual, and the global p-value.
 
 How often chance alone does as well anywhere in the catalogue (the look-elsewhere effect) is counted
-on white residuals.
+on white residuals; among tones it is known.
 """
 
 import math
@@ -15,7 +15,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.scores import Bank, build_bank, local_p_values
+from pendpipe.diagnosis.scores import Bank, build_bank, local_p_values, tangent_basis
 from pendpipe.diagnosis.spectrum import Band, ToneScan, tone_scan
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
@@ -148,20 +148,24 @@ class Scanner:
         Of the effects that are no tones.
     noise
         Of the readings.
+    basis
+        Orthonormal, of the model's tangent space among all readings, shape (n + 1, p).
     spectral, scans
         The effects that are tones, and the scans for them, steady or decaying.
     """
 
     bank: Bank
     noise: Noise
+    basis: FloatArray
     spectral: tuple[Effect, ...] = ()
     scans: tuple[ToneScan, ...] = ()
 
     def tones(self, residual: FloatArray) -> list[FloatArray]:
-        """Return each scan's chi^2 of a whitened, projected residual (with the prior's entry)."""
+        """Return each scan's chi^2 of a whitened residual (with the prior's entry)."""
         if not self.scans:
             return []
-        weights = self.noise.adjoint(residual[:-1])
+        left = residual - self.basis @ (self.basis.T @ residual)
+        weights = self.noise.adjoint(left[:-1])
         return [scan.scores(weights) for scan in self.scans]
 
 
@@ -169,23 +173,22 @@ def prepare(fit: Fit, data: Data, noise: Noise, effects: Sequence[Effect]) -> Sc
     """Compute the derivatives by all effects."""
     spectral = tuple(effect for effect in effects if effect.spectral)
     bank = build_bank(fit, noise, [effect for effect in effects if effect not in spectral])
+    basis = bank.basis if len(bank.basis) == len(fit.residual) else tangent_basis(fit)
     scans: list[ToneScan] = []
     if spectral and data.uniform:
         since = data.time_s - data.time_s[0]
         own = fit.value[OMEGA] / (2.0 * math.pi)
         steady = Band(_FEWEST_CYCLES / float(since[-1]), own, plane_band_hz(fit.at.span))
-        scans.append(tone_scan(data, noise, bank.basis, math.inf, steady))
+        scans.append(tone_scan(data, noise, basis, math.inf, steady))
         scans += [
-            tone_scan(
-                data, noise, bank.basis, part * float(since[-1]), Band(_LOWEST_MODE * own, own)
-            )
+            tone_scan(data, noise, basis, part * float(since[-1]), Band(_LOWEST_MODE * own, own))
             for part in _DECAY_TIMES
         ]
-    return Scanner(bank, noise, spectral, tuple(scans))
+    return Scanner(bank, noise, basis, spectral, tuple(scans))
 
 
 def draw_chance(scanner: Scanner, seed: int, draws: int = DRAWS) -> Chance:
-    """Count trials: draw white residuals, project them as the fit does, and scan them.
+    """Count trials: draw white residuals and scan them; a loudest tone is drawn from its law.
 
     The tail of the smallest p-value is extrapolated with a slowly growing number of trials, as
     by Gross and Vitells for continuous scans.
@@ -200,18 +203,12 @@ def draw_chance(scanner: Scanner, seed: int, draws: int = DRAWS) -> Chance:
     generator, bank = np.random.default_rng(seed), scanner.bank
     rows = bank.rows()
     largest: list[list[FloatArray]] = []
-    loudest: list[FloatArray] = []
     at_once = max(min(_DRAWS_AT_ONCE, _NUMBERS_AT_ONCE // len(bank.basis)), 1)
     for first in range(0, draws, at_once):
-        some = min(at_once, draws - first)
-        white = generator.standard_normal((some, len(bank.basis))).T
-        white -= bank.basis @ (bank.basis.T @ white)
+        # The columns are orthogonal to what a fit would take from it.
+        white = generator.standard_normal((min(at_once, draws - first), len(bank.basis))).T
         scores = bank.scores(white)
         largest.append([scores[indices].max(axis=0) for indices in rows.values()])
-        tone = np.zeros(some)
-        for scores in scanner.tones(white):
-            tone = np.maximum(tone, scores.max(axis=0))
-        loudest.append(tone)
     # All shapes of one effect have the same degrees of freedom.
     found = {
         name: local_p_values(np.concatenate(parts)[None], bank.freedom[rows[name][:1]])[0]
@@ -221,8 +218,18 @@ def draw_chance(scanner: Scanner, seed: int, draws: int = DRAWS) -> Chance:
         name: Trials(1.0, 0.0) if len(rows[name]) == 1 else _trials(local)
         for name, local in found.items()
     }
-    smallest = np.min([np.exp(-0.5 * np.concatenate(loudest)), *found.values()], axis=0)
+    tone = np.exp(-_loudest(scanner.scans, generator.exponential(size=draws)))
+    smallest = np.min([tone, *found.values()], axis=0)
     return Chance(_trials(smallest), own, draws)
+
+
+def _loudest(scans: Sequence[ToneScan], rare: FloatArray) -> FloatArray:
+    """Return half of the largest chi^2 of a tone where its trials times e^-that are `rare`."""
+    height = np.full_like(rare, 0.0 if not scans else 10.0)
+    for _ in range(6 if scans else 0):
+        trials = np.sum([scan.trials(height) for scan in scans], axis=0)
+        height = np.maximum(np.log(np.maximum(trials, 1e-9) / rare), 1e-3)
+    return height
 
 
 def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = None) -> Detection:
@@ -238,8 +245,7 @@ def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = N
         An earlier detection on this record, whose trials are reused.
     """
     bank = scanner.bank
-    residual = fit.residual - bank.basis @ (bank.basis.T @ fit.residual)
-    scores, tones = bank.scores(residual), scanner.tones(residual)
+    scores, tones = bank.scores(bank.compared(fit.residual)), scanner.tones(fit.residual)
     local = [scan.p_values(found) for scan, found in zip(scanner.scans, tones, strict=True)]
     smallest = min(
         [1.0, *(float(each.min()) for each in (bank.p_values(scores), *local) if len(each))]
@@ -256,8 +262,7 @@ def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = N
 def more_leads(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> list[Lead]:
     """Score effects that were not scanned, on a fit's residual."""
     bank = build_bank(fit, noise, effects)
-    residual = fit.residual - bank.basis @ (bank.basis.T @ fit.residual)
-    return _bank_leads(bank, bank.scores(residual), {})
+    return _bank_leads(bank, bank.scores(bank.compared(fit.residual)), {})
 
 
 def _bank_leads(bank: Bank, scores: FloatArray, own: dict[str, Trials]) -> list[Lead]:

@@ -58,7 +58,7 @@ class Evaluation:
     @cached_property
     def columns(self) -> FloatArray:
         """The Jacobian."""
-        columns = np.empty((len(self.at.reading) + 1, self.model.size))
+        columns = np.empty((len(self.residual), self.model.size))
         columns[:-1] = self.noise.whiten(jacobian(self.model, self.value, self.at))
         columns[-1] = 0.0
         columns[-1, SHARE] = 1.0 / _SHARE_SD

@@ -160,28 +160,24 @@ class Noise:
         mean = math.sqrt(float(np.mean(self.variance)))
         return np.full(len(self.variance), mean) if self.level is None else mean * self.level
 
-    def log_scale_variance(self, rows: FloatArray, chosen: IntArray | None = None) -> FloatArray:
+    def log_scale_variance(self, rows: FloatArray) -> FloatArray:
         """Return the variance of the logarithm of the noise that unit columns meet.
 
         Parameters
         ----------
         rows
             Whitened columns of unit length, shape (k, n or more).
-        chosen
-            The cosines that stand in the columns, where these are cosines and not all of them.
         """
         if not len(self.starts):
             return np.zeros(len(rows))
-        if chosen is not None:
-            power = rows[:, : len(chosen)] ** 2
-            sums = np.cumsum(np.pad(power, ((0, 0), (1, 0))), axis=1, dtype=np.float64)
-            edges = np.searchsorted(chosen, [*self.starts, len(self.variance)])
-            energy = np.diff(sums[:, edges], axis=1)
-        else:
-            rows = rows[:, : len(self.variance)]
-            rows = rows if self.coloured else dct(rows, norm="ortho")
-            energy = np.add.reduceat(rows**2, self.starts, axis=1)
+        energy = self.energy_in_bins(rows)
         return np.asarray(np.einsum("km,mn,kn->k", energy, self.uncertainty, energy, optimize=True))
+
+    def energy_in_bins(self, rows: FloatArray) -> FloatArray:
+        """Return the squares of unit columns in each bin of S, shape (k, bins)."""
+        rows = rows[:, : len(self.variance)]
+        rows = rows if self.coloured else dct(rows, norm="ortho")
+        return np.asarray(np.add.reduceat(rows**2, self.starts, axis=1))
 
     def misfit(self, residual: FloatArray) -> float:
         """Return the mean square about the harmonics of a whitened residual: 1 for noise alone."""

@@ -6,17 +6,16 @@ rest, at unit length, with the whitened residual: the locally most powerful test
 effect's shape is many such columns.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import dct
 from scipy.special import betainc, chdtrc
 
-from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.blocks import Blocks, blocks_of
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, pulled
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
@@ -34,12 +33,6 @@ _RESOLVED_SD = 4.0
 
 _COLUMNS_AT_ONCE = 32
 _NUMBERS_AT_ONCE = 1 << 22
-_MANY = 16_000
-"""Readings from which on the cosines about the harmonics are asked alone."""
-_HARMONICS = 12
-_BESIDE_HARMONIC = 1.0 / 16.0
-"""Half width of their bands in so many readings, over the motion's frequency: some 80 cosines. It
-falls, and their number grows, with the root of the number of readings."""
 _KNOWN = 1e-6
 """Variance of ln S below which it is known."""
 
@@ -54,88 +47,40 @@ class Candidate(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Bands:
-    """What of a long record is compared: its cosines about the harmonics of the motion.
-
-    What an effect changes varies slowly from cycle to cycle, and so lies there. The cosines of
-    white noise are independent, so that any part of them makes a test as exact as all; and of a
-    thousand cycles an eighth holds all but a hundredth of the fall of chi^2.
-
-    Parameters
-    ----------
-    chosen
-        Which cosines; None for all numbers as they are.
-    cosines
-        Whether whitened readings are cosines already.
-    """
-
-    chosen: IntArray | None
-    cosines: bool
-
-    def of(self, rows: FloatArray) -> FloatArray:
-        """Take them from whitened readings, with the prior's entry behind; (..., n + 1)."""
-        if self.chosen is None:
-            return rows
-        white = rows if self.cosines else dct(rows[..., :-1], norm="ortho")
-        return np.concatenate([white[..., self.chosen], rows[..., -1:]], axis=-1)
-
-    def span(self, basis: FloatArray) -> FloatArray:
-        """Return an orthonormal basis of what a space's basis, shape (n + 1, p), is in them."""
-        return basis if self.chosen is None else _span(self.of(basis.T).T)
-
-
-WHOLE: Final = Bands(None, cosines=False)
-"""Of a record that is not long: all readings."""
-
-
-def bands_of(fit: Fit, noise: Noise) -> Bands:
-    """Choose the cosines of a long record that its effects change."""
-    time, phase = fit.at.sampled.time_s, fit.at.sampled.phase
-    count = len(time)
-    interval = (time[-1] - time[0]) / (count - 1)
-    even = np.abs(time - time[0] - interval * np.arange(count)) < 0.5 * interval
-    if fit.at.parts or count < _MANY or not np.all(even):
-        return WHOLE
-    # Of each frequency that the motion has: over a hundredth of the record each.
-    some = np.linspace(0, count - 1, 101).astype(np.int64)
-    pace = np.abs(np.diff(phase[some]) / np.diff(some)) / np.pi
-    cosine = np.arange(count) / count
-    beside = _BESIDE_HARMONIC * pace.max() * math.sqrt(_MANY / count)
-    order = np.arange(_HARMONICS + 1)[:, None]
-    near = (cosine > order * pace.min() - beside) & (cosine < order * pace.max() + beside)
-    return Bands(np.flatnonzero(near.any(axis=0)), noise.coloured)
-
-
-@dataclass(frozen=True)
 class Bank:
     """Unit columns of all candidates, orthogonal to the model's tangent space.
 
     Parameters
     ----------
     basis
-        Orthonormal, of the model's tangent space, shape (n + 1, p).
+        Orthonormal, of the model's tangent space, shape (m + 1, p).
     columns
-        Shape (m, k), float32: a candidate's columns are orthonormal among themselves.
+        Shape (m + 1, k), float32: a candidate's columns are orthonormal among themselves.
     candidates
         The effects and shapes to which the columns belong.
     log_scale_variance
         Variance of the logarithm of the noise that each candidate meets, shape (candidates,).
-    bands
-        The m of the n + 1 whitened numbers that are compared.
+    blocks
+        Of the fit whose m whitened numbers are compared; None where they are given as such.
     """
 
     basis: FloatArray
     columns: NDArray[np.float32]
     candidates: tuple[Candidate, ...]
     log_scale_variance: FloatArray
-    bands: Bands = WHOLE
+    blocks: Blocks | None = None
+
+    def compared(self, residual: FloatArray) -> FloatArray:
+        """Return what is compared of a whitened residual, less what the model can reproduce."""
+        numbers = residual if self.blocks is None else self.blocks.numbers_of(residual)
+        return np.asarray(numbers - self.basis @ (self.basis.T @ numbers))
 
     def scores(self, residual: FloatArray) -> FloatArray:
         """Return the sum of squares of each candidate's inner products; shape (candidates, ...).
 
         A size that can't be negative (a friction) scores with a positive sign only.
         """
-        products = self.columns.T @ self.bands.of(residual.T).T.astype(np.float32)
+        products = self.columns.T @ residual.astype(np.float32)
         signed = [c.first for c in self.candidates if c.effect.one_sided]
         products[signed] = np.maximum(products[signed], 0.0)
         squares = products.astype(np.float64) ** 2
@@ -180,14 +125,14 @@ def _span(part: FloatArray) -> FloatArray:
 def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
     """Compute the columns of all effects along a fitted motion.
 
-    A few shapes at a time, stored in single precision, and of a long record the bands that they
-    change: in double precision and whole it would take gigabytes.
+    A few shapes at a time, stored in single precision, and of a long record in blocks.
     """
+    blocks = blocks_of(fit, noise)
+    fit, noise = blocks.fit, blocks.noise
     shapes = [_shapes(effect, fit.at.span) for effect in effects]
     most = sum(max(e.sizes, 1) * len(rows) for e, rows in zip(effects, shapes, strict=True))
-    basis, bands, filled = tangent_basis(fit), bands_of(fit, noise), 0
-    known = bands.span(basis)
-    columns = np.empty((most, len(known)), dtype=np.float32)
+    basis, filled = tangent_basis(fit), 0
+    columns = np.empty((most, len(basis)), dtype=np.float32)
     candidates, unsure = [], [np.zeros(0)]
     at_once = max(min(_COLUMNS_AT_ONCE, _NUMBERS_AT_ONCE // len(basis)), 1)
     for effect, rows in zip(effects, shapes, strict=True):
@@ -196,19 +141,17 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
             some = len(rows)
         for first in range(0, len(rows), some):
             part = rows[first : first + some]
-            seen, own, units = _beside(
-                known, effect, part, whitened(fit, noise, effect, part, bands)
-            )
+            seen, own, units = _beside(basis, effect, part, whitened(fit, noise, effect, part))
             if not own:
                 continue
-            flat = units.reshape(-1, len(known))
+            flat = units.reshape(-1, len(basis))
             columns[filled : filled + len(flat)] = flat
-            each = noise.log_scale_variance(flat, bands.chosen)
+            each = noise.log_scale_variance(flat)
             unsure.append(each.reshape(units.shape[:2]).mean(axis=1))
             for shape in own:
                 candidates.append(Candidate(seen, shape, filled, units.shape[1]))
                 filled += units.shape[1]
-    return Bank(basis, columns[:filled].T, tuple(candidates), np.concatenate(unsure), bands)
+    return Bank(basis, columns[:filled].T, tuple(candidates), np.concatenate(unsure), blocks)
 
 
 def _beside(
@@ -266,15 +209,11 @@ def _shapes(effect: Effect, span: Span) -> list[tuple[float, ...]]:
 
 
 def whitened(
-    fit: Fit,
-    noise: Noise,
-    effect: Effect,
-    shapes: Sequence[Sequence[float]],
-    bands: Bands = WHOLE,
+    fit: Fit, noise: Noise, effect: Effect, shapes: Sequence[Sequence[float]]
 ) -> FloatArray:
-    """Derivatives of the whitened readings (in bands) by each size of each shape, (columns, m)."""
+    """Derivatives of the whitened readings by each size of each shape, (columns, n + 1)."""
     if isinstance(effect, ReleasedParameter):
-        return bands.of(effect.sensitivity(fit)[None])
+        return effect.sensitivity(fit)[None]
     small = effect.small(fit.at.span)
     changes = [_sizes(effect, shape, k, small) for shape in shapes for k in range(effect.sizes)]
     raw = responses(effect, changes, fit.at, fit.model.pendulum(fit.value))
@@ -282,7 +221,7 @@ def whitened(
     raw[~np.isfinite(raw.sum(axis=1))] = 0.0
     rows = np.zeros((len(raw), len(fit.jacobian)))
     rows[:, :-1] = noise.whiten(raw.T).T
-    return bands.of(rows)
+    return rows
 
 
 def _sizes(

@@ -1,5 +1,6 @@
 """Scans for tones of any frequency, steady or decaying, in a residual."""
 
+import math
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -55,6 +56,9 @@ class ToneScan:
     as_steady
         Where what lies beside a steady tone is taken, shape (m,): near the motion's harmonics,
         whose misfits fade too, or everywhere if beside a wider one lies the next harmonic.
+    lines
+        Independent frequencies in the scanned band (Baluev 2008): sqrt(4 pi) times its width and
+        the standard deviation of the time, weighted with the squared envelope.
     """
 
     decay_s: float
@@ -65,6 +69,15 @@ class ToneScan:
     size: int
     wider: float
     as_steady: BoolArray
+    lines: float
+
+    def trials(self, height: FloatArray) -> FloatArray:
+        """Return the number of trials at half a chi^2, to a tenth.
+
+        By Rice's formula they grow with the root of the height, up to all frequencies.
+        """
+        crossings, most = self.lines * np.sqrt(height), np.count_nonzero(self.inverse[:, 0])
+        return np.asarray(crossings * most / np.maximum(np.hypot(crossings, most), 1.0))
 
     def p_values(self, scores: FloatArray) -> FloatArray:
         """Return the probability that chance alone does better at each frequency by itself.
@@ -160,4 +173,9 @@ def tone_scan(data: Data, noise: Noise, basis: FloatArray, decay_s: float, band:
     beyond = _BESIDE * wider / (count * data.interval_s) > band.own_hz
     as_steady = beyond | (np.abs(order - np.rint(order)) < OFF_HARMONIC)
     unsure = noise.log_variance_at(cosine)
-    return ToneScan(decay_s, envelope, frequency, inverse, unsure, size, wider, as_steady)
+    since = data.time_s - data.time_s[0]
+    since = since - float(fade @ since) / float(fade.sum())
+    spread_s = math.sqrt(float(fade @ since**2) / float(fade.sum()))
+    width_hz = np.count_nonzero(seen) / (size * data.interval_s)
+    own = float(math.sqrt(4.0 * math.pi) * spread_s * width_hz)
+    return ToneScan(decay_s, envelope, frequency, inverse, unsure, size, wider, as_steady, own)

@@ -37,49 +37,74 @@ class Clock:
         How many half cycles.
     order
         Intervals between the nodes of one half cycle.
+    every
+        Of so many cycles, an odd number, the middle one has nodes and stands for all.
     """
 
     count: int
     order: int = 16
+    every: int = 1
+
+    @property
+    def half_cycles(self) -> IntArray:
+        """Numbers of the half cycles with nodes, shape (rows,)."""
+        return _with_nodes(self.count, self.every)
 
     @property
     def psi(self) -> FloatArray:
-        """Phase of each node, shape (count, order + 1)."""
-        return _phases(self.count, self.order)[0]
+        """Phase of each node, shape (rows, order + 1)."""
+        return _phases(self)[0]
 
     @property
     def cosine(self) -> FloatArray:
-        """cos(psi), shape (count, order + 1)."""
-        return _phases(self.count, self.order)[1]
+        """cos(psi), shape (rows, order + 1)."""
+        return _phases(self)[1]
 
     @property
     def sine(self) -> FloatArray:
-        """sin(psi), shape (count, order + 1); exactly zero at the turning points."""
-        return _phases(self.count, self.order)[2]
+        """sin(psi), shape (rows, order + 1); exactly zero at the turning points."""
+        return _phases(self)[2]
 
     @property
     def side(self) -> FloatArray:
         """+1 and -1 in turn: the side of the turning point that begins each half cycle."""
-        return _phases(self.count, self.order)[3]
+        return _phases(self)[3]
 
     def derivative(self, values: FloatArray) -> FloatArray:
         """Differentiate by the phase within each half cycle; shape as `values`."""
         return np.asarray(values @ _differentiation(self.order).T)
 
     def integral(self, rate: FloatArray) -> FloatArray:
-        """Integrate over the phase from psi = 0; shape (..., count, order + 1) as `rate`."""
+        """Integrate over the phase from psi = 0; shape (..., rows, order + 1) as `rate`."""
         parts = rate @ _integration(self.order).T
-        parts[..., 1:, :] += np.cumsum(parts[..., :-1, -1], axis=-1)[..., None]
+        if self.every == 1:
+            parts[..., 1:, :] += np.cumsum(parts[..., :-1, -1], axis=-1)[..., None]
+            return np.asarray(parts)
+        first = parts[..., ::2, -1].copy()
+        cycle = first + parts[..., 1::2, -1]
+        before = self.every * (np.cumsum(cycle, axis=-1) - cycle) + self.every // 2 * cycle
+        parts[..., ::2, :] += before[..., None]
+        parts[..., 1::2, :] += (before + first)[..., None]
         return np.asarray(parts)
 
 
+def _with_nodes(count: int, every: int) -> IntArray:
+    numbers: IntArray = np.arange(count)
+    if every == 1:
+        return numbers
+    cycle = numbers // 2
+    whole = cycle < count // 2 // every * every
+    return np.asarray(numbers[whole & (cycle % every == every // 2)])
+
+
 @lru_cache(maxsize=8)
-def _phases(count: int, order: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def _phases(clock: Clock) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Phase, cosine and sine of each node, and the sign of each half cycle; not to be written."""
-    sign = np.asarray(1.0 - 2.0 * (np.arange(count) % 2)[:, None], dtype=np.float64)
-    psi: FloatArray = math.pi * (np.arange(count)[:, None] + _nodes(order))
-    cosine: FloatArray = sign * np.cos(math.pi * _nodes(order))
-    sine = np.sin(math.pi * _nodes(order))
+    numbers, nodes = clock.half_cycles[:, None], _nodes(clock.order)
+    sign = np.asarray(1.0 - 2.0 * (numbers % 2), dtype=np.float64)
+    psi: FloatArray = math.pi * (numbers + nodes)
+    cosine: FloatArray = sign * np.cos(math.pi * nodes)
+    sine = np.sin(math.pi * nodes)
     sine[[0, -1]] = 0.0
     sine = np.asarray(sign * sine)
     for each in (psi, cosine, sine, sign):
@@ -171,6 +196,13 @@ class Motion:
     def velocity(self) -> FloatArray:
         """x', rad/s."""
         return -self.upwards * self.angular_frequency * self.amplitude * self.clock.sine
+
+    def thinned(self, every: int) -> Motion:
+        """The same with one cycle of `every`, which stands for all: where they change slowly."""
+        clock = replace(self.clock, every=every)
+        rows = clock.half_cycles
+        log_amplitude, time_s = self.log_amplitude[rows], self.time_s[rows]
+        return Motion(clock, self.angular_frequency, log_amplitude, time_s, self.upwards)
 
     @property
     def direction(self) -> FloatArray:
@@ -456,6 +488,28 @@ class Sampled:
             sine=self.cosine,
             ahead_rad=0.5 * math.pi,
             _slope=acceleration,
+        )
+
+    @property
+    def half_cycle(self) -> IntArray:
+        """The row of the motion that each time lies in, shape (n,)."""
+        return np.asarray(self._first // (_FINER * self.motion.clock.order + 1))
+
+    def thinned(self, motion: Motion, rows: IntArray) -> Sampled:
+        """Return some of the readings, on a thinned motion (`Motion.thinned`) with their cycles."""
+        half, length = self.half_cycle[rows], _FINER * motion.clock.order + 1
+        row = np.searchsorted(motion.clock.half_cycles, half)
+        return replace(
+            self,
+            motion=motion,
+            time_s=self.time_s[rows],
+            phase=self.phase[rows],
+            amplitude=self.amplitude[rows],
+            cosine=self.cosine[rows],
+            sine=self.sine[rows],
+            _first=self._first[rows] + (row - half) * length,
+            _weights=np.ascontiguousarray(self._weights[:, rows]),
+            _slope=None if self._slope is None else self._slope[rows],
         )
 
     def at_nodes(self, values: FloatArray) -> FloatArray:

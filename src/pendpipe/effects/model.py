@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, Self
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics.any_law import (
     Clock,
     Law,
@@ -60,6 +60,18 @@ class Evaluated:
     span: Span
     parts: tuple[Part, ...] = ()
     """Of a `pendpipe.effects.stack.Stack`: its recordings."""
+    whole: Evaluated | None = None
+    """What these readings were taken from (`thinned`)."""
+
+    def thinned(self, every: int, rows: IntArray, law: Law) -> Evaluated:
+        """Return some readings, of the middle one of every so many cycles, which stands for all.
+
+        What is small changes the motion alike in all of them; an instant is known to them.
+        """
+        motion = self.tangent.motion.thinned(every)
+        sampled = self.sampled.thinned(motion, rows)
+        reading = self.reading[rows]
+        return Evaluated(reading, sampled, Tangent(law, motion), self.span, whole=self)
 
     @cached_property
     def start(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -76,9 +88,11 @@ class Evaluated:
         if not acting:
             return change
         instants = np.array([kick.time_s for kick in acting.values()])
-        there = sample_motion(self.tangent.motion, instants)
+        whole = self.whole or self
+        there = sample_motion(whole.tangent.motion, instants)
         log, late = kick_sizes(there, list(acting.values()), there)
-        node_log, node_time, by_log, by_time = self.start
+        node_log, node_time, _, _ = whole.start
+        _, _, by_log, by_time = self.start
         then_log, then_time = there.at_nodes(np.stack([node_log, node_time]))
         scale = log / then_log
         first = np.searchsorted(self.sampled.time_s, instants, side="right")
@@ -458,7 +472,7 @@ def jacobian(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
         return np.concatenate([part.own @ part.mixing for part in at.parts])
     sampled, tangent = at.sampled, at.tangent
     pendulum = model.pendulum(value)
-    columns = np.empty((len(model.time_s), model.size))
+    columns = np.empty((len(at.reading), model.size))
     losses = [A, B, C, SHARE]
     columns[:, losses] = sampled.change(
         *tangent.of_force(np.stack([_by_loss(model, value, at, index) for index in losses]))

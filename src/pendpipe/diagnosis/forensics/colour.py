@@ -14,13 +14,14 @@ from scipy.fft import dct
 
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.blocks import blocks_of
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.local import residual_of
 from pendpipe.diagnosis.forensics.tails import tail_of_squares, upper_tail
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Finding, Location, nothing
-from pendpipe.diagnosis.scores import bands_of, tangent_basis
+from pendpipe.diagnosis.scores import tangent_basis
 from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, compact
@@ -181,16 +182,18 @@ def find_random_torque(data: Data, fit: Fit, noise: Noise, samples: Samples) -> 
 
 def _fluctuations(data: Data, fit: Fit, noise: Noise) -> tuple[Shapes, Shapes, float]:
     """Return the shapes in amplitude and in phase, and the variance of a kick for S_a = 1."""
-    sampled, time = fit.at.sampled, data.time_s
-    edges = np.linspace(time[0], time[-1], _KICKS + 1)
+    edges = np.linspace(data.time_s[0], data.time_s[-1], _KICKS + 1)
+    residual = np.append(noise.whiten(residual_of(data, fit)), fit.residual[-1])
+    blocks = blocks_of(fit, noise)
+    fit, noise, residual = blocks.fit, blocks.noise, blocks.numbers_of(residual)
+    sampled = fit.at.sampled
+    time = sampled.time_s
     spacing = float(edges[1] - edges[0])
     instants = edges[:-1] + 0.5 * spacing
     growth = sampled.at_nodes(fit.at.tangent.of_start()[0])
     there = np.interp(instants, time, sampled.amplitude)
     grown = there * np.interp(instants, time, growth)
-    bands = bands_of(fit, noise)
-    basis = bands.span(tangent_basis(fit))
-    residual = bands.of(np.append(noise.whiten(residual_of(data, fit)), fit.residual[-1]))
+    basis = tangent_basis(fit)
     residual -= basis @ (basis.T @ residual)
     quadratures = (
         (sampled.amplitude * sampled.cosine * growth, grown),
@@ -202,7 +205,7 @@ def _fluctuations(data: Data, fit: Fit, noise: Noise) -> tuple[Shapes, Shapes, f
             # A kick's random steps are spread over its window.
             after = np.clip((time - edge) / spacing, 0.0, 1.0)
             # The last entry is the prior's.
-            yield bands.of(np.append(noise.whiten(after * quadrature / size), 0.0))
+            yield np.append(noise.whiten(after * quadrature / size), 0.0)
 
     amplitude, phase = (
         _shapes(np.stack([*columns(*pair)], axis=1), basis, residual) for pair in quadratures

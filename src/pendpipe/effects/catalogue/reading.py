@@ -95,9 +95,7 @@ def camera_geometry(sampled: Sampled, pendulum: Pendulum, e_1: float, e_2: float
 )
 def sensor_backlash(sampled: Sampled, pendulum: Pendulum, play: float) -> FloatArray:
     """The reading stays behind by b/2, and rests after a reversal until the play is used up."""
-    motion = sampled.motion
-    half = np.floor(sampled.phase / math.pi).astype(np.intp)
-    half = np.clip(half, 0, motion.clock.count - 1)
+    motion, half = sampled.motion, sampled.half_cycle
     turn, direction = motion.turning_angle[half, 0], motion.direction[half, 0]
     rests = np.maximum(0.0, play - np.abs(sampled.angle - turn))
     return np.asarray(direction * (rests - 0.5 * play))
