@@ -6,6 +6,7 @@ packages are imported by the function that needs them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from pendpipe.analysis.turning_points import TurningPoints
     from pendpipe.diagnosis.run import Outcome
     from pendpipe.diagnosis.several import JointOutcome
+    from pendpipe.estimate import Estimate
     from pendpipe.formats import Inspection
 
 Source = Recording | str | Path
@@ -213,7 +215,7 @@ def turning_points(recording: Source) -> TurningPoints:
 
 
 def fit(
-    recording: Source | ArrayLike | DataFrame,
+    recording: Source | TurningPoints | ArrayLike | DataFrame,
     angle_rad: ArrayLike | None = None,
     *,
     method: Method | None = None,
@@ -224,6 +226,7 @@ def fit(
     points: TurningPoints | None = None,
     clock_ppm: float | None = None,
     length_m: float | None = None,
+    period: float | Estimate | None = None,
     name: str | None = None,
 ) -> FitResult:
     """Fit a, b, c, frequency and amplitude to the free decay of a recording.
@@ -239,6 +242,7 @@ def fit(
     recording
         A recording, the path of its file, a DataFrame with ``time_s`` and ``angle_rad`` (or
         ``angle_deg``, ``volts``, ``displacement_m``), or times in s with the angles behind them.
+        Amplitudes alone (a ruler's, or speeds at a gate), and turning points, are fitted by Eq. 14.
     angle_rad
         The angles at these times, rad.
     method
@@ -256,7 +260,10 @@ def fit(
     clock_ppm
         What the clock may be off by, in parts per million; it enters the errors.
     length_m
-        Length of the pendulum whose displacement is read as L sin x (with ``restoring="sine"``).
+        Length of the pendulum whose displacement is read as L sin x (with ``restoring="sine"``);
+        amplitudes in m, and speeds in m/s, become angles by it.
+    period
+        Period of small swings, s, where amplitudes alone are given, which show none.
     name
         What to call the recording in messages; by default its path.
 
@@ -289,15 +296,40 @@ def fit(
     _check_choice("method", method, ("waveform", "turning-points"))
     _check_choice("restoring", restoring, ("linear", "sine"))
     _check_choice("baseline", baseline, ("eq8", "viscous"))
-    recording = _source(recording, angle_rad)
-    place, motion = name or _place(recording), _motion(recording, volts_per_radian)
     from dataclasses import replace
 
-    from pendpipe.analysis.fit import fit_recording
+    from pendpipe.analysis.fit import fit_recording, fit_turning_points
+    from pendpipe.analysis.fit.by_amplitudes import fit_amplitudes
     from pendpipe.analysis.fit.by_points import as_angles
     from pendpipe.analysis.fit.result import with_clock
     from pendpipe.analysis.free_decay import measure_recording
+    from pendpipe.analysis.turning_points import (
+        TurningPoints,
+        is_turning_points,
+        read_turning_points,
+    )
 
+    if isinstance(recording, str | Path) and is_turning_points(recording):
+        recording = read_turning_points(recording)
+    if isinstance(recording, TurningPoints):
+        found = fit_turning_points(recording, restoring=restoring, baseline=baseline, fixed=fixed)
+        return replace(found, name=name or "")
+    recording = _source(recording, angle_rad)
+    place, motion = name or _place(recording), _motion(recording, volts_per_radian)
+    own = "" if isinstance(recording, Recording) else Path(recording).name
+    if motion.is_of_amplitudes and points is None:
+        found = fit_amplitudes(
+            motion,
+            period=_given_period(period),
+            length_m=length_m,
+            baseline=baseline,
+            fixed=fixed,
+            place=place,
+        )
+        return replace(found, name=own)
+    refuse_if(
+        period is not None, "period", "the recording shows its own", "leave it out (--fix holds it)"
+    )
     if points is None:
         points, decay = measure_recording(motion, place)
     else:
@@ -326,9 +358,21 @@ def fit(
     return replace(
         result,
         cuts=(*(cut._asdict() for cut in points.cuts), *result.cuts),
-        name="" if isinstance(recording, Recording) else Path(recording).name,
+        name=own,
         decay=decay,
     )
+
+
+def _given_period(period: float | Estimate | None) -> Estimate | None:
+    from pendpipe.estimate import Estimate
+
+    if period is None:
+        return None
+    given = period if isinstance(period, Estimate) else Estimate(float(period), 0.0, "s")
+    refuse_if(
+        not 0.0 < given.value < math.inf, "period", f"{given.value!r} is no period", "give seconds"
+    )
+    return given
 
 
 def diagnose(

@@ -189,6 +189,11 @@ class Recording:
         return reading if self.quality is None else reading & (self.quality != MISSING)
 
     @cached_property
+    def is_of_amplitudes(self) -> bool:
+        """Whether the readings are amplitudes against time, and no swing; see `only_falls`."""
+        return only_falls(self.values[self.usable])
+
+    @cached_property
     def interval_s(self) -> float:
         """The usual time between samples: the median of the differences."""
         return float(np.median(np.diff(self.time_s))) if len(self) > 1 else float("nan")
@@ -287,6 +292,50 @@ _LARGEST: Final = 1e60
 """Of readings, whose fourth powers must be numbers as well; they move by its inverse at least."""
 _SHORTEST_S, _LONGEST_S = 1e-60, 1e14
 """Of a recording. Beyond three million years the search for the period counts false cycles."""
+
+
+_LEVEL: Final = 0.03
+"""Of the range, by which falling sizes may lie above the least before them, on average."""
+
+
+_LONGEST_LIST: Final = 100_000
+"""Readings of which nobody makes a list of amplitudes."""
+_BENDS: Final = 8
+"""How often a smooth fall bends to and fro about a cubic, at most."""
+
+
+def only_falls(values: FloatArray) -> bool:
+    """Say whether readings are a decay without its swings: sizes that fall from one to the next.
+
+    Noise may let some rise, but then they scatter about a smooth fall as noise does, whose second
+    differences alternate.
+
+    Examples
+    --------
+    >>> time = np.arange(50.0)
+    >>> only_falls(np.exp(-time / 20)), only_falls(np.exp(-time / 20) * np.cos(time))
+    (True, False)
+    """
+    if len(values) > _LONGEST_LIST:
+        return False
+    sizes = np.abs(values[np.isfinite(values)])
+    if len(sizes) < 4 or not sizes[-1] < 0.8 * sizes[0]:
+        return False
+    above = sizes - np.minimum.accumulate(sizes)
+    if not float(np.mean(above)) < _LEVEL * float(np.ptp(sizes)):
+        return False
+    steps = np.diff(sizes)
+    falls, rises = float(np.mean(steps < 0.0)), float(np.mean(steps > 0.0))
+    bends = np.diff(steps)
+    if len(bends) > 4 * _BENDS:
+        powers = np.linspace(-1.0, 1.0, len(bends))[:, None] ** np.arange(4)
+        bends = bends - powers @ np.linalg.lstsq(powers, bends)[0]
+    alike = float(bends[1:] @ bends[:-1]) / max(float(bends @ bends), 1e-300)
+    turns = np.count_nonzero(bends[1:] * bends[:-1] < 0.0)
+    if alike > 0.3 and turns > _BENDS:
+        # A smooth swing on a steep drift.
+        return False
+    return falls > max(0.4, 3.0 * rises) or (falls > rises and alike < -0.3)
 
 
 def jumps_of_a_turn(values: FloatArray) -> bool:

@@ -20,8 +20,9 @@ from pendpipe import api
 from pendpipe.analysis.fit.by_points import parse_fixed
 from pendpipe.analysis.fit.printed import gravity_line, lines
 from pendpipe.analysis.fit.result import FitResult
-from pendpipe.analysis.turning_points import read_turning_points
+from pendpipe.analysis.turning_points import is_turning_points, read_turning_points
 from pendpipe.arguments import (
+    ALTERNATIVES,
     FILES,
     OUTPUT,
     Arguments,
@@ -36,6 +37,7 @@ from pendpipe.arguments import (
     tell,
 )
 from pendpipe.errors import InputError, refuse_if
+from pendpipe.estimate import over
 from pendpipe.files import is_stream, write_json
 from pendpipe.report.class_table import Fitted, form_of, printed, together, write_fits
 
@@ -55,6 +57,18 @@ _OWN: Final[Flags] = {
         "type": measured_number,
         "metavar": "M",
         "help": "length of a simple pendulum, m, as 0.600 or 0.600(1): prints g",
+    },
+    "--period": {
+        "type": measured_number,
+        "metavar": "S",
+        "heading": ALTERNATIVES,
+        "help": "period of small swings, s, as 1.42 or 1.42(1), where amplitudes alone are given",
+    },
+    "--frequency": {
+        "type": measured_number,
+        "metavar": "HZ",
+        "heading": ALTERNATIVES,
+        "help": "its inverse, Hz",
     },
     "--clock-ppm": {
         "type": number_within(0),
@@ -151,8 +165,9 @@ def _fit(arguments: Arguments, say: Callable[[str], None] = tell) -> FitResult:
     fixed = parse_fixed(arguments.fix, arguments.baseline)
     recording, provenance = read_motion(arguments, quiet=not arguments.verbose, say=say)
     points = arguments.turning_points and read_turning_points(arguments.turning_points)
+    period, frequency = arguments.period, arguments.frequency
     result = api.fit(
-        recording,
+        arguments.file if is_turning_points(arguments.file) else recording,
         points=points,
         method=None if arguments.method == "auto" else arguments.method,
         restoring=None if arguments.restoring == "auto" else arguments.restoring,
@@ -160,6 +175,7 @@ def _fit(arguments: Arguments, say: Callable[[str], None] = tell) -> FitResult:
         fixed=fixed,
         length_m=arguments.length.value if arguments.length else None,
         clock_ppm=arguments.clock_ppm,
+        period=over(1.0, frequency, "s") if frequency else period,
         name=arguments.file,
     )
     return replace(

@@ -71,7 +71,7 @@ def _sheet(arguments: Arguments, file: str) -> Sheet:
     recording, provenance = read_motion(arguments, quiet=True, say=notes.append)
     result = replace(api.fit(recording, name=file), provenance=provenance, name=name)
     outcome = None
-    if not arguments.no_diagnosis:
+    if not arguments.no_diagnosis and result.method != "amplitudes":
         from pendpipe.diagnosis.run import diagnose_recording
 
         outcome = diagnose_recording(recording, place=file)

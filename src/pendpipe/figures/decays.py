@@ -4,7 +4,7 @@ Each draws the law that was fitted, and names it in its key.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -194,10 +194,10 @@ def _fitted(decay: Decay, factor: float) -> list[Mark]:
     middle = np.interp(moment, decay.points.time_s, decay.level_rad)
     amplitude = decay.along(elapsed)[0]
     label = f"fitted amplitude, {decay.law_name}"
-    return [
-        curve(moment, factor * (middle + amplitude), label=label),
-        curve(moment, factor * (middle - amplitude)),
-    ]
+    fitted = [curve(moment, factor * (middle + amplitude), label=label)]
+    if decay.fit.method == "amplitudes":
+        return fitted
+    return [*fitted, curve(moment, factor * (middle - amplitude))]
 
 
 def _residual(
@@ -398,7 +398,7 @@ def draw_fit(decay: Decay, recording: Recording) -> Figure:
         Q against amplitude, with the Q that the turning points show without a model.
     """
     unit = decay.points.unit
-    factor, shown_unit = axis_unit(decay.amplitude_rad, unit)
+    quality = _quality_by_amplitude(decay)
     own, own_unit = axis_unit(recording.values[recording.usable], recording.unit)
     time, look = recording.time_s, {"alpha": 0.6, "rasterized": True, "label": "readings"}
     readings = curve(time, own * recording.values, BLUE, width=0.5, **look)
@@ -411,12 +411,8 @@ def draw_fit(decay: Decay, recording: Recording) -> Figure:
             key=2,
         ),
         _residual(decay, about),
-        Panel(
-            _quality_by_amplitude(decay, factor),
-            {"xlabel": f"Amplitude ({shown_unit})", "ylabel": "Q", "ylim": (0.0, None)},
-            key=2,
-        ),
-        shares=(1.3, 0.7, 1.0),
+        *quality,
+        shares=(1.3, 0.7, 1.0)[: 2 + len(quality)],
         sharex=False,
     )
 
@@ -454,7 +450,7 @@ def draw_sheet(decay: Decay, recording: Recording) -> Figure:
         Two panels for one printed sheet.
     """
     unit = decay.points.unit
-    factor, shown_unit = axis_unit(decay.amplitude_rad, unit)
+    quality = _quality_by_amplitude(decay)
     own, own_unit = axis_unit(recording.values[recording.usable], recording.unit)
     time, look = recording.time_s, {"alpha": 0.6, "rasterized": True, "label": "readings"}
     marks = [curve(time, own * recording.values, BLUE, width=0.5, **look)]
@@ -472,12 +468,8 @@ def draw_sheet(decay: Decay, recording: Recording) -> Figure:
             },
             key=2,
         ),
-        Panel(
-            _quality_by_amplitude(decay, factor),
-            {"xlabel": f"Amplitude ({shown_unit})", "ylabel": "Q", "ylim": (0.0, None)},
-            key=2,
-        ),
-        shares=(1.2, 1.0),
+        *quality,
+        shares=(1.2, 1.0)[: 1 + len(quality)],
         sharex=False,
     )
 
@@ -488,19 +480,26 @@ def draw_residual(decay: Decay) -> Figure:
     return figure_of(2.2, _residual(decay, {"xlabel": "Time (s)"}))
 
 
-def _quality_by_amplitude(decay: Decay, factor: float) -> Iterator[Mark]:
+def _quality_by_amplitude(decay: Decay) -> tuple[Panel, ...]:
+    """Q against amplitude; nothing of amplitudes without a period."""
     amplitude, quality = decay.along(np.linspace(0.0, float(decay.elapsed_s[-1]), 400))
+    if np.isnan(quality).all():
+        return ()
+    factor, unit = axis_unit(decay.amplitude_rad, decay.points.unit)
+    marks = []
     if decay.fit.light != "red":
-        yield curve(factor * amplitude, quality, label="fitted law")
+        marks.append(curve(factor * amplitude, quality, label="fitted law"))
     seen = [
         (factor * each.amplitude_rad, each.quality_factor.value, each.quality_factor.sd)
         for each in seen_qualities(decay.fit)
     ]
-    yield _measured_quality(*np.array(seen).reshape(-1, 3).T)
+    marks.append(_measured_quality(*np.array(seen).reshape(-1, 3).T))
     limit = decay.fit.quality_factor_limit
     if limit is not None and 3.0 * limit.sd < limit.value < 2.0 * float(np.nanmax(quality)):
-        yield level(limit.value, GREY, 1.4, linestyle=":", label="limit πf/b")
+        marks.append(level(limit.value, GREY, 1.4, linestyle=":", label="limit πf/b"))
     largest, least = float(np.max(amplitude)), float(np.min(amplitude))
     # Dry friction ends the fitted motion: zero stands on no logarithmic axis.
     if 0.0 < 5.0 * least < largest:
-        yield logarithmic("x", largest / least)
+        marks.append(logarithmic("x", largest / least))
+    about = {"xlabel": f"Amplitude ({unit})", "ylabel": "Q", "ylim": (0.0, None)}
+    return (Panel(marks, about, key=2),)

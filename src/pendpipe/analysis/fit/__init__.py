@@ -128,6 +128,22 @@ def fit_recording(
     )
 
 
+def fit_turning_points(
+    points: TurningPoints,
+    *,
+    restoring: Restoring | None = None,
+    baseline: Baseline = "eq8",
+    fixed: Mapping[str, float] | None = None,
+) -> FitResult:
+    """Fit Eq. 14 to turning points whose readings are not there; see `fit_recording`."""
+    points, _ = as_angles(points)
+    if restoring is None and not may_be_sine(points):
+        restoring = "linear"
+    torque = restoring or restoring_of(points, stated=True)
+    found = fit_points(points, baseline=baseline, fixed=fixed, restoring=torque)
+    return replace(found, points=points, cuts=tuple(cut._asdict() for cut in points.cuts))
+
+
 def _fit(
     samples: Samples,
     method: Method | None,

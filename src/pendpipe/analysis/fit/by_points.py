@@ -288,7 +288,7 @@ def fit_points(
         f" {period.chi2_per_dof:.3g} per point): the frequency is a mean"
     )
     return result_of(
-        *_numbers(points, envelope, period, stretched),
+        *numbers_of(points, envelope, period, stretched),
         envelope.held,
         points,
         Eq8(period.angular_frequency, a, hysteretic, b - hysteretic, c, restoring),
@@ -306,13 +306,16 @@ def fit_points(
     )
 
 
-def _numbers(
+def numbers_of(
     points: TurningPoints,
     envelope: EnvelopeFit,
     period: Period,
     stretched: float,
 ) -> tuple[FloatArray, FloatArray, list[tuple[float, float]]]:
-    """The seven parameters, their covariance (amplitudes and times are independent), intervals."""
+    """Return the seven parameters, their covariance, and the intervals of a, b, c.
+
+    Amplitudes and times are independent.
+    """
     _, gradient, normal = envelope.quadratic
     gradient, normal = gradient / stretched, normal / stretched
     rates = covariance(normal, envelope.held)

@@ -75,7 +75,8 @@ def check_period(points: TurningPoints, law: Eq8) -> tuple[PeriodCheck, ...]:
     """
     clear = points.chosen(points.amplitude_rad > _CLEAR * points.angle_sd_rad)
     count = len(clear)
-    if count < _FEWEST:
+    if count < _FEWEST or not np.all(np.isfinite(clear.time_sd_s)):
+        # Somebody looked at these times, and nothing turned there.
         return ()
     parts = [slice(0, count)]
     if count >= 3 * _FEWEST:
@@ -142,8 +143,8 @@ def judged(
             max(_asked(of_losses), _scattered(checks, enlarged)) if enlarged > 1.0 else 1.0,
         )
         result = replace(_widened(result, widening, enlarged), widening=widening)
-    quotable, problems = _quotable(result, periods, refuted=refuted)
-    light, reason = _light(checks, problems, refuted=refuted, unit=points.unit)
+    quotable, problems = _quotable(result, periods)
+    light, reason = _light(result, problems)
     return replace(
         result, light=light, light_reason=reason, quotable=quotable, period_check=periods
     )
@@ -212,13 +213,16 @@ def _scaled(estimate: Estimate, factor: float, *, at_least: float) -> Estimate:
 
 
 def _quotable(
-    result: FitResult, periods: Sequence[PeriodCheck], *, refuted: bool
+    result: FitResult, periods: Sequence[PeriodCheck]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What may be quoted, and why the rest may not."""
     checks, unit = result.decrement_check, result.parameters["amplitude"].unit
     problems, quotable = [], []
     worst = max(periods, key=lambda each: abs(each.excess), default=None)
-    if worst is None:
+    if result.method == "amplitudes":
+        # Its period is given, or there is none.
+        pass
+    elif worst is None:
         problems.append("the period: too few turning points confirm it")
     elif abs(worst.excess) > TOLERANCE:
         problems.append(
@@ -227,37 +231,58 @@ def _quotable(
         )
     else:
         quotable.append("period")
-    off = [each for each in checks if is_off(each)]
-    unseen = [each for each in checks if not each.confirms and each not in off]
+    off, unseen = unsure(result)
+    name = "half-lives" if math.isnan(result.value("frequency")) else "Q"
+    seen_in = "amplitudes" if result.method == "amplitudes" else "turning points"
     if len(checks) < 3:
-        problems.append("Q: too few turning points confirm it")
+        problems.append(f"{name}: too few {seen_in} confirm it")
     problems += [
-        f"Q at {compact(each.amplitude_rad, unit)}: the turning points show one that is"
+        f"{name} at {compact(each.amplitude_rad, unit)}: the {seen_in} show one that is"
         f" {abs(100.0 * each.excess):.0f} % {'higher' if each.excess > 0.0 else 'lower'}"
         for each in off
     ]
     if unseen:
         where = ", ".join(compact(each.amplitude_rad, unit) for each in unseen)
         known = max(each.seen_sd / abs(each.seen) for each in unseen)
-        problems.append(f"Q at {where}: the turning points show it to {100.0 * known:.0f} % only")
+        problems.append(f"{name} at {where}: the {seen_in} show it to {100.0 * known:.0f} % only")
     if len(checks) >= 3 and not (off or unseen):
-        quotable.append("Q")
+        quotable += [] if math.isnan(result.value("frequency")) else ["Q"]
         if all(each.dominant for each in result.quality_factors):
-            quotable += ["losses"] if refuted else ["losses", "a", "b", "c"]
+            quotable += ["losses"] if result.refuted else ["losses", "a", "b", "c"]
     return tuple(quotable), tuple(problems)
 
 
-def _light(
-    checks: Sequence[Decrement], problems: Sequence[str], *, refuted: bool, unit: str
-) -> tuple[Light, str]:
+def unsure(result: FitResult) -> tuple[list[Decrement], list[Decrement]]:
+    """Return where the turning points show another loss, and where nothing shows it well enough.
+
+    Where the one test of fit finds nothing but noise, a difference is its chance, and the loss is
+    known as well as the law knows it.
+    """
+    checks, refuted = result.decrement_check, result.refuted
+    off = [each for each in checks if refuted and is_off(each)]
+    return off, [
+        each
+        for each in checks
+        if each not in off
+        and not each.confirms
+        and (refuted or relative_loss_sd(result, each.amplitude_rad) > TOLERANCE)
+    ]
+
+
+def _light(result: FitResult, problems: Sequence[str]) -> tuple[Light, str]:
     """Return the light and its reason, a clause."""
-    wrong = [check for check in checks if check.contradicts]
+    wrong = [check for check in result.decrement_check if check.contradicts]
     if wrong:
         worst = max(wrong, key=lambda check: abs(check.excess))
-        return "red", f"the fitted law contradicts the decay: {worst.sentence(unit)}"
+        said = worst.sentence(result.parameters["amplitude"].unit)
+        if result.method == "amplitudes":
+            said = said.replace("turning points", "amplitudes")
+        return "red", f"the fitted law contradicts the decay: {said}"
     if problems:
         return "amber", f"don't quote {'; nor '.join(problems)}"
-    if refuted:
+    if result.method == "amplitudes":
+        return "green", "the amplitudes fall as the law says"
+    if result.refuted:
         return "green", (
             f"period and Q are right to {100.0 * TOLERANCE:.0f} % and to their errors; the law is"
             " not the whole story: see pendpipe diagnose"

@@ -10,6 +10,7 @@ import numpy as np
 from pendpipe.analysis.fit.decrement import loss_of
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Release, sample
+from pendpipe.physics.decay import amplitude
 
 if TYPE_CHECKING:
     from pendpipe.analysis.fit.result import FitResult
@@ -20,6 +21,8 @@ def predicted(result: FitResult, time_s: FloatArray) -> FloatArray:
     points = result.points
     assert points is not None
     omega, y0 = 2.0 * math.pi * result.value("frequency"), result.value("amplitude")
+    if result.method == "amplitudes":
+        return amplitude(time_s - points.time_s[0], y0, *map(result.value, "abc"))
     side = float(points.side[0])
     # The phase at the first reading counts from a turning point on the positive side.
     late = result.value("phase") - (0.0 if side > 0.0 else math.pi)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.decrement import is_off
+from pendpipe.analysis.fit.consequence import unsure
 from pendpipe.analysis.fit.quality import LOSSES, Quality
 from pendpipe.analysis.torque import TOP
 from pendpipe.analysis.turning_points import BEAT
@@ -31,6 +31,7 @@ _KINDS: Final = {
 SHORT: Final = {"a": "drag ~ speed²", "b": "viscous or internal", "c": "dry friction"}
 _CLOCK: Final = 50e-6
 """By what part a laboratory's clock may well be off."""
+_TIMELESS: Final = "not shown by amplitudes: --period or --frequency tells it, and Q"
 _SLIGHT: Final = 0.05
 """Share of a loss below which it is not named."""
 _DIAGNOSE: Final = "pendpipe diagnose FILE says what the law lacks"
@@ -104,18 +105,18 @@ def heading(result: FitResult, name: str = "") -> str:
     points, decay = result.points, result.decay
     unit = result.parameters["amplitude"].unit if decay is None else decay.unit
     kind = _KINDS.get(unit, f"readings in {pretty_unit(unit)}")
-    if points is None or decay is None:
-        return f"{name or 'a fit'}: {kind}, {result.turning_points} turning points"
-    name = name or result.name or "recording"
-    first, last = float(points.time_s[0]), float(points.time_s[-1])
-    rate = 1.0 / decay.interval_s if decay.interval_s > 0.0 else math.nan
-    amplitude = points.amplitude_rad
-    swings = 0.5 * float(points.half_cycle[-1] - points.half_cycle[0])
+    what = "amplitudes" if result.method == "amplitudes" else "turning points"
+    name = name or result.name or ("a fit" if points is None else "recording")
+    if points is None:
+        return f"{name}: {kind}, {result.turning_points} {what}"
+    amplitude, swings = points.amplitude_rad, f"{len(points)} {what}"
     ends = (short_size(abs(float(y)), points.unit) for y in (amplitude[0], amplitude[-1]))
-    return (
-        f"{name}: {kind}, {rate:.4g} Hz, {last - first:.3g} s, {swings:.0f} swings from"
-        f" {' to '.join(ends)}"
-    )
+    span = f"{float(np.ptp(points.time_s)):.3g} s"
+    if result.method != "amplitudes" and decay is not None:
+        rate = 1.0 / decay.interval_s if decay.interval_s > 0.0 else math.nan
+        span = f"{rate:.4g} Hz, {span}"
+        swings = f"{0.5 * float(points.half_cycle[-1] - points.half_cycle[0]):.0f} swings"
+    return f"{name}: {kind}, {span}, {swings} from {' to '.join(ends)}"
 
 
 def _remarks(result: FitResult) -> Iterator[str]:
@@ -137,13 +138,16 @@ def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
     period, wide = result.period, result.widening
     small = "period, small swings" if result.restoring == "sine" else "period"
     text = with_error(period.value, period.sd, "s", short=True)
-    if result.light == "red":
+    if result.method == "amplitudes":
+        text = f"{text}, as given" if math.isfinite(period.value) else _TIMELESS
+    elif result.light == "red":
         text += f", {WITHOUT_LAW}" if result.period_check else ""
     elif result.restoring == "sine" and qualities:
         large = qualities[0]
         text += f"  ({large.period_s:.5g} s at {short_size(large.amplitude_rad, unit)})"
     yield small, text + _widened(wide.period if result.light != "red" else 1.0)
-    if result.clock_ppm is None and period.sd < _CLOCK * period.value:
+    by_clock = period.sd < _CLOCK * period.value and result.method != "amplitudes"
+    if by_clock and result.clock_ppm is None:
         moved = with_error(float(f"{_CLOCK * period.value:.1g}"), None, "s")
         yield "clock", f"one off by 50 ppm adds {moved}, which is not in the error (--clock-ppm)"
     if qualities:
@@ -152,7 +156,8 @@ def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
             for each in qualities
         )
         without = f", {WITHOUT_LAW}" if result.light == "red" else _widened(wide.losses)
-        yield "Q", found + without
+        if math.isfinite(period.value):
+            yield "Q", found + without
         yield "damping", damping(result)
     if not has_law:
         return
@@ -171,11 +176,12 @@ def damping(result: FitResult) -> str:
     """Print damping time, half-life and logarithmic decrement at the largest amplitude shown."""
     numbers, unit = result.damping(), result.parameters["amplitude"].unit
     tau, half, decrement = (
-        _number(numbers[name])
-        for name in ("damping_time_s", "half_life_s", "logarithmic_decrement")
+        numbers[name] for name in ("damping_time_s", "half_life_s", "logarithmic_decrement")
     )
     where = short_size(numbers["amplitude_rad"].value, unit)
-    return f"to 1/e in {tau} s, to 1/2 in {half} s, decrement {decrement} a swing, at {where}"
+    said = f"to 1/e in {_number(tau)} s, to 1/2 in {_number(half)} s"
+    swing = math.isfinite(decrement.value)
+    return f"{said}{f', decrement {_number(decrement)} a swing' if swing else ''}, at {where}"
 
 
 def energy(result: FitResult) -> str:
@@ -211,7 +217,9 @@ def misfit(result: FitResult) -> str:
         swing = 0.5 * float(np.nanmax(result.decay.values) - np.nanmin(result.decay.values))
     share = 100.0 * result.residual_rms_rad / swing if swing > 0.0 else math.nan
     noise = 100.0 * result.noise_rms_rad / swing if swing > 0.0 else math.nan
-    what = "swings" if result.method == "waveform" else "turning points"
+    what = {"waveform": "swings"}.get(result.method, result.method.replace("-", " "))
+    if result.method == "amplitudes":
+        return f"the fit follows the {what} to {share:.2g} %"
     if not result.refuted:
         return f"the fit follows the {what} to {share:.2g} %; nothing but noise is left"
     story = "right to 5 %, but the law is" if result.light == "green" else "the law is"
@@ -228,13 +236,15 @@ def sentence(result: FitResult) -> str:
         period = result.period
         name = "T0" if result.restoring == "sine" else "T"
         said.append(f"{name} = {with_error(period.value, period.sd, 's')}")
-    known = [each for each in result.quality_factors if each.amplitude_rad not in _unseen(result)]
-    if result.light == "red":
-        known = list(result.quality_factors)
+    known = list(result.quality_factors)
+    if result.light != "red":
+        doubted = {each.amplitude_rad for some in unsure(result) for each in some}
+        known = [each for each in known if each.amplitude_rad not in doubted]
     if known:
         q = known[0]
-        text = with_error(q.quality_factor.value, q.quality_factor.sd)
-        said.append(f"Q = {text} at {compact(q.amplitude_rad, unit)}")
+        timeless = math.isnan(q.period_s)
+        number, name = (q.half_life_s, "half-life") if timeless else (q.quality_factor, "Q")
+        said.append(f"{name} = {number} at {compact(q.amplitude_rad, unit)}")
         if "losses" in result.quotable and (loss := q.dominant):
             share = 100.0 * q.losses[loss].value
             said.append(f"{share:.0f} % of the loss there is {LOSSES[loss]}")
@@ -242,11 +252,6 @@ def sentence(result: FitResult) -> str:
         return "nothing of this fit can be quoted."
     without = " (from the turning points, without a law)" if result.light == "red" else ""
     return f"{'; '.join(said)}{without}."
-
-
-def _unseen(result: FitResult) -> set[float]:
-    checks = result.decrement_check
-    return {each.amplitude_rad for each in checks if is_off(each) or not each.confirms}
 
 
 def following(result: FitResult) -> str:
@@ -257,6 +262,9 @@ def following(result: FitResult) -> str:
         return f"{_DIAGNOSE}; --accept prints the law"
     if result.refuted:
         return f"{_DIAGNOSE}; pendpipe page FILE makes a sheet to hand out"
+    if result.method == "amplitudes":
+        lacks = math.isnan(result.period.value)
+        return "--period T gives Q" if lacks else "record the swing itself to see its period"
     if "Q" not in result.quotable:
         return "record more swings: the turning points must show the decrement"
     if "losses" not in result.quotable:

@@ -40,19 +40,29 @@ class Quality:
     ----------
     amplitude_rad
         Amplitude y, in the unit of the recording.
-    quality_factor
-        ``pi/(T loss)``: T the period and loss the relative loss of amplitude at y.
+    damping_time_s
+        1 over the relative loss of amplitude.
     period_s
-        The period at y.
+        The period at y; NaN where nothing shows it.
     losses
         Share of a y, b and c/y in the loss, by ``"a"``, ``"b"``, ``"c"``; empty where the
         turning points show Q without a law.
     """
 
     amplitude_rad: float
-    quality_factor: Estimate
+    damping_time_s: Estimate
     period_s: float
     losses: Mapping[str, Estimate]
+
+    @property
+    def quality_factor(self) -> Estimate:
+        """``pi tau/T``: tau the damping time and T the period at y."""
+        return _times(self.damping_time_s, math.pi / self.period_s, "")
+
+    @property
+    def half_life_s(self) -> Estimate:
+        """Time in which the amplitude would fall to a half at this loss, s: ``ln 2 tau``."""
+        return _times(self.damping_time_s, math.log(2.0), "s")
 
     @property
     def dominant(self) -> str | None:
@@ -96,11 +106,7 @@ def seen_qualities(result: FitResult) -> tuple[Quality, ...]:
     return tuple(
         Quality(
             check.amplitude_rad,
-            Estimate(
-                math.pi / (period * check.seen),
-                math.pi / (period * check.seen) * check.seen_sd / check.seen,
-                "",
-            ),
+            Estimate(1.0 / check.seen, check.seen_sd / check.seen**2, "s"),
             period,
             {},
         )
@@ -166,11 +172,11 @@ def quality_by_law(result: FitResult, amplitude: float) -> Quality:
     loss, total = loss_of(law, amplitude), sum(losses.values())
     period = period_of(result, amplitude)
     covariance = _covariance_of_losses(result, amplitude)
-    value = math.pi / (period * loss) if loss > 0.0 else math.inf
+    value = 1.0 / loss if loss > 0.0 else math.inf
     shares = {name: each / total if total > 0.0 else math.nan for name, each in losses.items()}
     return Quality(
         amplitude,
-        Estimate(value, value * relative_loss_sd(result, amplitude), ""),
+        Estimate(value, value * relative_loss_sd(result, amplitude), "s"),
         period,
         {
             name: Estimate(share, _sd(np.eye(3)[index] - share, covariance), "")
@@ -202,6 +208,8 @@ def _covariance_of_losses(result: FitResult, amplitude: float) -> FloatArray:
 
 def period_of(result: FitResult, amplitude: float) -> float:
     """Period at one amplitude, s; that of small amplitudes where the law cannot swing there."""
+    if not math.isfinite(result.value("frequency")):
+        return math.nan
     lossless = Eq8(2.0 * math.pi * result.value("frequency"), restoring=result.restoring)
     try:
         cycle = turning_points(lossless, Release(0.0, amplitude), count=3)
@@ -215,15 +223,18 @@ def damping_of(result: FitResult) -> dict[str, Estimate]:
     found = result.quality_factors
     if not found:
         return {}
-    large = found[0]
-    q, relative = large.quality_factor.value, large.quality_factor.sd / large.quality_factor.value
-    tau = q * large.period_s / math.pi
+    large, tau = found[0], found[0].damping_time_s
+    decrement = large.period_s / tau.value
     return {
         "amplitude_rad": Estimate(large.amplitude_rad, 0.0, result.parameters["amplitude"].unit),
-        "damping_time_s": Estimate(tau, tau * relative, "s"),
-        "half_life_s": Estimate(math.log(2.0) * tau, math.log(2.0) * tau * relative, "s"),
-        "logarithmic_decrement": Estimate(math.pi / q, math.pi / q * relative, ""),
+        "damping_time_s": tau,
+        "half_life_s": large.half_life_s,
+        "logarithmic_decrement": Estimate(decrement, decrement * tau.sd / tau.value, ""),
     }
+
+
+def _times(estimate: Estimate, factor: float, unit: str) -> Estimate:
+    return Estimate(factor * estimate.value, factor * estimate.sd, unit)
 
 
 def small_period(result: FitResult) -> Estimate:

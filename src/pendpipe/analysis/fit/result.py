@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
     from pendpipe.recording import Recording
 
-Method = Literal["waveform", "turning-points"]
+Method = Literal["waveform", "turning-points", "amplitudes"]
 Baseline = Literal["eq8", "viscous"]
 DragForm = Literal["energy", "speed", "undecided"]
 PARTS: Final = ("quality_factor_hysteretic", "quality_factor_viscous")
@@ -72,6 +72,11 @@ def units(unit: str) -> dict[str, str]:
     }
 
 
+def fast_beside(a: float, b: float, c: float, amplitude: float) -> float:
+    """Return an angular frequency to which Eq. 13 holds, where amplitudes show none."""
+    return 1e4 * max(a * amplitude + b + c / amplitude, 1e-300)
+
+
 @dataclass(frozen=True, repr=False)
 class FitResult:
     """What one recording says of a, b, c and the rest.
@@ -79,7 +84,8 @@ class FitResult:
     Parameters
     ----------
     method, baseline
-        How it was fitted, and with which model.
+        How it was fitted (to all readings, to turning points, or to amplitudes alone, whose
+        frequency, phase and noise are NaN), and with which model.
     parameters
         The seven of `PARAMETERS`: the rates of Eq. 13, Eq. 8's frequency omega/(2 pi),
         |y| at the first turning point kept, the phase at the first sample kept (the motion
@@ -256,23 +262,20 @@ class FitResult:
         """Name of the law that was fitted."""
         if self.restoring == "sine":
             return "Eq. 8 with the torque of sin x"
-        return "Eq. 14" if self.method == "turning-points" else "Eq. 8"
+        return "Eq. 8" if self.method == "waveform" else "Eq. 14"
 
     @property
     def law(self) -> Eq8:
         """Eq. 8 with the fitted numbers; b is divided as the readings like it best."""
-        b, held = self.value("b"), self.quality_factor_hysteretic
+        held, frequency = self.quality_factor_hysteretic, self.value("frequency")
+        a, b, c = map(self.value, "abc")
         best = self.hysteretic_share * b
-        share = best if held is None else math.pi * self.value("frequency") / held.value
+        share = best if held is None else math.pi * frequency / held.value
         hysteretic = min(max(share, 0.0), b)
-        law = Eq8(
-            2.0 * math.pi * self.value("frequency"),
-            self.value("a"),
-            hysteretic,
-            b - hysteretic,
-            self.value("c"),
-            restoring=self.restoring,
-        )
+        omega = math.tau * frequency
+        if not math.isfinite(omega):
+            omega = fast_beside(a, b, c, self.value("amplitude"))
+        law = Eq8(omega, a, hysteretic, b - hysteretic, c, restoring=self.restoring)
         speed = self.drag == "speed"
         return replace(law, drag="speed") if speed else law
 

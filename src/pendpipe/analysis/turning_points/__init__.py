@@ -4,6 +4,7 @@ from pendpipe.analysis.turning_points.find import find_turning_points
 from pendpipe.analysis.turning_points.table import (
     BEAT,
     TurningPoints,
+    is_turning_points,
     read_turning_points,
     write_turning_points,
 )
@@ -12,6 +13,7 @@ __all__ = [
     "BEAT",
     "TurningPoints",
     "find_turning_points",
+    "is_turning_points",
     "read_turning_points",
     "write_turning_points",
 ]

@@ -32,6 +32,8 @@ _NUMBERS: Final = (
 )
 
 
+_HEAD: Final = 1 << 16
+"""Bytes of a file within which the header of its table begins."""
 BEAT: Final = "two modes beat"
 """How a note begins that tells of two modes."""
 
@@ -152,6 +154,16 @@ def write_turning_points(path: str | Path, points: TurningPoints) -> None:
     ]
     with replaced(path) as stream:
         stream.writelines(table_lines(told, {name: getattr(points, name) for name in COLUMNS}))
+
+
+def is_turning_points(path: str | Path) -> bool:
+    """Whether a file is a table of turning points of ours."""
+    try:
+        with Path(path).open("rb") as stream:
+            head = stream.read(_HEAD)
+    except OSError:
+        return False
+    return f"# {MARK}: ".encode() in head and f"\n{','.join(COLUMNS)}\n".encode() in head
 
 
 def read_turning_points(path: str | Path) -> TurningPoints:
