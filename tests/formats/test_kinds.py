@@ -1081,12 +1081,10 @@ def test_inspect_prints_the_number_that_column_takes(
 <<<<<<< HEAD
 =======
 @pytest.mark.parametrize("wavers", [0.0, 0.5])
-def test_amplitudes_that_are_alike_or_waver_are_amplitudes(
-    tmp_path: Path, wavers: float
-) -> None:
+def test_amplitudes_that_are_alike_or_waver_are_amplitudes(tmp_path: Path, wavers: float) -> None:
     rows = np.arange(40)
     sizes = 33 * np.exp(-0.03 * rows) + wavers * np.sin(2.0 * rows)
-    found = read_text(tmp_path, text(np.rint(2 * sizes) / 2, digits=1, head="deg\n"))
+    found = read_text(tmp_path, text(5.0 * rows, np.rint(2 * sizes) / 2, digits=1, head="t,deg\n"))
     assert found.is_of_amplitudes
 
 
