@@ -317,7 +317,7 @@ def fit(
     recording = _source(recording, angle_rad)
     place, motion = name or _place(recording), _motion(recording, volts_per_radian)
     own = "" if isinstance(recording, Recording) else Path(recording).name
-    if motion.is_of_amplitudes and points is None:
+    if motion.holds_amplitudes and points is None:
         found = fit_amplitudes(
             motion,
             period=_given_period(period),

@@ -168,14 +168,15 @@ class Recording:
         """Whether the unit is known, and not guessed."""
         return not any("(--unit)" in guess for guess in self.weak_guesses)
 
-    @property
+    @cached_property
     def holds_amplitudes(self) -> bool:
         """Whether each reading is the size of a swing at its time, and not the motion itself.
 
         So read with a ruler, at a gate, or off turning points: y(t) of Eq. 14. Kept in the
         metadata (``holds: amplitudes``), and with it in the plain form.
         """
-        return self.metadata.get("holds") == "amplitudes"
+        told = self.metadata.get("holds") == "amplitudes"
+        return told or only_falls(self.values[self.usable])
 
     @property
     def unit(self) -> str:
@@ -187,11 +188,6 @@ class Recording:
         """Which samples hold a reading: neither missing nor NaN; shape (n,)."""
         reading = np.isfinite(self.values)
         return reading if self.quality is None else reading & (self.quality != MISSING)
-
-    @cached_property
-    def is_of_amplitudes(self) -> bool:
-        """Whether the readings are amplitudes against time, and no swing; see `only_falls`."""
-        return only_falls(self.values[self.usable])
 
     @cached_property
     def interval_s(self) -> float:
@@ -298,6 +294,16 @@ _LEVEL: Final = 0.03
 """Of the range, by which falling sizes may lie above the least before them, on average."""
 
 
+def sizes_of(values: FloatArray) -> FloatArray:
+    """Give the amplitudes in a list of them, or of turning points about any level, shape (n,)."""
+    steps = np.diff(values[np.isfinite(values)])
+    level = 0.0
+    if len(steps) > 3 and np.mean(steps[1:] * steps[:-1] < 0.0) >= 0.9:
+        # They lie on its two sides in turn.
+        level = float(np.nanmedian(0.25 * (values[:-2] + 2.0 * values[1:-1] + values[2:])))
+    return np.asarray(np.abs(values - level))
+
+
 _LONGEST_LIST: Final = 100_000
 """Readings of which nobody makes a list of amplitudes."""
 _BENDS: Final = 8
@@ -318,7 +324,7 @@ def only_falls(values: FloatArray) -> bool:
     """
     if len(values) > _LONGEST_LIST:
         return False
-    sizes = np.abs(values[np.isfinite(values)])
+    sizes = sizes_of(values[np.isfinite(values)])
     if len(sizes) < 4 or not sizes[-1] < 0.8 * sizes[0]:
         return False
     above = sizes - np.minimum.accumulate(sizes)

@@ -122,7 +122,7 @@ def test_a_swing_is_not_asked_for_its_period() -> None:
 
 
 def test_amplitudes_are_no_recording_of_the_swing() -> None:
-    with pytest.raises(pp.InputError, match="pendpipe fit reads them"):
+    with pytest.raises(pp.InputError, match=r"pendpipe fit takes Eq\. 14 of them"):
         pp.diagnose(pp.Recording(time_s=TIME, angle_rad=FALL))
 
 

@@ -536,20 +536,6 @@ def test_what_can_not_be_read_is_refused_for_its_reason(
         read_text(tmp_path, content, name)
 
 
-<<<<<<< HEAD
-=======
-def test_amplitudes_are_read_as_that_and_a_swing_as_none(tmp_path: Path) -> None:
-    """Turning points of one side only fall; the same readings with their swings are read."""
-    rows = [(1.9 * n, 0.25 * math.exp(-0.03 * n)) for n in range(20)]
-    listed = "".join(f"{t:.2f},{x:.5f}\n" for t, x in rows)
-    peaks = read_text(tmp_path, ("time,theta (rad)\n" + listed).encode(), "peaks.csv")
-    assert peaks.is_of_amplitudes
-    swing = read_text(tmp_path, text(TIME, ANGLE, head="time,theta (rad)\n").encode(), "swing.csv")
-    same(swing)
-    assert not swing.is_of_amplitudes
-
-
->>>>>>> 099774b (Fit amplitudes alone by Eq. 14, and doubt a loss only where more than noise is left)
 def test_a_project_of_capstone_and_a_zip_without_a_table_are_refused(tmp_path: Path) -> None:
     for member, said in (("main.xml", "PASCO Capstone"), ("a.jpg", "no CSV")):
         archive = io.BytesIO()
@@ -1078,17 +1064,6 @@ def test_inspect_prints_the_number_that_column_takes(
     assert any(line.endswith("foo, in no known unit") for line in told)
 
 
-<<<<<<< HEAD
-=======
-@pytest.mark.parametrize("wavers", [0.0, 0.5])
-def test_amplitudes_that_are_alike_or_waver_are_amplitudes(tmp_path: Path, wavers: float) -> None:
-    rows = np.arange(40)
-    sizes = 33 * np.exp(-0.03 * rows) + wavers * np.sin(2.0 * rows)
-    found = read_text(tmp_path, text(5.0 * rows, np.rint(2 * sizes) / 2, digits=1, head="t,deg\n"))
-    assert found.is_of_amplitudes
-
-
->>>>>>> 099774b (Fit amplitudes alone by Eq. 14, and doubt a loss only where more than noise is left)
 @pytest.mark.parametrize("runs", [0, 3])
 def test_passages_of_a_light_gate_are_no_swing(tmp_path: Path, runs: int) -> None:
     passages = [f"{n};{800 * n + n % 3}\n" for n in range(1, 60)]

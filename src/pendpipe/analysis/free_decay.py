@@ -369,18 +369,11 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     """
     if recording.holds_amplitudes:
         why = "it holds amplitudes, not a recording of the swing"
-        raise NotAnalysableError(place, why, "give the recording that they were read from")
+        raise NotAnalysableError(place, why, "pendpipe fit takes Eq. 14 of them")
     # A whole recording is not copied.
     usable = slice(None) if recording.usable.all() else recording.usable
     time, values = recording.time_s[usable], recording.values[usable]
     span = float(np.ptp(values)) if len(values) else 0.0
-    refuse_if(
-        recording.is_of_amplitudes,
-        place,
-        "amplitudes alone, which only fall: no recording of the swing",
-        "pendpipe fit reads them, with --period for Q",
-        NotAnalysableError,
-    )
     if len(values) < 8 or span == 0:
         why = "the reading never changes" if len(values) >= 8 else f"{len(values)} samples only"
         raise NotAnalysableError(place, why, "is this the right channel?")

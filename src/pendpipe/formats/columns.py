@@ -14,13 +14,10 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
 from pendpipe.formats.circle import on_a_circle, pivot_of
-from pendpipe.formats.lists import Listed, counts_samples, list_in, one_way, sizes_of
+from pendpipe.formats.lists import Listed, counts_samples, list_in, one_way
 from pendpipe.formats.table import Column, ReadOptions, Table, derivative_slope
 from pendpipe.formats.words import Role, Unit, plain, role_of, unit_of
-<<<<<<< HEAD
-=======
-from pendpipe.recording import Quantity, find_step, from_below, jumps_of_a_turn, only_falls
->>>>>>> 099774b (Fit amplitudes alone by Eq. 14, and doubt a loss only where more than noise is left)
+from pendpipe.recording import sizes_of
 
 _WORTH: Final[Mapping[Role, float]] = {
     "angle": 6.0,
@@ -133,7 +130,6 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
     picked = [find(table, table.columns, part) for part in parts]
     if not parts and options.channel is not None:
         picked = [find(table, channels, options.channel, range(1, len(channels) + 1))]
-<<<<<<< HEAD
     mine: Sequence[Column] = channels
     others, notes, weak = "", tuple[str, ...](), tuple[str, ...]()
     readings = tuple(picked)
@@ -154,47 +150,6 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         f"no column looks like the motion of a pendulum (found {names})",
         "name it with --column (and its unit with --unit)",
     )
-=======
-    if picked:
-        return Choice(time, counts, tuple(picked), channels)
-    time, mine, others = _of_one_run(channels, time)
-    readings, notes, weak = _readings(mine, time)
-    # What an instrument sampled by a clock of its own is no list.
-    told = readings or [c for c in mine if c.role != "index"]
-    falling = [c for c in told if c.time_s is None and only_falls(c.values)]
-    readings = readings or tuple(falling[:1])
-    counting = [c.label for c in readings if _counts_samples(c) and one_way(c.values) == 1.0]
-    named = [c for c in table.columns if not readings and plain(c.name).startswith("period")]
-    lasting = [c.label for c in (*named, *filter(_lasts, table.columns))]
-    names = listed([column.label for column in table.columns])
-    counted = time is None or time.role != "time"
-    spectrum = [c.label for c in table.columns if counted and _counts_frequencies(c)]
-    swing = "give the recording of the swing: "
-    for wrong, problem, remedy in (
-        (
-            lasting and (named or time is None or counts or time.label in lasting),
-            f"'{''.join(lasting[:1])}' holds periods, not a recording of the swing",
-            f"{swing}periods alone tell no loss",
-        ),
-        (
-            spectrum,
-            f"'{''.join(spectrum[:1])}' counts frequencies: a spectrum, no recording of the swing",
-            "give the recording that it was made from",
-        ),
-        (
-            counting,
-            f"'{''.join(counting[:1])}' only counts, as passages of a light gate do: no recording"
-            " of the swing",
-            f"{swing}times of passages tell no amplitude",
-        ),
-        (
-            not readings,
-            f"no column looks like the motion of a pendulum (found {names})",
-            "name it with --column (and its unit with --unit)",
-        ),
-    ):
-        refuse_if(reading and wrong, table.place, problem, remedy)
->>>>>>> 099774b (Fit amplitudes alone by Eq. 14, and doubt a loss only where more than noise is left)
     if others:
         notes = (*notes, f"one of several runs is read; choose with --column: {others}")
     return Choice(time, counts, readings, channels, notes, weak, found)
@@ -212,22 +167,6 @@ def find(table: Table, columns: Sequence[Column], key: str, numbers: Sequence[in
     return alike[0]
 
 
-<<<<<<< HEAD
-=======
-def _counts_frequencies(column: Column) -> bool:
-    """Whether a column of frequencies rises from row to row."""
-    named = plain(column.name).startswith(("freq", "f(hz")) or plain(column.unit) in ("hz", "khz")
-    return named and one_way(column.values) == 1.0
-
-
-def _lasts(column: Column) -> bool:
-    """Whether a column of times holds durations: they go up and down, and none is near 0."""
-    times = column.values[np.isfinite(column.values)]
-    some = column.role == "time" and len(times) > 2 and one_way(times) < 0.9
-    return bool(some and times.min() > 0.3 * np.median(times))
-
-
->>>>>>> 099774b (Fit amplitudes alone by Eq. 14, and doubt a loss only where more than noise is left)
 def _parts(table: Table, options: ReadOptions) -> list[str]:
     """Split ``x,y`` unless a column bears that very name."""
     key = options.columns[1] or ""

@@ -10,6 +10,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.formats.table import Column, periods
 from pendpipe.formats.words import plain
+from pendpipe.recording import only_falls
 
 _STEADY: Final = 0.02
 """Share by which the size of a steady signal may change from beginning to end."""
@@ -84,31 +85,6 @@ def list_in(
                 column,
             )
     return None
-
-
-def sizes_of(values: FloatArray) -> FloatArray:
-    """Give the amplitudes in a list of them, or of turning points about any level, shape (n,)."""
-    return np.abs(values - (_level_of_turns(values) or 0.0))
-
-
-def only_falls(values: FloatArray) -> bool:
-    """Whether a column holds a decay without its swings: sizes that fall from row to row."""
-    sizes = sizes_of(values[np.isfinite(values)])
-    steps = np.diff(sizes)
-    if len(steps) < 4 or not sizes[-1] < 0.8 * sizes[0]:
-        return False
-    # Of a swing as many sizes rise as fall; of a list few rise, but some may be alike.
-    falls, rises = float(np.mean(steps < 0.0)), float(np.mean(steps > 0.0))
-    return falls > max(0.4, 3.0 * rises)
-
-
-def _level_of_turns(values: FloatArray) -> float | None:
-    """Give the level of rows that lie on its two sides in turn, as turning points do."""
-    steps = np.diff(values[np.isfinite(values)])
-    if len(steps) < 4 or np.mean(steps[1:] * steps[:-1] < 0.0) < 0.9:
-        return None
-    level = 0.25 * (values[:-2] + 2.0 * values[1:-1] + values[2:])
-    return float(np.nanmedian(level))
 
 
 def one_way(values: FloatArray) -> float:

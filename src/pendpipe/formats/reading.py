@@ -23,8 +23,6 @@ from pendpipe.formats.lists import (
     SETTINGS,
     WAVEFORM,
     holds_settings,
-    only_falls,
-    sizes_of,
     steady,
 )
 from pendpipe.formats.plugin import HEAD
@@ -54,6 +52,7 @@ from pendpipe.recording import (
     converter_step,
     find_step,
     read_plain,
+    sizes_of,
 )
 
 _ANYTHING: Final = ReadOptions()
@@ -331,10 +330,10 @@ def read_if_plain(place: Path, data: bytes, options: ReadOptions) -> Recording |
             "name the reading's column, or choose it with --column and --unit",
         )
     recording = read_plain(place, data)
-    if only_falls(recording.values):  # as our own table of turning points
+    if recording.holds_amplitudes:  # as our own table of turning points
         values, said = sizes_of(recording.values), "it only falls: amplitudes against time"
         metadata = {**recording.metadata, "holds": "amplitudes"}
-        notes = (*recording.notes, *([] if recording.holds_amplitudes else [said]))
+        notes = (*recording.notes, *([] if "holds" in recording.metadata else [said]))
         recording = replace(recording, values=values, metadata=metadata, notes=notes)
     return replace(recording, resolution=recording.resolution or find_step(recording.values))
 

@@ -28,7 +28,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
-from pendpipe.recording import Quantity, Recording
+from pendpipe.recording import Quantity, Recording, sizes_of
 
 if TYPE_CHECKING:
     from pendpipe.analysis.fit.result import Baseline, FitResult
@@ -37,8 +37,6 @@ _FEWEST: Final = 5
 """Amplitudes: a, b, c and the first are four numbers."""
 _FINEST: Final = 1e-6
 """Of the first amplitude: no ruler or gate is better."""
-_SLACK: Final = 0.2
-"""Of the first amplitude, by which the zero of a ruler may be off."""
 
 
 def fit_amplitudes(
@@ -55,7 +53,7 @@ def fit_amplitudes(
     Parameters
     ----------
     recording
-        Amplitudes; on both sides of the zero, where they are signed.
+        Amplitudes, or turning points on both sides in turn.
     period
         Of small swings, s; without it Q and the period are NaN.
     length_m
@@ -72,7 +70,7 @@ def fit_amplitudes(
         If there are fewer than five.
     """
     usable = recording.usable
-    time, signed, unit = recording.time_s[usable], recording.values[usable], recording.unit
+    time, sizes = recording.time_s[usable], sizes_of(recording.values[usable])
     refuse_if(
         len(time) < _FEWEST,
         place,
@@ -80,21 +78,17 @@ def fit_amplitudes(
         f"give {_FEWEST} or more",
         NotAnalysableError,
     )
-    signed, unit, step = _angles(signed, unit, recording.resolution or 0.0, length_m)
-    below = (signed < 0.0).astype(np.int64)
-    both = bool(below.any()) and not below.all()
-    first = float(np.abs(signed[0]))
+    sizes, unit, step = _angles(sizes, recording.unit, recording.resolution or 0.0, length_m)
+    first = float(sizes[0])
 
     def points_of(sd: float) -> TurningPoints:
         return TurningPoints(
-            half_cycle=2 * np.arange(len(time)) + below,
+            half_cycle=2 * np.arange(len(time)),
             time_s=time,
             time_sd_s=np.full(len(time), np.nan),
-            angle_rad=signed,
+            angle_rad=sizes,
             angle_sd_rad=np.full(len(time), sd),
             level_rad=np.zeros(len(time)),
-            level_sd_rad=_SLACK * first if both else 0.0,
-            level_coupling=1.0,
             step_rad=step,
             start_s=float(time[0]),
             stop_s=float(time[-1]),
@@ -107,7 +101,7 @@ def fit_amplitudes(
         period = Estimate(1.0 / fixed["frequency"], 0.0, "s")
     turning = math.tau / period.value if period else math.nan
     held, parts = held_values(fixed, baseline, 0.5 * turning / math.pi)
-    free = 4 - len([name for name in held if name != "offset"]) + both
+    free = 4 - len([name for name in held if name != "offset"])
     freedom = max(len(time) - free, 1)
     least = max(step / math.sqrt(12.0), _FINEST * first)
     rough = fit_envelope(points_of(max(least, 0.01 * first)), held)
@@ -148,7 +142,7 @@ def fit_amplitudes(
     quantities: dict[str, Quantity] = {"rad": "angle_rad", "m": "displacement_m"}
     shown = Recording(
         time,
-        points.amplitude_rad,
+        sizes,
         quantities.get(unit, "reading"),
         metadata={"unit": unit},
         resolution=step or None,
