@@ -25,7 +25,7 @@ html_math_renderer = "mathml"
 html_theme = "furo"
 html_static_path = ["_static"]
 html_css_files = ["wrap.css"]
-html_title = f"pendpipe {version}"
+html_title = "pendpipe"
 exclude_patterns = ["_build", "_ext"]
 
 autodoc_member_order = "bysource"
