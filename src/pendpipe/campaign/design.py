@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pendpipe import physics
-from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.configuration.apparatus import fluid_at
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.configuration.models import WATER_C, Apparatus, Fluid, Tank
@@ -268,17 +268,23 @@ class Design:
         They follow water's formulas, where the fluid's temperature is given; a mixture is
         taken to change with temperature as water does.
         """
-        columns = []
         warmer_k = np.broadcast_to(warmer_k, (*warmer_k.shape[:-1], len(self.runs)))
-        for number, run in enumerate(self.runs):
-            found = physics.Fluid(0.0, 1.0)
-            if run.fluid is not None:
-                about = run.fluid.temperature_c if run.temperature_c is None else run.temperature_c
-                then = None if about is None else np.clip(about + warmer_k[..., number], *WATER_C)
-                found = fluid_at(run.fluid, then)
-            columns.append(np.broadcast_arrays(*found, warmer_k[..., number])[:2])
-        density, viscosity = np.moveaxis(np.array(columns), (0, 1), (-1, 0))
+        density, viscosity = np.zeros_like(warmer_k), np.ones_like(warmer_k)
+        for fluid, chosen, about in self._baths:
+            then = np.clip(about + warmer_k[..., chosen], *WATER_C)
+            density[..., chosen], viscosity[..., chosen] = fluid_at(fluid, then)
         return density, viscosity
+
+    @cached_property
+    def _baths(self) -> list[tuple[Fluid, IntArray, FloatArray]]:
+        """Each fluid, the indices of its records, and their temperatures in Celsius."""
+        found = []
+        for fluid in dict.fromkeys(run.fluid for run in self.runs if run.fluid is not None):
+            chosen = [number for number, run in enumerate(self.runs) if run.fluid == fluid]
+            given = [self.runs[number].temperature_c for number in chosen]
+            about = [fluid.temperature_c if each is None else each for each in given]
+            found.append((fluid, np.array(chosen), np.array(about, dtype=np.float64)))
+        return found
 
     @cached_property
     def rod_air_drag(self) -> FloatArray:

@@ -15,7 +15,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from pendpipe.arrays import FloatArray
 from pendpipe.files import replaced
@@ -245,8 +245,7 @@ def logarithmic(axis: Literal["x", "y"], span: float | None = None) -> Mark:
             few, many = (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0)
             own.set_major_locator(LogLocator(subs=many if span < 10.0 else few))
         own.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        own.set_minor_formatter(NullFormatter())
-        own.set_tick_params(which="minor", length=0)
+        own.set_minor_locator(NullLocator())
 
     return scale
 

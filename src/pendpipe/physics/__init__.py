@@ -145,7 +145,9 @@ def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module 'pendpipe.physics' has no attribute {name!r}")
     modules = (importlib.import_module(f"{__name__}.{module}") for module in _MODULES)
-    return next(vars(module)[name] for module in modules if name in vars(module))
+    found = next(vars(module)[name] for module in modules if name in vars(module))
+    globals()[name] = found  # it is asked for once
+    return found
 
 
 def __dir__() -> list[str]:

@@ -14,6 +14,7 @@ import hashlib
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -183,7 +184,11 @@ def key(campaign: Campaign, stage: Stage, record: Record) -> str:
     sensor = _sensor(campaign) if stage.name == "calibrate" else None
     files = [home / name for name in stage.inputs] + ([sensor] if sensor else [])
     read = manifest.recorded(files)
-    return jobs.digest([settings(campaign, stage, record), code_version(stage.module), read])
+    return jobs.digest([settings(campaign, stage, record), _code(stage.module), read])
+
+
+_code = cache(code_version)
+"""It takes 3 ms, and is asked for each record."""
 
 
 def write_chunk(campaign: Campaign, stage: Stage, records: Sequence[Record], out: Path) -> None:
