@@ -2,7 +2,8 @@
 
     python -m benchmarks.scale                              10, 100, 1,000; 10,000 are planned
     python -m benchmarks.scale --run 10 100 --plan 10000    fewer
-    python -m benchmarks.scale --profile slurm              on a cluster
+    python -m benchmarks.scale --profile slurm --run 10 100 --plan --diagnose
+                                                            on a Slurm of one node (tests/slurm)
 
 Records are files of 2,048 readings. CPU seconds count, since others may use the machine; on a
 cluster those of the jobs are not seen, and the clock stands for them. The table is written
@@ -19,6 +20,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -29,6 +32,25 @@ PAGE: Final = ROOT / "docs" / "scale.md"
 SAMPLES: Final = 2048
 FILES: Final = 100
 """Decays that are made; more records are of the same files."""
+
+
+SLURM: Final = (
+    *("--", "--slurm-status-command", "squeue", "--slurm-no-account"),
+    *("--slurm-init-seconds-before-status-checks", "1", "--seconds-between-status-checks", "1"),
+)
+"""The node has no accounting, and its scheduler nothing else to do."""
+
+
+@contextmanager
+def one_node() -> Iterator[None]:
+    """A Slurm on this machine while it is measured."""
+    script = str(ROOT / "tests/slurm/cluster.sh")
+    with tempfile.TemporaryDirectory() as place:
+        subprocess.run([script, "up", place], check=True)
+        try:
+            yield
+        finally:
+            subprocess.run([script, "down", place], check=True)
 
 
 class Cost(NamedTuple):
@@ -102,7 +124,8 @@ def measure(records: int, *, diagnosed: bool, to_end: bool, profile: str) -> Row
         first = cost(folder, "-n")
         if not to_end:
             return Row(records, diagnosed, first, None, None, None)
-        run = cost(folder, "--cores", "2", "--profile", profile)
+        asked = SLURM if profile == "slurm" else ()
+        run = cost(folder, "--cores", "2", "--profile", profile, *asked)
         with (folder / "records.tsv").open("a", encoding="utf-8") as table:
             table.write("added\t0.csv\n")
         page_mb = (folder / "results/report.html").stat().st_size / 1e6
@@ -142,10 +165,11 @@ def main() -> None:
     asked += [(n, True, True) for n in arguments.diagnose]
     asked += [(n, True, False) for n in arguments.plan]
     rows = []
-    for records, diagnosed, to_end in asked:
-        row = measure(records, diagnosed=diagnosed, to_end=to_end, profile=arguments.profile)
-        rows.append(row)
-        print(table([row], arguments.profile).splitlines()[-1], flush=True)
+    with one_node() if arguments.profile == "slurm" else nullcontext():
+        for records, diagnosed, to_end in asked:
+            row = measure(records, diagnosed=diagnosed, to_end=to_end, profile=arguments.profile)
+            rows.append(row)
+            print(table([row], arguments.profile).splitlines()[-1], flush=True)
     text = table(rows, arguments.profile)
     load = os.getloadavg()[0]
     text += (

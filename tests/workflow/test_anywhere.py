@@ -93,6 +93,15 @@ rule all:
     counted = jobs(call(begun, "snakemake", "-n", "--quiet", "rules"))
     assert counted["pendpipe_fit"] == 1
     assert counted["pendpipe_report"] == 1
+    fits = "results/chunks/fit-all.json"
+    done = call(begun, "snakemake", "--cores", "2", fits)
+    assert done.returncode == 0, done.stdout + done.stderr
+    fit = begun / "results/rod/fit.json"
+    made = fit.stat().st_ino
+    assert not jobs(call(begun, "snakemake", "-n", fits))
+    done = call(begun, "snakemake", "--cores", "2", fits, "--forcerun", "pendpipe_fit")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert fit.stat().st_ino != made, "made again, under the name that the rule has here"
 
 
 def test_init_replaces_nothing(

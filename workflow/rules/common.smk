@@ -57,13 +57,27 @@ STAGES = [
     for name, stage in chunks.STAGES.items()
     if name != "diagnose" or CAMPAIGN.configuration.diagnose.enabled
 ]
-if workflow.is_main_process:
-    # Of a stage that is forced, what is done is done again. The jobs inherit it, on a cluster too.
-    forced = workflow.dag_settings.forcerun if workflow.dag_settings else ()
-    every = workflow.dag_settings.forceall if workflow.dag_settings else False
-    os.environ[chunks.ANEW] = " ".join(
-        name for name in chunks.STAGES if every or name.replace("-", "_") in forced
-    )
+
+
+def hand_on_forced():
+    """Let jobs know which stages are forced: there, what is done is done again.
+
+    Jobs inherit the variable, on a cluster too. Snakemake says what is forced after it has read
+    the rules. Another workflow may give them names of its own (`use rule * from ... as`).
+    """
+    if workflow.is_main_process:
+        asked = workflow.dag_settings
+        os.environ[chunks.ANEW] = " ".join(
+            name
+            for name, rule in RULE_NAMES.items()
+            if asked.forceall or rule in asked.forcerun
+        )
+
+
+RULE_NAMES = {
+    name: workflow.modifier.modify_rulename(name.replace("-", "_"))
+    for name in chunks.STAGES
+}
 
 
 # Before any job has begun: while they run, results come and go.
@@ -97,7 +111,12 @@ def set_aside_damaged():
 
 def planned(name, of):
     """What the plan of a job knows, as a parameter of its stage."""
-    return lambda wildcards: getattr(PLANS[name, wildcards.chunk], of)
+
+    def of_job(wildcards):
+        hand_on_forced()
+        return getattr(PLANS[name, wildcards.chunk], of)
+
+    return of_job
 
 
 def chunk_of(name, only=None):
