@@ -1,5 +1,6 @@
 """Pages made from a package's own templates."""
 
+from functools import cache
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -19,12 +20,18 @@ def render(package: str, name: str, **content: Any) -> str:
     content
         What the template names; nothing that it names may be missing.
     """
-    environment = Environment(
+    template = _environment(package, name.endswith(".html")).get_template(name)
+    return template.render(made_by=MADE_BY, **content)
+
+
+@cache
+def _environment(package: str, is_html: bool) -> Environment:
+    """Kept, so that a template is compiled once for a thousand pages."""
+    return Environment(
         loader=PackageLoader(package),
-        autoescape=name.endswith(".html"),
+        autoescape=is_html,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-        keep_trailing_newline=not name.endswith(".html"),
+        keep_trailing_newline=not is_html,
     )
-    return environment.get_template(name).render(made_by=MADE_BY, **content)

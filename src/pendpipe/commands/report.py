@@ -44,7 +44,7 @@ def run(arguments: Arguments) -> None:
     from pendpipe.figures.data import read_compared, read_content
     from pendpipe.files import write_whole
     from pendpipe.manifest import job
-    from pendpipe.report.page import page_files, render
+    from pendpipe.report.page import OWN_PAGE, page_files, render
     from pendpipe.report.tables import as_text, headline
 
     configuration, folder, comparison = read_compared(arguments.campaign, arguments.comparison)
@@ -53,7 +53,12 @@ def run(arguments: Arguments) -> None:
     summary = arguments.summary or compared.with_name("campaign.json")
     figures = arguments.figures or out.parent / "figures"
     inputs = [compared, summary, *page_files(comparison, folder, figures)]
-    with job(folder, "report", inputs=inputs, outputs=[out]):
+    with job(folder, "report", inputs=inputs, outputs=[out]) as running:
+
+        def own_page(record: str, page: str) -> None:
+            write_whole(folder / record / OWN_PAGE, page)
+            running.extras.append(folder / record / OWN_PAGE)
+
         page = render(
             configuration,
             comparison,
@@ -61,6 +66,8 @@ def run(arguments: Arguments) -> None:
             folder,
             figures,
             arguments.proof,
+            home=out,
+            own_page=own_page,
         )
         write_whole(out, page)
     tell(f"{out}: {len(page.encode()) / 1e6:.1f} MB")

@@ -7,7 +7,7 @@ it stands in one line of candidates. Everything below is in the details.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -226,6 +226,22 @@ class Summary:
             "quote": self.quote,
             "sentence": self.sentence,
         }
+
+
+def read_summary(content: Mapping[str, Any], unit: str) -> Summary:
+    """Read ``summary`` of ``diagnosis.json``, with the unit of the amplitudes."""
+    changes = tuple(
+        Change(
+            each["quantity"],
+            Estimate.from_json(each["fitted"]),
+            Estimate.from_json(each["with_missing"]),
+            each["amplitude_rad"],
+            unit,
+        )
+        for each in content["consequence"]
+    )
+    lists = {name: tuple(content[name]) for name in ("missing", "excluded")}
+    return Summary(**{**content, **lists, "consequence": changes})
 
 
 def _title(change: Change) -> str:

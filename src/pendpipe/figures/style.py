@@ -4,6 +4,7 @@ Colour never carries a meaning alone: branches differ in their symbols too, curv
 dashes. Vermilion is kept for what goes wrong when something is left out.
 """
 
+import csv
 import io
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -12,8 +13,10 @@ from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
@@ -280,6 +283,33 @@ def placeholder(reason: str) -> Figure:
     return figure
 
 
+def plotted(figure: Figure) -> str:
+    """What a figure shows, as CSV; points that are drawn as pixels stand in the results."""
+    table = io.StringIO()
+    writer = csv.writer(table, lineterminator="\n")
+    for axes in figure.axes:
+        bars = [each for each in axes.containers if isinstance(each, ErrorbarContainer)]
+        caps = [line for each in bars for line in each.lines[1]]
+        rows = []
+        for line in axes.lines:
+            if line in caps or line.get_rasterized() or line.get_transform() != axes.transData:
+                continue
+            own = [each for each in bars if each.lines[0] is line]
+            label = str((own[0] if own else line).get_label())
+            points = np.asarray(line.get_xydata(), dtype=np.float64)
+            sd = [""] * len(points)
+            if own and own[0].has_yerr:
+                segments = own[0].lines[2][-1].get_segments()
+                sd = [f"{0.5 * np.ptp(ends[:, 1]):.3g}" if len(ends) else "" for ends in segments]
+            name = "" if label.startswith("_") else label
+            both = zip(points.tolist(), sd, strict=False)
+            rows += [(name, f"{x:.7g}", f"{y:.7g}", error) for (x, y), error in both]
+        if rows:
+            writer.writerow(("of", axes.get_xlabel() or "x", axes.get_ylabel() or "y", "sd"))
+            writer.writerows(rows)
+    return table.getvalue()
+
+
 def save(
     figure: Figure, stem: Path, *, dpi: int = 200, forms: Sequence[str] = ("svg", "png")
 ) -> list[Path]:
@@ -296,6 +326,8 @@ def save(
         "png": {"Software": "pendpipe"},
         "pdf": {"Creator": "pendpipe", "CreationDate": None},
     }
+    if "png" in forms:  # a figure of its own, and not one of a thousand records
+        metadata["svg"]["Keywords"] = [plotted(figure)]
     with mpl.rc_context(saving):
         for path in written:
             form = path.suffix[1:]

@@ -88,6 +88,16 @@ CAPTIONS: Final = {
         " an amplitude that does; upright stripes are sudden. What is left below should look"
         " like noise.",
     ),
+    "waveform": Caption(
+        "Waveform",
+        "Every reading of a record with the amplitude of the fitted law; what was cut is shaded.",
+        "Drag over a stretch of time, or press + and −, to zoom in on the readings; 0 shows all.",
+    ),
+    "quality": Caption(
+        "Q against amplitude",
+        "Q of the fitted law (line), and what the turning points show without one (circles).",
+        "Q falls to the right where drag takes most, and to the left where dry friction does.",
+    ),
     "decay": Caption(
         "Decay",
         "Amplitudes of the turning points, with those of the fitted law and, for contrast,"
@@ -166,6 +176,31 @@ PROOF_CAPTIONS: Final = {
 }
 """Words for the figures of a scored challenge."""
 
+
+EQUATIONS: Final = (
+    (
+        "Eq. 8",
+        r"\ddot x + \left[\frac{\pi\omega^2 y_0}{4Q_{c0}} + \frac{\pi\omega}{4Q_h}\rho"
+        r" + \frac{\pi}{4y_0Q_{f0}}\rho^2\right]\mathrm{sgn}(\dot x) + \frac{\omega}{Q_v}\dot x"
+        r" + \omega^2 x = 0, \quad \rho^2 = \omega^2x^2 + \dot x^2",
+        "The law of motion. Where a record swings by sin x, ω² sin x stands for ω² x, and"
+        " 2ω²(1 − cos x) for ω²x² in ρ².",
+    ),
+    ("Eq. 13", r"-\frac{dy}{dt} = a y^2 + b y + c", "What its amplitude y loses, to first order."),
+    ("Eq. 15", r"Q(y) = \frac{\pi f}{a y + b + c/y}", "The quality factor at an amplitude."),
+    (
+        "Eq. 16",
+        r"Q_v = \frac{I\omega}{6\pi\eta R\,(1 + R/\delta)\,L^2}, \quad"
+        r" \delta = \sqrt{\frac{2\eta}{\omega\rho}}",
+        "That of a sphere of radius R at the distance L from the axis in a fluid.",
+    ),
+    (
+        "Eq. 17",
+        r"\frac{1}{Q_v} = \frac{1}{Q} - \frac{1}{Q_h}, \quad Q_h = k f^2",
+        "The viscous part of a limiting Q.",
+    ),
+)
+"""What the page refers to by number, as LaTeX."""
 
 GLOSSARY: Final = (
     ("Free decay", "The motion of a pendulum that was released and is left alone."),

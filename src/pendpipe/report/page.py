@@ -6,23 +6,26 @@ import base64
 import hashlib
 import io
 import json
+import os
 import re
 from collections import Counter
-from collections.abc import Mapping
-from html import escape
+from collections.abc import Callable, Iterable, Mapping
+from html import escape, unescape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from urllib.parse import quote
 
 from markupsafe import Markup
 
 from pendpipe.analysis.fit.printed import cause, facts, heading, sentence, size
 from pendpipe.analysis.fit.result import FitResult
-from pendpipe.figures.data import error, number, used
+from pendpipe.figures.data import NothingToDrawError, error, number, used
 from pendpipe.files import read_json, without_folders
 from pendpipe.quantities import compact, with_error
-from pendpipe.recording import Recording
+from pendpipe.recording import Recording, read_plain
 from pendpipe.report.captions import (
     CAPTIONS,
+    EQUATIONS,
     GLOSSARY,
     OF_A_RECORDING,
     PROOF_CAPTIONS,
@@ -43,15 +46,25 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from pendpipe.diagnosis.run import Outcome
+    from pendpipe.report.charts import Chart
 
 TEMPLATES: Final = Path(__file__).parent / "templates"
 BUDGET_BYTES: Final = 5_000_000
-"""The page stays below this up to 700 records; what no longer fits is named, left in its file."""
-_RESERVE_BYTES: Final = 350_000
-_RECORD_BYTES: Final = 6_000
-"""What a record takes beside its figures: its row, its section, its share of the downloads."""
+"""The page stays below this at 1,000 records; what no longer fits is on a record's own page."""
+MANY: Final = 100
+"""Beyond this only records that were refused, failed or miss something are drawn."""
+_RESERVE_BYTES: Final = 250_000
+_ROW_BYTES, _RECORD_BYTES = 2_000, 4_500
+"""What a record takes beside its drawings: in the tables, and in words where it is drawn."""
 
 TOGETHER: Final = "campaign_diagnosis.json"
+OWN_PAGE: Final = "record.html"
+_OF_THE_CAMPAIGN: Final = ("records.csv", "comparison.json", TOGETHER)
+_OF_A_RECORD: Final = (
+    *("recording.csv", "turning_points.csv", "fit.json", "diagnosis/diagnosis.json"),
+    "figures/decay.svg",
+)
+"""Files that the page links to."""
 
 Content = Mapping[str, Any]
 
@@ -63,6 +76,7 @@ _DROPPED = re.compile(
 )
 _NAME = re.compile(r'(\bid="|url\(#|href="#)([^")]+)')
 _COORDINATES = re.compile(r'( (?:d|x|y)=")([^"]*)')
+_TABLE = re.compile(r"<dc:subject>\s*<rdf:Bag>\s*<rdf:li>(.*?)</rdf:li>", re.DOTALL)
 _DIGITS = re.compile(r"(\d+\.\d{2})\d+")
 
 
@@ -95,11 +109,23 @@ def inline_svg(text: str, prefix: str, title: str, description: str) -> Markup:
     return Markup(opening + rest.strip())
 
 
+def table_inside(path: Path) -> str:
+    """The data that `pendpipe.figures.style.save` has put into a drawing, as CSV."""
+    found = _TABLE.search(path.read_text(encoding="utf-8"))
+    return unescape(found.group(1)) if found else ""
+
+
 class Room:
     """The bytes that a page has left for figures."""
 
     def __init__(self, left: int) -> None:
         self.left = left
+
+    def take(self, size: int) -> bool:
+        """Whether so many bytes fit; they are taken then."""
+        if fits := size < self.left:
+            self.left -= size
+        return fits
 
     def drawing(self, path: Path, prefix: str, title: str, description: str) -> Markup | None:
         """Return a drawn SVG as `inline_svg` does; None where there is none, or no room for it."""
@@ -117,6 +143,9 @@ def render(
     folder: Path,
     figures: Path,
     challenge: Path | None = None,
+    *,
+    home: Path | None = None,
+    own_page: Callable[[str, str], None] | None = None,
 ) -> str:
     """Make the page.
 
@@ -130,59 +159,182 @@ def render(
         Where figures 3 to 10 are.
     challenge
         Scores of a challenge, if there is one.
+    home
+        The page's file: it links to the results that lie beside or below it.
+    own_page
+        Is handed the name and the page of each record that is not wholly on this one.
 
     Returns
     -------
     str
-        One HTML document that refers to nothing outside itself.
+        One HTML document that loads nothing from outside itself.
     """
     entries = list(comparison["records"])
     has_theory = bool(comparison.get("has_theory"))
     columns, lines = table_of_records(entries, has_theory=has_theory)
-    room = Room(BUDGET_BYTES)
+    room = Room(BUDGET_BYTES - _RESERVE_BYTES - _ROW_BYTES * len(entries))
     drawn = {
         name: svg
         for name, words in CAPTIONS.items()
         if (svg := room.drawing(figures / f"{name}.svg", name, words.title, words.shows))
     }
-    room.left -= _RESERVE_BYTES + _RECORD_BYTES * len(entries)
-    decays, outside = _decays(folder, lines, room)
-    proven = proof(challenge, room)
     asked = configuration.get("diagnose") or {}
-    names = [str(entry["record"]) for entry in entries if asked.get("enabled", True)]
+    enabled = asked.get("enabled", True)
+    for line in lines:
+        line["diagnosis"] = _diagnosis(folder / line["name"]) if enabled else None
+    title = comparison.get("title") or "A campaign of free decays"
+    below = home is not None and folder.absolute().is_relative_to(home.absolute().parent)
+    links = Links(folder, home.absolute().parent if home is not None and below else None)
+    proven = proof(challenge, room)
+    shared = {
+        "captions": CAPTIONS,
+        "compact": compact,
+        "formula": formula,
+        "number": number,
+        "without_folders": without_folders,
+        **own_files(),
+    }
+    _draw_records(folder, lines, room, links)
+    for line in lines:
+        if own_page is not None and below and not line["refused"] and not line["zoom"]:
+            line["page"] = links.to(line["name"], OWN_PAGE)
+            own_page(line["name"], _own_page(folder, line, home, title, shared))
+    for line in lines:
+        line["link"] = f"#{line['anchor']}" if line["drawn"] else line["page"]
     return fill_template(
         "pendpipe.report",
         "page.html",
-        title=comparison.get("title") or "A campaign of free decays",
+        title=title,
         has_theory=has_theory,
         simulated=sum(entry.get("source") == "simulated" for entry in entries),
         rows=headline(comparison, configuration.get("simulated") or {}),
         figures=drawn,
-        captions=CAPTIONS,
+        tables={name: table_inside(figures / f"{name}.svg") for name in drawn},
         columns=columns,
-        diagnosed=diagnoses(folder, names, room),
+        diagnosed=[line["diagnosis"] | line for line in lines if line["diagnosis"]],
+        many=len(lines) > MANY,
         together=read_json(folder / TOGETHER) if (folder / TOGETHER).is_file() else None,
         asked=asked,
         proof=proven,
         records=lines,
+        files=links.present(_OF_THE_CAMPAIGN),
         counts=Counter(line["health"][:3] for line in lines),
         chi2_range=CHI2_RANGE,
         states=STATES,
         comparison=comparison,
         fitted=used(comparison),
-        decays=decays,
-        outside=outside,
+        equations=EQUATIONS,
         glossary=GLOSSARY,
-        number=number,
         error=error,
         with_error=with_error,
-        compact=compact,
-        without_folders=without_folders,
         provenance=comparison.get("provenance") or {},
         numbers=base64.b64encode(json.dumps(summary, indent=1).encode()).decode(),
-        **own_files(),
         findings=findings(comparison),
         warned=grouped_warnings(entries),
+        **shared,
+    )
+
+
+class Links(NamedTuple):
+    """Links from a page in the folder `home` to the results in `folder`; none without `home`."""
+
+    folder: Path
+    home: Path | None
+
+    def to(self, *names: str) -> str | None:
+        """The link to a result, by its folder and name."""
+        if self.home is None:
+            return None
+        return quote(self.folder.joinpath(*names).absolute().relative_to(self.home).as_posix())
+
+    def present(self, names: Iterable[str], record: str = "") -> list[tuple[str, str]]:
+        """Names and links of those of a record's (or the campaign's) files that there are."""
+        there = [name for name in names if (self.folder / record / name).is_file()]
+        return [(name, link) for name in there if (link := self.to(record, name))]
+
+
+def formula(latex: str) -> Markup:
+    """A formula as MathML, which browsers draw by themselves."""
+    from latex2mathml.converter import convert
+
+    return Markup(convert(latex))
+
+
+def _draw_records(folder: Path, lines: list[dict[str, Any]], room: Room, links: Links) -> None:
+    """Give the records their drawings while there is room, those that need a look first."""
+    for line in lines:
+        found = line["diagnosis"] and line["diagnosis"]["content"]["effects"]
+        line["marked"] = bool(line["refused"] or line["health"].word == "failed" or found)
+        line |= dict.fromkeys(("waveform", "quality", "map", "decay", "page"))
+        line |= {"drawn": False, "zoom": False, "files": []}
+    first = sorted(lines, key=lambda line: not line["marked"])
+    for line in first if len(lines) <= MANY else [line for line in first if line["marked"]]:
+        line["files"] = links.present(_OF_A_RECORD, line["name"])
+        drawings = {} if line["refused"] else _drawings(folder, line["entry"])
+        size = _RECORD_BYTES + sum(chart.size for chart in drawings.values())
+        line["drawn"] = room.take(size)
+        line |= drawings if line["drawn"] else {}
+    drawn = [line for line in first if line["drawn"] and not line["refused"]]
+    for line in drawn:
+        line["map"] = _residual_map(folder, line, room)
+    for line in drawn:
+        packed = line["waveform"].packed if line["waveform"] else {}
+        line["zoom"] = bool(packed) and room.take(len(str(packed)))
+    # All or none: they show in detail what each waveform and Q(A) shows at a glance.
+    decays = {line["name"]: folder / line["name"] / "figures" / "decay.svg" for line in drawn}
+    if sum(path.stat().st_size for path in decays.values() if path.is_file()) < room.left:
+        for line in drawn:
+            line["decay"] = _decay(decays[line["name"]], line, room)
+
+
+def _decay(path: Path, line: Content, room: Room) -> Markup | None:
+    # The prefix is a number: a record's name need not be an identifier.
+    words = f"{CAPTIONS['decay'].shows} Record {line['name']}."
+    return room.drawing(path, line["anchor"], f"Decay of {line['name']}", words)
+
+
+def _residual_map(folder: Path, line: Content, room: Room) -> Markup | None:
+    """What the model leaves, before and after; only where something is missing it is drawn."""
+    if not line["diagnosis"] or line["diagnosis"]["content"]["verdict"] != "missing-physics":
+        return None
+    words = f"{CAPTIONS['residual_map'].shows} Record {line['name']}."
+    title = f"Residual of {line['name']} before and after"
+    path = folder / line["name"] / "diagnosis" / "residual_map.svg"
+    return room.drawing(path, f"{line['anchor']}-map", title, words)
+
+
+def _drawings(folder: Path, entry: Content) -> dict[str, Chart]:
+    """A record's waveform and Q against amplitude, where its results are there."""
+    from pendpipe.figures.decays import read_decay
+    from pendpipe.report.charts import quality_by_amplitude, waveform
+
+    try:
+        decay = read_decay(folder, entry)
+        quality = quality_by_amplitude(decay)
+    except NothingToDrawError:
+        return {}
+    drawn = {} if quality is None else {"quality": quality}
+    if (path := folder / str(entry["record"]) / "recording.csv").is_file():
+        constant = number(entry.get("volts_per_radian"))
+        drawn["waveform"] = waveform(read_plain(path), decay, constant)
+    return drawn
+
+
+def _own_page(
+    folder: Path, line: Content, home: Path | None, campaign: str, shared: Content
+) -> str:
+    """The page of one record, with all its drawings."""
+    room, place = Room(BUDGET_BYTES), folder / line["name"]
+    own = {**line, "page": None, "zoom": True, "files": Links(place, place).present(_OF_A_RECORD)}
+    if not line["drawn"]:
+        own |= _drawings(folder, line["entry"])
+    own["zoom"] = own["waveform"] is not None
+    own["map"] = _residual_map(folder, own, room)
+    own["decay"] = _decay(place / "figures" / "decay.svg", own, room)
+    back = "" if home is None else os.path.relpath(home.absolute(), place.absolute())
+    back = quote(Path(back).as_posix())
+    return fill_template(
+        "pendpipe.report", "record_page.html", line=own, home=back, campaign=campaign, **shared
     )
 
 
@@ -202,30 +354,9 @@ def page_files(comparison: Content, folder: Path, figures: Path) -> list[Path]:
     files += [
         folder / str(entry["record"]) / name
         for entry in comparison["records"]
-        for name in (
-            "figures/decay.svg",
-            "diagnosis/diagnosis.json",
-            "diagnosis/residual_map.svg",
-        )
+        for name in (*_OF_A_RECORD, "diagnosis/residual_map.svg")
     ]
     return [path for path in files if path.is_file()]
-
-
-def _decays(
-    folder: Path, lines: list[dict[str, Any]], room: Room
-) -> tuple[dict[str, Markup], list[str]]:
-    """Each record's decay figure while there is room, and the records beyond it."""
-    drawn = {
-        # The prefix is a number: a record's name need not be an identifier.
-        name: room.drawing(
-            path, line["anchor"], f"Decay of {name}", f"{CAPTIONS['decay'].shows} Record {name}."
-        )
-        for line in lines
-        if not line["refused"]
-        and (path := folder / (name := line["name"]) / "figures" / "decay.svg").is_file()
-    }
-    decays = {name: svg for name, svg in drawn.items() if svg is not None}
-    return decays, [name for name in drawn if name not in decays]
 
 
 VERDICTS: Final = {
@@ -236,42 +367,22 @@ VERDICTS: Final = {
 """How each verdict is shown."""
 
 
-def diagnoses(folder: Path, names: list[str], room: Room) -> list[dict[str, Any]]:
-    """Read every record's diagnosis; none where the campaign was not diagnosed.
+def _diagnosis(place: Path) -> dict[str, Any] | None:
+    """Read a record's diagnosis; None where it was not diagnosed."""
+    from pendpipe.diagnosis.summary import read_summary
 
-    Parameters
-    ----------
-    folder
-        The campaign's results.
-    names
-        Of the records.
-    room
-        What the page has left for figures.
-    """
-    found = []
-    for index, name in enumerate(names, start=1):
-        place, anchor = folder / name / "diagnosis", f"diagnosis-{index}"
-        if not (place / "diagnosis.json").is_file():
-            continue
-        content = read_json(place / "diagnosis.json")
-        # What is presumed is fitted, and no finding.
-        content["effects"] = [each for each in content["effects"] if not each.get("presumed")]
-        figure = None
-        if content["verdict"] == "missing-physics":
-            words = f"{CAPTIONS['residual_map'].shows} Record {name}."
-            title = f"Residual of {name} before and after"
-            figure = room.drawing(place / "residual_map.svg", anchor, title, words)
-        found.append(
-            {
-                "name": name,
-                "anchor": anchor,
-                "light": VERDICTS[content["verdict"]],
-                "statement": without_folders(str(content["statement"])),
-                "figure": figure,
-                "content": content,
-            }
-        )
-    return found
+    if not (path := place / "diagnosis" / "diagnosis.json").is_file():
+        return None
+    content = read_json(path)
+    # What is presumed is fitted, and no finding.
+    content["effects"] = [each for each in content["effects"] if not each.get("presumed")]
+    parameters = content["baseline"].get("parameters") or {}
+    unit = (parameters.get("amplitude") or {}).get("unit", "rad")
+    return {
+        "light": VERDICTS[content["verdict"]],
+        "summary": read_summary(content["summary"], unit),
+        "content": content,
+    }
 
 
 KEPT: Final = {
