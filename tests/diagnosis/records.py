@@ -13,17 +13,19 @@ import numpy as np
 
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.torque import Restoring
-from pendpipe.analysis.turning_points.measure import prepare
+from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis import silent
 from pendpipe.diagnosis.begin import Beginning, begin
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise, white_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.run import Outcome, _fit_of, diagnose_recording
+from pendpipe.diagnosis.task import Task
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.any_law import Motion
 from pendpipe.effects import Effect
-from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.effect import Parameter, Pendulum
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
@@ -81,6 +83,11 @@ def beginning_of(record: Recording, restoring: Restoring | None = None) -> Begin
     points, part = measure_recording(record, "the test")
     fit = fit_recording(part, points=points, restoring=restoring)
     return begin(prepare(part, "the test"), points, fit, baseline="eq8", fixed={})
+
+
+def task_of(samples: Samples | None = None) -> Task:
+    """What a search for anything of the catalogue is to do, at a level of 1 %."""
+    return Task(CATALOGUE, (), "eq8", 0.01, 1, silent, samples)
 
 
 def prepared(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pendpipe.diagnosis.state import first_noise
 from scipy.integrate import solve_ivp
 
 from pendpipe.analysis.fit import fit_recording
@@ -11,7 +12,6 @@ from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.refine import misfit, refine
 from pendpipe.diagnosis.run import diagnose_recording
-from pendpipe.diagnosis.state import first_noise
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects.baseline import OMEGA, START

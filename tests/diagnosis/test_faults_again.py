@@ -10,26 +10,29 @@ import pytest
 
 from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis import silent
-from pendpipe.diagnosis.faults import Forensics
+from pendpipe.diagnosis.detect import Detection
+from pendpipe.diagnosis.evidence import NO_SCAN
+from pendpipe.diagnosis.faults import correct, examine_again
 from pendpipe.diagnosis.forensics import TESTS
+from pendpipe.diagnosis.hypothesis import Fault, Hypothesis, is_gross
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Finding, nothing
 from pendpipe.diagnosis.run import diagnose_recording
-from pendpipe.diagnosis.state import Fault, State, is_gross
+from pendpipe.diagnosis.task import Task
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
 
-from .records import INTERVAL_S, NOISE_RAD, TIME_S, TRUTH, other_engine, prepared, white
+from .records import INTERVAL_S, NOISE_RAD, TIME_S, TRUTH, other_engine, prepared, task_of, white
 
 LEVEL, ODD = 0.01, 812
+NOTHING = Detection((), 1.0, NO_SCAN)
 
 
-def blamed(error: float, odd: int = ODD) -> tuple[Forensics, State]:
+def blamed(error: float, odd: int = ODD) -> tuple[Task, Hypothesis]:
     """A search with the right model, and one reading that was masked as a glitch."""
     readings = other_engine(TRUTH) + white(21)
     # Its own noise taken off: it is wrong by just so much.
@@ -39,34 +42,33 @@ def blamed(error: float, odd: int = ODD) -> tuple[Forensics, State]:
     data = data.masked(mask)
     noise = white_noise(data, NOISE_RAD)
     fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
-    state = State(fit, data, noise, [], fit.value)
-    state.faults = [Fault(Finding("glitches", 1e-9, mask=mask), 1e-7, 0, mask)]
+    faults = (Fault(Finding("glitches", 1e-9, mask=mask), 1e-7, 0, mask),)
     samples = prepare(Recording(TIME_S, readings, "angle_rad"), "the test")
-    return Forensics(samples, LEVEL), state
+    state = Hypothesis(fit, data, noise, (), fit, samples, faults=faults, first=NOTHING)
+    return task_of(samples), state
 
 
 @pytest.mark.parametrize("error", [0.5, 3.0, -3.5])
 def test_a_reading_that_noise_explains_in_the_end_returns(error: float) -> None:
-    forensics, state = blamed(error)
-    before = state.fit
-    assert forensics.again(state, silent)
-    assert state.faults == []
+    task, before = blamed(error)
+    state = examine_again(before, task)
+    assert state.faults == ()
     assert state.data.used == len(TIME_S)
     assert np.array_equal(state.noise.weight, state.data.weight)
     # It counts again; and the record is no more suspicious than its tests say now.
-    assert state.fit.chi2 > before.chi2 or abs(error) < 1.0
-    assert forensics.p_value(state.faults) > LEVEL
+    assert state.fit.chi2 > before.fit.chi2 or abs(error) < 1.0
+    assert state.p_value > LEVEL
 
 
 @pytest.mark.parametrize("error", [12.0, -30.0])
 def test_a_reading_that_nothing_explains_stays_out_and_is_measured_anew(error: float) -> None:
-    forensics, state = blamed(error)
-    assert not forensics.again(state, silent)
+    task, state = blamed(error)
+    state = examine_again(state, task)
     (fault,) = state.faults
     assert state.data.weight[ODD] == 0.0
     assert state.data.used == len(TIME_S) - 1
     assert fault.p_value < LEVEL
-    assert forensics.p_value(state.faults) == fault.p_value
+    assert state.p_value == fault.p_value
     largest = fault.finding.parameters["largest"].value
     assert largest == pytest.approx(error * NOISE_RAD, abs=2.0 * NOISE_RAD)
 
@@ -78,9 +80,9 @@ def test_a_far_reading_stays_out_where_its_test_cannot_judge(
     error: float, odd: int, stays: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """At the ends of coloured noise no test can tell; the model's own error can."""
-    forensics, state = blamed(error, odd)
+    task, state = blamed(error, odd)
     monkeypatch.setitem(TESTS, "glitches", lambda *_: nothing("glitches"))
-    assert forensics.again(state, silent) is not stays
+    state = examine_again(state, task)
     assert (state.data.weight[odd] == 0.0) is np.bool_(stays)
 
 
@@ -88,12 +90,12 @@ def test_a_test_that_reports_nothing_counts_by_its_chance() -> None:
     """The farther off one reading, the less likely the record, before it is called a glitch."""
     chances = []
     for error in (4.6, 4.8, 5.0):
-        forensics, state = blamed(error)
-        state.faults, state.data = [], replace(state.data, weight=np.ones(len(TIME_S)))
-        state.noise = white_noise(state.data, NOISE_RAD)
-        forensics.before(state, silent)
-        assert state.faults == []
-        chances.append(forensics.p_value([]))
+        task, state = blamed(error)
+        data = replace(state.data, weight=np.ones(len(TIME_S)))
+        noise = white_noise(data, NOISE_RAD)
+        state = correct(replace(state, faults=(), data=data, noise=noise), task)
+        assert state.faults == ()
+        chances.append(state.p_value)
     assert LEVEL < chances[2] < chances[1] < chances[0] < 1.0
     # As the tail of a normal distribution falls: by six.
     assert chances[2] < 0.25 * chances[0]
@@ -101,17 +103,17 @@ def test_a_test_that_reports_nothing_counts_by_its_chance() -> None:
 
 def test_glitches_are_masked_before_a_model_that_is_far_off_is_mended() -> None:
     """No other test can judge by such a model; readings apart from their neighbours can."""
-    forensics, state = blamed(0.0)
-    readings = state.data.values.copy()
+    task, right = blamed(0.0)
+    readings = right.data.values.copy()
     wild = [300, 801, 1200]
     readings[wild] += 40.0 * NOISE_RAD
-    state.data, _ = prepared(readings)
-    state.noise, state.faults = white_noise(state.data, NOISE_RAD), []
-    state.held, state.bare = [OMEGA], TRUTH.copy()
-    state.bare[OMEGA] *= 1.01
-    state.fit = refine(state.fit.model, state.data, state.noise, state.bare, held=state.held)
-    assert is_gross(state.fit, state.data)
-    forensics.before(state, silent)
+    data, _ = prepared(readings)
+    noise, off = white_noise(data, NOISE_RAD), TRUTH.copy()
+    off[OMEGA] *= 1.01
+    fit = refine(right.fit.model, data, noise, off, held=(OMEGA,))
+    assert is_gross(fit, data)
+    begun = Hypothesis(fit, data, noise, (OMEGA,), fit, right.samples)
+    state = correct(begun, task)
     (fault,) = state.faults
     assert fault.finding.identifier == "glitches"
     assert np.flatnonzero(state.data.weight == 0.0).tolist() == wild

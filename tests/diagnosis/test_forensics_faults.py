@@ -11,17 +11,16 @@ import pytest
 import pendpipe as pp
 from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis import silent
 from pendpipe.diagnosis.data import gather
-from pendpipe.diagnosis.faults import Forensics
+from pendpipe.diagnosis.faults import correct, corrected_by
 from pendpipe.diagnosis.forensics import TESTS
 from pendpipe.diagnosis.forensics.corrections import LostSamples, find_lost_samples
 from pendpipe.diagnosis.forensics.glitches import _smallest_p_value, find_in_misfit
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
+from pendpipe.diagnosis.hypothesis import Hypothesis
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Finding
-from pendpipe.diagnosis.state import State
 from pendpipe.effects.catalogue import CATALOGUE
 from pendpipe.effects.catalogue.restoring import cubic_stiffness
 from pendpipe.effects.model import Model
@@ -30,7 +29,7 @@ from pendpipe.recording import Recording
 from .decays import FREQUENCY_HZ, Fitted, Pendulum, fitted, rounded
 from .examine import examine
 from .faults import AIR, FAULTS, NOISE, STEP_12, STEP_16, speed, white
-from .records import null_fit
+from .records import null_fit, task_of
 
 FOUND = 1e-3
 
@@ -357,9 +356,8 @@ def test_lost_samples_that_no_motion_could_follow_are_not_corrected(
     monkeypatch.setattr(
         "pendpipe.diagnosis.faults.corrections.find_lost_samples", lambda *_: [late]
     )
-    state = State(fit, data, noise, [], fit.value)
     samples = prepare(Recording(data.time_s, data.values, "angle_rad"), "the test")
-    Forensics(samples, 0.01).before(state, silent)
+    state = correct(Hypothesis(fit, data, noise, (), fit, samples), task_of(samples))
     assert np.array_equal(state.data.time_s, data.time_s)
     assert "dropped-samples" not in [fault.finding.identifier for fault in state.faults]
 
@@ -377,8 +375,8 @@ def test_a_loss_that_is_placed_a_reading_off_makes_no_glitch(
     monkeypatch.setattr(
         "pendpipe.diagnosis.faults.corrections.find_lost_samples", lambda *_: [placed]
     )
-    state = State(record.fit, record.data, record.noise, [], record.fit.value)
-    Forensics(record.samples, 0.01).before(state, silent)
+    begun = Hypothesis(record.fit, record.data, record.noise, (), record.fit, record.samples)
+    state = correct(begun, task_of(record.samples))
     (fault,) = state.faults
     assert fault.finding.identifier == "dropped-samples"
     # What the readings beside it took from chi^2 is no gain of the correction.
@@ -390,11 +388,11 @@ def test_readings_left_out_beside_a_step_are_no_gain_of_a_correction() -> None:
     fit, data, noise = null_fit()
     weight = data.weight.copy()
     weight[np.arange(50, len(data), 30)] = 0.0
-    state = State(fit, data, noise, [], fit.value)
     samples = prepare(Recording(data.time_s, data.values, "angle_rad"), "the test")
+    state = Hypothesis(fit, data, noise, (), fit, samples)
     unchanged = replace(data, weight=weight)
-    assert not Forensics(samples, 0.01)._correct(state, unchanged, Finding("clock-slips", 1e-9))
-    assert state.faults == []
+    found = corrected_by(state, task_of(samples), unchanged, Finding("clock-slips", 1e-9))
+    assert found is state
 
 
 @pytest.mark.parametrize("stale", [True, False])

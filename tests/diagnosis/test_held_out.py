@@ -62,7 +62,7 @@ def test_a_law_that_only_noise_asked_for_predicts_worse_and_a_right_one_does_not
     outcome = diagnosed("sensor-cubic")
     found = outcome.search
     assert not predicts_worse(
-        found.baseline, found.improved, found.data, found.noise, (), found.held, drawn=False
+        found.baseline, found.fit, found.data, found.noise, (), found.held, drawn=False
     )
 
 

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from pendpipe.diagnosis import weighing
+from pendpipe.diagnosis.hypothesis import Hypothesis, Step
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.run import Outcome, diagnose_recording
-from pendpipe.diagnosis.search import Search
-from pendpipe.diagnosis.state import Step
 from pendpipe.diagnosis.weighing import Weighed, swap_in_likelier, weigh
 from pendpipe.effects.baseline import B
 
@@ -27,7 +26,7 @@ def wrong_loss() -> Outcome:
     return diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
 
 
-def having_taken(outcome: Outcome, name: str) -> Search:
+def having_taken(outcome: Outcome, name: str) -> Hypothesis:
     """The same search as if it had added another of the refitted effects."""
     found = outcome.search
     (step,) = found.steps
@@ -40,14 +39,14 @@ def having_taken(outcome: Outcome, name: str) -> Search:
     fit = refine(first.fit.model, found.data, found.noise, first.fit.value, held=held)
     return replace(
         found,
-        improved=fit,
+        fit=fit,
         steps=(replace(step, rivals=(first, *rest)),),
         held=held,
-        named=fit,
+        without_curve=None,
     )
 
 
-def led(outcome: Outcome, name: str) -> tuple[Step, float, dict[str, float], Search]:
+def led(outcome: Outcome, name: str) -> tuple[Step, float, dict[str, float], Hypothesis]:
     """Return the final leader if another was added first, and all probabilities."""
     found, (weighed,) = swap_in_likelier(having_taken(outcome, name), outcome.beginning)
     (step,) = found.steps
@@ -63,8 +62,8 @@ def test_a_likelier_effect_replaces_the_one_that_was_added(taken: str) -> None:
     assert step.winner.identifier == "circular-error"
     assert own > max(mates.values())
     assert taken in mates
-    assert [effect.identifier for effect in found.improved.model.effects] == ["circular-error"]
-    assert found.improved.chi2 == pytest.approx(scanned("circular-error").search.improved.chi2)
+    assert [effect.identifier for effect in found.fit.model.effects] == ["circular-error"]
+    assert found.fit.chi2 == pytest.approx(scanned("circular-error").search.fit.chi2)
 
 
 @pytest.mark.parametrize(
@@ -98,7 +97,7 @@ def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
     monkeypatch.setattr(weighing, "weigh", weighed)
     outcome = scanned("circular-error")
     found, _ = swap_in_likelier(outcome.search, outcome.beginning)
-    assert [effect.identifier for effect in found.improved.model.effects] == [leads]
+    assert [effect.identifier for effect in found.fit.model.effects] == [leads]
     assert found.steps[0].winner.identifier == leads
 
 
@@ -124,8 +123,8 @@ def test_a_wrong_parameter_replaces_missing_physics() -> None:
     step, _, _, found = led(wrong_loss(), taken)
     assert step.winner.identifier == "parameter-b"
     assert B not in found.held
-    sd = float(found.improved.covariance()[B, B]) ** 0.5
-    assert abs(found.improved.value[B] - TRUTH[B]) < 4.0 * sd
+    sd = float(found.fit.covariance()[B, B]) ** 0.5
+    assert abs(found.fit.value[B] - TRUTH[B]) < 4.0 * sd
 
 
 def test_the_next_effect_is_compared_beside_the_new_leader(
@@ -140,7 +139,7 @@ def test_the_next_effect_is_compared_beside_the_new_leader(
     assert found.steps[0].winner.identifier == other.identifier
     assert found.steps[1].before is found.steps[0].winner.fit
     assert found.steps[1].winner is outcome.search.steps[1].winner
-    assert {effect.identifier for effect in found.improved.model.effects} == {
+    assert {effect.identifier for effect in found.fit.model.effects} == {
         other.identifier,
         found.steps[1].winner.identifier,
     }
@@ -165,7 +164,7 @@ def test_after_a_swap_every_effect_is_weighed_beside_the_new_ones(
         found, weighed = swap_in_likelier(outcome.search, outcome.beginning)
     names = {rival.identifier for rival in wanted}
     assert {step.winner.identifier for step in found.steps} == names
-    assert {effect.identifier for effect in found.improved.model.effects} == names
+    assert {effect.identifier for effect in found.fit.model.effects} == names
     for step, each in zip(found.steps, weighed, strict=True):
         left = {effect.identifier for effect in each.without.model.effects}
         assert left == names - {step.winner.identifier}

@@ -65,7 +65,7 @@ def test_a_curved_sensor_shows_at_large_amplitudes_that_is_early() -> None:
     found = location_of("sensor-cubic")
     assert found.amplitude_rad is not None
     assert found.time_s is not None
-    amplitude = diagnosed("sensor-cubic").search.improved.at.sampled.amplitude
+    amplitude = diagnosed("sensor-cubic").search.fit.at.sampled.amplitude
     assert found.amplitude_rad[1] > 0.97 * amplitude.max()
     assert found.amplitude_rad[0] > 1.2 * amplitude.min()
     assert found.time_s[0] < 5.0

@@ -17,8 +17,9 @@ from pendpipe.diagnosis import silent
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, lines
-from pendpipe.diagnosis.faults import SLIPS, Forensics
+from pendpipe.diagnosis.faults import SLIPS, _examined, _slips
 from pendpipe.diagnosis.forensics import TESTS, corrections
+from pendpipe.diagnosis.hypothesis import CHOICE, FURTHER, Hypothesis, Step, price
 from pendpipe.diagnosis.location import off_harmonics
 from pendpipe.diagnosis.moves import describe, improve
 from pendpipe.diagnosis.refine import Fit, refine
@@ -26,8 +27,6 @@ from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import Finding
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.search import _on_trial
-from pendpipe.diagnosis.state import CHOICE, FURTHER, State, Step, price
-from pendpipe.diagnosis.task import Task
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
@@ -45,6 +44,7 @@ from .records import (
     prepared,
     pulled,
     recording,
+    task_of,
     white,
     with_effects,
 )
@@ -56,7 +56,7 @@ SCALES = st.builds(
 )
 
 
-def state_with(readings: FloatArray, *names: str) -> State:
+def state_with(readings: FloatArray, *names: str) -> Hypothesis:
     """A search that has added several effects, each from near its true values."""
     data, noise = prepared(readings)
     effects = tuple(by_identifier(name) for name in names)
@@ -67,13 +67,13 @@ def state_with(readings: FloatArray, *names: str) -> State:
     ]
     start = np.concatenate([bare.value, *shapes])
     fit = refine(Model(TIME_S, INTERVAL_S, effects), data, noise, start)
-    state = State(fit, data, noise, [], bare.value)
+    steps = []
     for effect in effects:
         gain = bare.chi2 - fit.chi2
         lead = Lead(effect, (), gain, 1e-12)
         rival = Rival.of(lead, fit, bare.chi2, Scale(fit.chi2), NO_SCAN)
-        state.steps.append(Step((rival,), 1e-9, bare))
-    return state
+        steps.append(Step((rival,), 1e-9, bare))
+    return Hypothesis(fit, data, noise, (), bare, steps=tuple(steps))
 
 
 @given(scale=SCALES, behind=st.floats(0.0, 1e6))
@@ -110,7 +110,7 @@ def test_a_magnet_may_be_a_restoring_torque_without_a_name() -> None:
 def test_two_names_for_one_law_give_way_to_a_curve() -> None:
     state = state_with(pulled() + white(6), "frequency-drift", "cubic-stiffness")
     before = state.fit.chi2
-    improve(state, silent)
+    state = improve(state, silent)
     assert [step.winner.identifier for step in state.steps] == ["unnamed-restoring"]
     assert state.fit.chi2 < before + FURTHER + 18.0
 
@@ -138,7 +138,7 @@ def test_each_further_name_has_its_price_and_sin_x_has_none() -> None:
 def test_a_name_that_leaves_noise_stays() -> None:
     state = state_with(with_effects("sensor-quadratic") + white(5), "sensor-quadratic")
     before = state.fit
-    improve(state, silent)
+    state = improve(state, silent)
     assert state.fit is before
 
 
@@ -163,7 +163,7 @@ def test_what_chance_does_not_explain_is_never_called_consistent(first_hz: float
 def test_a_second_name_that_the_readings_do_not_need_is_dropped() -> None:
     readings = with_effects("sensor-quadratic") + white(5)
     state = state_with(readings, "sensor-quadratic", "tone-pickup")
-    improve(state, silent)
+    state = improve(state, silent)
     assert [step.winner.identifier for step in state.steps] == ["sensor-quadratic"]
 
 
@@ -236,9 +236,8 @@ def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
     bent = 4e-4 * np.tanh(angle / 0.02)
     data, noise = prepared(other_engine(TRUTH) + bent + white(6))
     fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
-    state = State(fit, data, noise, [], fit.value)
     before = remainder_of(fit, data, noise)
-    assert describe(state, 1e-9, task_for(recording(data.values, 6)))
+    state = describe(Hypothesis(fit, data, noise, (), fit), 1e-9, task_of())
     assert state.steps[-1].winner.lead.effect.kind == "unnamed"
     after = remainder_of(state.fit, state.data, state.noise)
     assert after.excess < 0.2 * before.excess
@@ -251,21 +250,15 @@ def test_what_is_left_is_described_where_only_sin_x_was_found() -> None:
     data, noise = prepared(model.reading(value) + 0.3 * CHIRP + white(6))
     fit = refine(model, data, noise, value)
     known = Step((Rival(Lead(sine, (), 9.0, 0.0), fit, 9.0, 9.0, 9.0),), 0.0, fit)
-    state = State(fit, data, noise, [], fit.value[: len(TRUTH)], [known])
-    assert describe(state, 1e-9, task_for(recording(data.values, 6)))
+    bare = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
+    state = describe(Hypothesis(fit, data, noise, (), bare, steps=(known,)), 1e-9, task_of())
     assert state.steps[-1].winner.drawn
 
 
 def test_noise_is_not_described() -> None:
     fit, data, noise = null_fit()
-    state = State(fit, data, noise, [], fit.value)
-    assert not describe(state, 0.1, task_for(recording(data.values, 6)))
-    assert state.fit is fit
-
-
-def task_for(record: Recording) -> Task:
-    forensics = Forensics(prepare_samples(record, "the test"), 0.01)
-    return Task(CATALOGUE, (), "eq8", 0.01, 1, forensics, silent)
+    state = Hypothesis(fit, data, noise, (), fit)
+    assert describe(state, 0.1, task_of()) is state
 
 
 def test_a_step_and_a_tone_are_both_named_and_no_curve_instead() -> None:
@@ -326,15 +319,14 @@ def test_a_random_cause_pays_the_price_of_a_name(
 ) -> None:
     """Beside one name more than beside none; a fault that shows by itself pays nothing."""
     readings = with_effects(*names) + white(5)
-    state = state_with(readings, *names)
+    samples = prepare_samples(recording(readings, 6), "the test")
+    state = replace(state_with(readings, *names), samples=samples)
     least = {"clipping": 0.0}.get(name, FURTHER if names else CHOICE)
-    forensics = task_for(recording(readings, 6)).forensics
     for gain, told in ((least - 1.0, least == 0.0), (least + 1.0, True)):
         finding = Finding(name, 1e-9, gain)
         monkeypatch.setitem(TESTS, name, lambda *_, finding=finding: finding)
-        state.faults.clear()
-        forensics._examine(name, state, silent)
-        assert [fault.finding.identifier for fault in state.faults] == [name] * told
+        after, _ = _examined(name, state, task_of(samples))
+        assert [fault.finding.identifier for fault in after.faults] == [name] * told
 
 
 @pytest.mark.parametrize("times", [3.0, 10.0])
@@ -377,9 +369,10 @@ def test_slips_are_looked_for_again_once_the_misfit_has_halved(
         state_with(other_engine(TRUTH) + share * (pulled() - other_engine(TRUTH)) + white(6))
         for share in (3.0, 1.5)
     )
-    forensics = task_for(recording(whole.data.values, 6)).forensics
+    samples = prepare_samples(recording(whole.data.values, 6), "the test")
+    state, task = replace(whole, samples=samples), task_of(samples)
     for _ in range(3):
-        forensics._correct_slips(whole, silent)
+        state = _slips(state, task)
     assert asked == [*SLIPS]
-    forensics._correct_slips(part, silent)
+    _slips(replace(state, fit=part.fit, data=part.data, noise=part.noise), task)
     assert asked == [*SLIPS, *SLIPS]

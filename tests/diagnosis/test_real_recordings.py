@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pendpipe.diagnosis.state import first_noise
 
 from pendpipe.analysis.fit import fit_recording
 from pendpipe.analysis.free_decay import measure_recording
@@ -23,7 +24,6 @@ from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.location import beat_of
 from pendpipe.diagnosis.refine import Fit, fit_in_growing_window
 from pendpipe.diagnosis.run import diagnose_recording
-from pendpipe.diagnosis.state import first_noise
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects.baseline import A, C
 from pendpipe.effects.catalogue import by_identifier

@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pendpipe.diagnosis.state import Fault
 
 from pendpipe.diagnosis.detect import Chance, Lead, Trials
 from pendpipe.diagnosis.evidence import Rival, Scale, class_width, evidence, probabilities
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Finding
 from pendpipe.diagnosis.run import Outcome, diagnose_recording
-from pendpipe.diagnosis.state import Fault
 from pendpipe.diagnosis.weighing import fault_named, law_of, weigh
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import by_identifier
@@ -70,7 +70,7 @@ def test_a_rival_is_compared_by_its_gain_with_the_final_noise(
     start = np.append(weighed.without.value, own)
     model = weighed.without.model.adding(one.lead.effect)
     fit = refine(model, found.data, found.noise, start, held=found.held)
-    behind = fit.chi2 - found.improved.chi2
+    behind = fit.chi2 - found.fit.chi2
     assert behind > step.winner.gain - one.gain
     width = class_width(replace(step.winner, gain=weighed.gain))
     assert (one.identifier in {mate.identifier for mate in weighed.mates}) == (behind < width)
@@ -138,7 +138,7 @@ def test_a_curve_without_a_name_takes_nothing_from_the_law() -> None:
     weighed = [weigh(found, outcome.beginning, step) for step in found.steps]
     law = law_of(found, weighed)
     assert law.model.effects == ()
-    assert law.chi2 > 2.0 * found.improved.chi2
+    assert law.chi2 > 2.0 * found.fit.chi2
     assert law.error_scale > 1.0
     for name in ("a", "b", "c", "frequency"):
         alone, given = diagnosis.baseline.parameters[name], diagnosis.improved.parameters[name]

@@ -13,14 +13,13 @@ from itertools import combinations
 from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.detect import CATALOGUE_SHARE, RED_NOISE_SHARE, Trials, detect, prepare
 from pendpipe.diagnosis.evidence import SIZE_CHARGE, Rival
+from pendpipe.diagnosis.hypothesis import FURTHER, Hypothesis, settled
 from pendpipe.diagnosis.refine import Fit, best_fit, refine
 from pendpipe.diagnosis.refits import refit_leads
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.state import FURTHER, State, settled
-from pendpipe.effects import Effect
 
 
-def prefer_parameters(state: State, rivals: Sequence[Rival]) -> list[Rival]:
+def prefer_parameters(state: Hypothesis, rivals: Sequence[Rival]) -> list[Rival]:
     """Put a held parameter first if such parameters alone explain as much as any effect.
 
     Parameters
@@ -48,7 +47,7 @@ def prefer_parameters(state: State, rivals: Sequence[Rival]) -> list[Rival]:
     return [first, *(rival for rival in rivals if rival is not first)]
 
 
-def _fewest(state: State, released: Sequence[Rival], most: Fit) -> tuple[Sequence[Rival], Fit]:
+def _fewest(state: Hypothesis, released: Sequence[Rival], most: Fit) -> tuple[Sequence[Rival], Fit]:
     """Return the fewest parameters to which no other adds more than chance, and their fit."""
     for number in range(1, len(released)):
         tried = [(some, _together(state, some)) for some in combinations(released, number)]
@@ -59,11 +58,11 @@ def _fewest(state: State, released: Sequence[Rival], most: Fit) -> tuple[Sequenc
     return released, most
 
 
-def _together(state: State, released: Sequence[Rival]) -> Fit | None:
+def _together(state: Hypothesis, released: Sequence[Rival]) -> Fit | None:
     """Fit the model with some held parameters released."""
     if len(released) == 1:
         return released[0].fit
-    model, held = state.fit.model, list(state.held)
+    model, held = state.fit.model, state.held
     for rival in released:
         effect = rival.lead.effect
         assert isinstance(effect, ReleasedParameter)
@@ -72,7 +71,9 @@ def _together(state: State, released: Sequence[Rival]) -> Fit | None:
     return best_fit(model, state.data, state.noise, [best.fit.value], held=held)
 
 
-def _do_as_well(state: State, fit: Fit, needed: Sequence[Rival], rivals: Sequence[Rival]) -> bool:
+def _do_as_well(
+    state: Hypothesis, fit: Fit, needed: Sequence[Rival], rivals: Sequence[Rival]
+) -> bool:
     """Whether wrong parameters explain as much as each effect and curve.
 
     A single wrong parameter has a high prior. Several must be better than one effect that does as
@@ -95,8 +96,8 @@ def _unit(rival: Rival) -> float:
 
 
 def reconsider_red_noise(
-    state: State, effects: Sequence[Effect], level: float, seed: int, progress: Progress
-) -> None:
+    state: Hypothesis, level: float, seed: int, progress: Progress
+) -> Hypothesis:
     """Test whether apparent red noise is an effect, and re-estimate the noise if so.
 
     No tone is asked: red noise has no line. The best effect for noise that is not red is fitted,
@@ -108,9 +109,7 @@ def reconsider_red_noise(
     Parameters
     ----------
     state
-        The search so far; its noise, and the scan with it, are replaced.
-    effects
-        What may be missing.
+        The search so far, with its scan; that and the noise are replaced.
     level, seed
         The significance level; the seed of the draws that count trials.
     progress
@@ -118,39 +117,38 @@ def reconsider_red_noise(
     """
     share = level * RED_NOISE_SHARE
     progress("testing whether the red noise is a drift or a step")
-    effects = [each for each in effects if each.kind != "unnamed" and not each.spectral]
-    assert state.now is not None
+    assert state.scanned is not None
+    effects = [each for each in state.scanned[-1] if each.kind != "unnamed" and not each.spectral]
     fit, data, noise = settled(state.fit, state.data, state.noise, state.held, red=False)
-    other = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)
+    other = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.scan)
     if other.p_value > level * CATALOGUE_SHARE:
-        return
+        return state
     rivals = refit_leads(fit, data, noise, other, held=state.held, phase_lost=False, most=3)
     if not rivals:
-        return
+        return state
     extended, data, noise = settled(rivals[0].fit, data, noise, state.held)
     gained = state.fit.chi2 + state.noise.cost - extended.chi2 - noise.cost
     by_chance = math.exp(0.5 * min(_charge(state, rivals) - gained, 0.0))
     if by_chance > share:
-        return
+        return state
     fit = refine(state.fit.model, data, noise, state.fit.value, held=state.held)
-    state.fit, state.data, state.noise = fit, data, noise
-    found = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.now)
+    found = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.scan)
     # The same part of the catalogue's share of the level as of this test's share.
     rare = by_chance * CATALOGUE_SHARE / RED_NOISE_SHARE
-    state.now = replace(found, p_value=max(found.p_value, rare))
-    state.first = state.now if not state.steps else state.first
+    now = replace(found, p_value=max(found.p_value, rare))
+    first = state.first if state.steps else now
+    return replace(state, fit=fit, data=data, noise=noise, now=now, first=first)
 
 
-def _charge(state: State, rivals: Sequence[Rival]) -> float:
+def _charge(state: Hypothesis, rivals: Sequence[Rival]) -> float:
     """Return the charge for the effects and shapes that were tried, and for the fitted sizes.
 
     A size is known to one part in g^(1/2) of it, for a gain of g in chi^2 (Laplace). Tones are
     scanned at every second cosine.
     """
-    assert state.now is not None
     effect, gain = rivals[0].lead.effect, max(rivals[0].gain, 1.0)
     by_frequency = Trials(0.5 * len(state.data), 0.0)
-    own = state.now.chance.own.get(effect.key)
+    own = state.scan.chance.own.get(effect.key)
     trials = own or (by_frequency if effect.spectral else Trials(1.0, 0.0))
     tried = trials.number_at(-0.5 * gain) * len(rivals)
     return 2.0 * math.log(tried) + effect.sizes * math.log(gain)

@@ -10,6 +10,7 @@ effect is that of its scan, shapes and sizes, less its prior (`evidence.Rival.ch
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -18,11 +19,18 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, ranked
+from pendpipe.diagnosis.hypothesis import (
+    CHOICE,
+    Hypothesis,
+    Step,
+    is_further,
+    price,
+    price_of_another,
+)
 from pendpipe.diagnosis.location import off_harmonics
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.scores import build_bank
-from pendpipe.diagnosis.state import CHOICE, State, Step, is_further, price, price_of_another
 from pendpipe.diagnosis.task import Task, undrawn
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
@@ -45,23 +53,23 @@ class Proposed(NamedTuple):
     credit: float = 0.0
 
 
-def improve(state: State, progress: Progress, rare: Sequence[Effect] = ()) -> None:
+def improve(state: Hypothesis, progress: Progress, rare: Sequence[Effect] = ()) -> Hypothesis:
     """Make the best move, again and again, until none lowers the score.
 
     `rare` are the names that may take the place of a curve.
     """
     for _ in range(_MOST_MOVES):
-        here = Proposed(state.fit, tuple(state.steps))
+        here = Proposed(state.fit, state.steps)
         there = [*_drops(state), *_curves_for_names(state), *_rare_for_a_curve(state, rare)]
         best = _best(here, there, state)
         if best is here:
-            return
+            return state
         progress(best.words)
-        state.steps[:] = best.steps
-        state.settle(best.fit)
+        state = replace(state, steps=best.steps).settle(best.fit)
+    return state
 
 
-def _best(here: Proposed, there: Sequence[Proposed], state: State) -> Proposed:
+def _best(here: Proposed, there: Sequence[Proposed], state: Hypothesis) -> Proposed:
     """Return the set of the smallest score; `here` if no other is smaller."""
     found = [here, *there]
     best = min(found, key=lambda each: each.fit.chi2)
@@ -69,7 +77,7 @@ def _best(here: Proposed, there: Sequence[Proposed], state: State) -> Proposed:
     return min(found, key=lambda each: scale.lost_by(each.fit, each.credit) + price(each.steps))
 
 
-def _drops(state: State) -> Iterator[Proposed]:
+def _drops(state: Hypothesis) -> Iterator[Proposed]:
     """Drop one effect.
 
     The last one, which was significant, is not dropped where it leaves only noise, unless a fault
@@ -90,7 +98,7 @@ def _drops(state: State) -> Iterator[Proposed]:
             yield Proposed(without, others, f"{effect.name} is no longer needed")
 
 
-def _curves_for_names(state: State) -> Iterator[Proposed]:
+def _curves_for_names(state: Hypothesis) -> Iterator[Proposed]:
     """Put one curve in the place of several names: all, or all but what is sudden or a line.
 
     Where more than noise is left, the name that gains most stays: a curve competes for the rest. A
@@ -128,7 +136,7 @@ def _curves_for_names(state: State) -> Iterator[Proposed]:
         )
 
 
-def _rare_for_a_curve(state: State, rare: Sequence[Effect]) -> Iterator[Proposed]:
+def _rare_for_a_curve(state: Hypothesis, rare: Sequence[Effect]) -> Iterator[Proposed]:
     """Put a rare name, or two, in the place of a curve: a camera is oblique, and has a shutter."""
     for step in [step for step in state.steps if step.winner.drawn]:
         fit = refit_without(state, [step])
@@ -144,7 +152,7 @@ def _rare_for_a_curve(state: State, rare: Sequence[Effect]) -> Iterator[Proposed
             yield Proposed(fit, tuple(steps), f"{names[0].name} in place of {step.winner.name}")
 
 
-def _with_each(bare: Fit, names: Sequence[Effect], state: State) -> list[Fit]:
+def _with_each(bare: Fit, names: Sequence[Effect], state: Hypothesis) -> list[Fit]:
     """Fit each of some names beside the effects of a model that has it not."""
     present = {effect.identifier for effect in bare.model.effects}
     starts = [
@@ -155,7 +163,7 @@ def _with_each(bare: Fit, names: Sequence[Effect], state: State) -> list[Fit]:
     return [fit for pair in starts if (fit := _with(bare, *pair, state))]
 
 
-def refit_without(state: State, steps: Sequence[Step]) -> Fit | None:
+def refit_without(state: Hypothesis, steps: Sequence[Step]) -> Fit | None:
     """Refit the model without some effects, from the present values and from the baseline's.
 
     None where it has no such motion: they are needed.
@@ -163,11 +171,11 @@ def refit_without(state: State, steps: Sequence[Step]) -> Fit | None:
     model, value = state.fit.model, state.fit.value
     for step in steps:
         model, value = model.dropping(step.winner.lead.effect, value)
-    bare = np.concatenate([state.bare, value[len(state.bare) :]])
+    bare = np.concatenate([state.baseline.value, value[state.baseline.model.size :]])
     return best_fit(model, state.data, state.noise, [value, bare], held=state.held)
 
 
-def describe(state: State, p_value: float, task: Task) -> bool:
+def describe(state: Hypothesis, p_value: float, task: Task) -> Hypothesis:
     """Add what describes best what is left, a curve or a rare name, if that lowers the score.
 
     Where nothing but sin x was found in what chance does not explain, the best curve says so.
@@ -175,20 +183,19 @@ def describe(state: State, p_value: float, task: Task) -> bool:
     curves = [(curve, np.zeros(curve.count)) for curve in _curves(state.fit, state, in_time=True)]
     fits = [fit for pair in curves if (fit := _with(state.fit, *pair, state))]
     if not fits:
-        return False
+        return state
     scale = Scale.of(min(fits, key=lambda fit: fit.chi2), state.data, state.noise)
     rivals = ranked([_rival(state.fit, fit, scale) for fit in fits])
     found = [*filter(is_further, state.steps), *state.faults]
     needed = not found and p_value < task.level
     if rivals[0].evidence <= CHOICE and not needed:
-        return False
+        return state
     rivals = prefer_rare(state, rivals, task)
-    state.steps.append(Step(tuple(rivals), p_value, state.fit))
-    state.settle(rivals[0].fit)
-    return True
+    step = Step(tuple(rivals), p_value, state.fit)
+    return replace(state, steps=(*state.steps, step)).settle(rivals[0].fit)
 
 
-def prefer_rare(state: State, rivals: Sequence[Rival], task: Task) -> list[Rival]:
+def prefer_rare(state: Hypothesis, rivals: Sequence[Rival], task: Task) -> list[Rival]:
     """Put a rare name before a leading curve, or a tone at a harmonic, if its score is smaller.
 
     Rare names are not scanned for: they look much like others, which would then be in doubt more
@@ -219,7 +226,7 @@ def _rival(bare: Fit, fit: Fit, scale: Scale) -> Rival:
     return Rival.of(lead, fit, bare.chi2, scale, NO_SCAN)
 
 
-def _curves(bare: Fit, state: State, *, in_time: bool = False) -> list[Curve]:
+def _curves(bare: Fit, state: Hypothesis, *, in_time: bool = False) -> list[Curve]:
     """Return the curves with the coefficients that the recording resolves."""
     curves = undrawn((*CURVES, *FOLLOW_UP_CURVES), bare)
     drawn = [curve for curve in curves if in_time >= curve.in_time]
@@ -227,7 +234,7 @@ def _curves(bare: Fit, state: State, *, in_time: bool = False) -> list[Curve]:
     return [candidate.effect for candidate in seen if isinstance(candidate.effect, Curve)]
 
 
-def _with(bare: Fit, effect: Effect, own: FloatArray, state: State) -> Fit | None:
+def _with(bare: Fit, effect: Effect, own: FloatArray, state: Hypothesis) -> Fit | None:
     model, start = bare.model.adding(effect), np.concatenate([bare.value, own])
     fit = best_fit(model, state.data, state.noise, [start], held=state.held)
     return fit if fit and effect.believable(fit.value[len(bare.value) :]) else None

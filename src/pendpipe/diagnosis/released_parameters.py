@@ -57,9 +57,9 @@ class ReleasedParameter(Effect):
         """Zero: it is one of the baseline's values."""
         return 0
 
-    def without(self, held: Iterable[int]) -> list[int]:
+    def without(self, held: Iterable[int]) -> tuple[int, ...]:
         """Return the indices that stay held (the model itself handles held parts of b)."""
-        return [index for index in held if index != self.index]
+        return tuple(index for index in held if index != self.index)
 
     def sensitivity(self, fit: Fit) -> FloatArray:
         """Derivative of the whitened readings by the parameter, shape (n + 1,)."""

@@ -25,6 +25,7 @@ from pendpipe.diagnosis.forensics.colour import level_note, wander_note
 from pendpipe.diagnosis.forensics.corrections import loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.held_out import held_out
+from pendpipe.diagnosis.hypothesis import Hypothesis
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of
@@ -37,7 +38,7 @@ from pendpipe.diagnosis.result import (
     swinging,
 )
 from pendpipe.diagnosis.scores import whitened
-from pendpipe.diagnosis.search import Search, search
+from pendpipe.diagnosis.search import search
 from pendpipe.diagnosis.statement import statement
 from pendpipe.diagnosis.summary import COLOURED_NOISE, Summary, html_of
 from pendpipe.diagnosis.values import parameters_of
@@ -123,7 +124,7 @@ class Outcome(Answer):
     nothing is missing
     """
 
-    search: Search
+    search: Hypothesis
     beginning: Beginning
 
     def save(
@@ -302,15 +303,15 @@ def diagnose_decay(
     # Of noise below that of rounding nothing is seen.
     seen = not found.data.time_noise and found.noise.rms > rounding
     changing = level_note(found.noise) if seen else None
-    wander = wander_note(found.noise, found.data, found.improved)
+    wander = wander_note(found.noise, found.data, found.fit)
     stamps = tuple(note for note in (gap, *found.clock_notes, changing, wander) if note)
     # With a red light the fit has lost the motion, which the search follows by its phase; and a
     # part of b that is held bounds b here alone.
     stands = fit is not None and fit.light != "red" and not beginning.model.parts
     before = FittedModel.of_fit(fit) if fit and stands else _fitted_model(found.baseline, found)
-    same = found.improved.value is found.baseline.value and found.improved.error_scale == 1.0
+    same = found.fit.value is found.baseline.value and found.fit.error_scale == 1.0
     law = law_of(found, weighed)
-    after = before if same else _fitted_model(found.improved, found, law)
+    after = before if same else _fitted_model(found.fit, found, law)
     drag_form = fit.drag_form if fit and stands else "energy"
     presumed = _presumed(found, drag_form)
     swung = found.baseline.model.restoring
@@ -318,7 +319,7 @@ def diagnose_decay(
     missing = any(effect.identifier != COLOURED_NOISE for effect in effects)
     if missing:
         progress("predicting cycles that are left out of the fit")
-    models = found.baseline, found.improved, found.data, found.noise
+    models = found.baseline, found.fit, found.data, found.noise
     held = held_out(*models, beginning.held, found.held) if missing else None
     swings = _small_swings(law, found)
     diagnosis = Diagnosis(
@@ -356,13 +357,15 @@ def diagnose_decay(
         provenance=dict(provenance or {}),
         fit=fit,
         name=Path(place).name if str(place) != "recording" else "",
-        scanned=tuple((lead.effect.identifier, lead.p_value) for lead in found.detection.leads),
+        scanned=tuple((lead.effect.identifier, lead.p_value) for lead in found.first.leads)
+        if found.first
+        else (),
     )
     return Outcome(diagnosis, found, beginning)
 
 
 def _in_order(
-    found: Search, weighed: Sequence[Weighed], samples: Samples
+    found: Hypothesis, weighed: Sequence[Weighed], samples: Samples
 ) -> tuple[FoundEffect, ...]:
     """List effects and measurement faults in the order in which they were added."""
     effects = [
@@ -375,16 +378,16 @@ def _in_order(
     return tuple(_checked(each, found, samples) for each in order)
 
 
-def _checked(effect: FoundEffect, found: Search, samples: Samples) -> FoundEffect:
+def _checked(effect: FoundEffect, found: Hypothesis, samples: Samples) -> FoundEffect:
     """Test a loss of samples in the readings as they are."""
     if effect.identifier != "dropped-samples" or effect.location.time_s is None:
         return effect
-    when, period_s = effect.location.time_s, found.improved.at.span.period_s
+    when, period_s = effect.location.time_s, found.fit.at.span.period_s
     at = effect.parameters["time"].value if "time" in effect.parameters else when[0]
     return replace(effect, confirmed=loss_confirmed(samples, at, period_s))
 
 
-def _small_swings(law: Fit, found: Search) -> SmallSwings | None:
+def _small_swings(law: Fit, found: Hypothesis) -> SmallSwings | None:
     """Compare the frequency at small amplitudes with the law, where that leaves a misfit."""
     if not remainder_of(law, found.data, found.noise).systematic:
         return None
@@ -411,7 +414,7 @@ def _fit_of(
         return None
 
 
-def _presumed(found: Search, drag_form: str) -> tuple[FoundEffect, ...]:
+def _presumed(found: Hypothesis, drag_form: str) -> tuple[FoundEffect, ...]:
     """List what the baseline has that Eq. 8 has not: sin x, and v|v| where that was fitted."""
     law = found.baseline.at.span.pendulum
     swung = [circular_error] if law.has(circular_error.form) else []
@@ -419,7 +422,7 @@ def _presumed(found: Search, drag_form: str) -> tuple[FoundEffect, ...]:
     return tuple(_as_presumed(each, found) for each in (*swung, *dragged))
 
 
-def _as_presumed(effect: Effect, found: Search) -> FoundEffect:
+def _as_presumed(effect: Effect, found: Hypothesis) -> FoundEffect:
     """Return what an effect of the baseline explains, to first order beside its other numbers."""
     fit = found.baseline
     (column,) = whitened(fit, found.noise, effect, [()])
@@ -444,7 +447,7 @@ def _as_presumed(effect: Effect, found: Search) -> FoundEffect:
     )
 
 
-def _fitted_model(fit: Fit, found: Search, law: Fit | None = None) -> FittedModel:
+def _fitted_model(fit: Fit, found: Hypothesis, law: Fit | None = None) -> FittedModel:
     """Return a fit's residual and parameters; those of its `law` where that is another fit.
 
     Residual, chi^2 and noise are those of a reading.
@@ -462,9 +465,9 @@ def _fitted_model(fit: Fit, found: Search, law: Fit | None = None) -> FittedMode
     )
 
 
-def _with_scatter(found: Search, samples: Samples) -> Search:
+def _with_scatter(found: Hypothesis, samples: Samples) -> Hypothesis:
     """Measure the scatter of the readings that were averaged."""
-    data, fit = found.data, found.improved
+    data, fit = found.data, found.fit
     if data.fold == 1:
         return found
     pieces = fit.model.follow(fit.value)

@@ -1,9 +1,8 @@
 """Add one effect after another, until nothing significant is left."""
 
 from collections.abc import Sequence
-from copy import copy
-from dataclasses import dataclass, replace
-from typing import Any, Final
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -12,19 +11,25 @@ from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.alternatives import prefer_parameters, reconsider_red_noise
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Detection, more_leads, printed
+from pendpipe.diagnosis.detect import CATALOGUE_SHARE, more_leads, printed
 from pendpipe.diagnosis.evidence import Rival, Scale
-from pendpipe.diagnosis.faults import Forensics
+from pendpipe.diagnosis.faults import correct, examine, examine_again, random_torque
 from pendpipe.diagnosis.held_out import predicts_worse
+from pendpipe.diagnosis.hypothesis import (
+    Hypothesis,
+    Step,
+    first_noise,
+    is_gross,
+    loses_phase,
+    price,
+)
 from pendpipe.diagnosis.moves import describe, improve, prefer_rare, refit_without
-from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit, fitted_from
 from pendpipe.diagnosis.refits import refit_leads
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.remainder import Remainder, remainder_of, with_errors
+from pendpipe.diagnosis.remainder import remainder_of, with_errors
 from pendpipe.diagnosis.result import BASELINES
 from pendpipe.diagnosis.second_mode import second_mode_first
-from pendpipe.diagnosis.state import Fault, State, Step, first_noise, is_gross, loses_phase, price
 from pendpipe.diagnosis.task import Task, undrawn
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
@@ -41,54 +46,6 @@ LESS_FRICTION: Final = (1.0, 0.9, 0.7, 0.4)
 """Fractions of the Coulomb friction to try if the baseline stops before the last reading."""
 
 
-@dataclass(frozen=True)
-class Search:
-    """The result of a search.
-
-    Parameters
-    ----------
-    data, noise
-        The readings (with masks) and the final estimate of their noise.
-    baseline
-        The baseline's fit, with that noise.
-    improved
-        The extended model's fit (the baseline's where nothing was found).
-    steps
-        One for each effect.
-    faults
-        Of the measurement, found by their own tests.
-    p_value
-        Global, on the baseline: of the catalogue's largest score, and of the tests.
-    unexplained
-        Global p-value of the final residual.
-    detection
-        The first scan: of the baseline's residual.
-    held
-        Indices of values that are not fitted in the extended model.
-    remainder
-        Misfit of the extended model beyond the noise.
-    named
-        The fit with the named effects only, without the curve for the rest: probabilities of
-        names refer to it.
-    clock_notes
-        What the tests of the time stamps found, a clause each.
-    """
-
-    data: Data
-    noise: Noise
-    baseline: Fit
-    improved: Fit
-    steps: tuple[Step, ...]
-    faults: tuple[Fault, ...]
-    p_value: float
-    unexplained: float
-    detection: Detection
-    held: tuple[int, ...]
-    remainder: Remainder
-    named: Fit
-    clock_notes: tuple[str, ...] = ()
-
-
 def search(
     beginning: Beginning,
     samples: Samples,
@@ -99,7 +56,7 @@ def search(
     seed: int,
     released: Sequence[ReleasedParameter] = (),
     progress: Progress = silent,
-) -> Search:
+) -> Hypothesis:
     """Fit the baseline, and add what improves it most, until chance explains the rest.
 
     Parameters
@@ -127,105 +84,78 @@ def search(
     fit = fitted_from(beginning.model, data, white, beginning.value, held=held)
     if fit is None:
         raise NoMotionError("it stops")
-    state = State(fit, data, white, held, fit.value)
-    state.settle(fit)
-    forensics = Forensics(samples, level)
-    task = Task(catalogue, released, baseline, level, seed, forensics, progress)
-    second_mode_first(beginning, state, task)
-    return grown(state, task, beginning)
+    state = Hypothesis(fit, data, white, beginning.held, fit, samples).settle(fit)
+    task = Task(catalogue, released, baseline, level, seed, progress, samples)
+    return grown(second_mode_first(beginning, state, task), task, beginning)
 
 
-def grown(state: State, task: Task, beginning: Beginning) -> Search:
-    """Add effects to a state, until chance explains the rest."""
-    _grow(state, task)
-    named = _described(state, task)
-    remainder = remainder_of(state.fit, state.data, state.noise)
-    forensics = task.forensics
-    forensics.after(state, task.progress)
-    improved = with_errors(state.fit, state.data, state.noise)
-    assert state.first is not None
-    assert state.now is not None
-    return Search(
-        state.data,
-        state.noise,
-        _baseline_alone(state, beginning),
-        improved,
-        tuple(state.steps),
-        tuple(state.faults),
-        min(state.first.p_value / CATALOGUE_SHARE, forensics.p_value(state.faults), 1.0),
-        min(state.now.p_value / CATALOGUE_SHARE, 1.0),
-        state.first,
-        tuple(state.held),
-        remainder,
-        named or improved,
-        tuple(forensics.clock_notes),
+def grown(state: Hypothesis, task: Task, beginning: Beginning) -> Hypothesis:
+    """Add effects to a hypothesis, until chance explains the rest."""
+    state, named = _described(_grow(state, task), task)
+    state = examine(state, task)
+    return replace(
+        state,
+        fit=with_errors(state.fit, state.data, state.noise),
+        baseline=_baseline_alone(state, beginning),
+        without_curve=named,
     )
 
 
-def _grow(state: State, task: Task) -> None:
+def _grow(state: Hypothesis, task: Task) -> Hypothesis:
     """Add effects until chance explains the rest, then improve the set.
 
     Of two laws that share a misfit neither may pay its price before the other is there. From the
     first that does not pay on, names stand if together they leave noise alone.
     """
-    paid: list[dict[str, Any]] = []
+    paid: Hypothesis | None = None
     while len(state.steps) < _MOST_EFFECTS:
-        task.forensics.before(state, task.progress)
-        before = [_as_it_is(each) for each in (state, task.forensics)]
-        if not _add_one(state, task, names_first=bool(paid)):
+        before = correct(state, task)
+        state = _add_one(before, task, names_first=paid is not None)
+        if len(state.steps) == len(before.steps):
             break
-        if not paid and not _pays(state.steps[-1], state.steps[:-1]):
+        if paid is None and not _pays(state.steps[-1], state.steps[:-1]):
             paid = before
-    _improve(state, task)
+    state = _improve(state, task)
     clean = Scale.of(state.fit, state.data, state.noise).clean
-    if paid and (not clean or any(step.winner.drawn for step in state.steps)):
+    if paid is not None and (not clean or any(step.winner.drawn for step in state.steps)):
         task.progress("more than noise is left: dropping what does not pay its price")
-        for each, was in zip((state, task.forensics), paid, strict=True):
-            vars(each).update(was)
-        _improve(state, task)
+        state = _improve(paid, task)
+    return state
 
 
-def _improve(state: State, task: Task) -> None:
+def _improve(state: Hypothesis, task: Task) -> Hypothesis:
     """Make the moves that lower the score; masked readings may come back with them."""
-    improve(state, task.progress, task.rare(state))
-    if task.forensics.again(state, task.progress):
-        improve(state, task.progress, task.rare(state))
+    better = improve(state, task.progress, task.rare(state))
+    after = examine_again(better, task)
+    if np.any(after.data.weight > better.data.weight):
+        return improve(after, task.progress, task.rare(after))
+    return after
 
 
-def _as_it_is(thing: object) -> dict[str, Any]:
-    """Return its attributes, so that they can be restored."""
-    return {
-        name: copy(value) if isinstance(value, (list, dict)) else value
-        for name, value in vars(thing).items()
-    }
-
-
-def _described(state: State, task: Task) -> Fit | None:
+def _described(state: Hypothesis, task: Task) -> tuple[Hypothesis, Fit | None]:
     """Describe what the names leave by rare names and a curve; return the fit without the curve.
 
     None where there is no curve, or no name beside it.
     """
-    task.scanned(state)
-    remainder = remainder_of(state.fit, state.data, state.noise)
-    while remainder.systematic and not _ends_with_curve(state):
-        assert state.now is not None
+    state = task.scanned(state)
+    while state.remainder.systematic and not _ends_with_curve(state):
         named = with_errors(state.fit, state.data, state.noise)
-        if not describe(state, state.now.p_value / CATALOGUE_SHARE, task):
+        better = describe(state, state.scan.p_value / CATALOGUE_SHARE, task)
+        if better is state:
             break
+        state = task.scanned(better)
         task.progress(f"describing what is left by {state.steps[-1].winner.name}")
-        task.scanned(state)
         if _ends_with_curve(state):
-            return named
-        remainder = remainder_of(state.fit, state.data, state.noise)
+            return state, named
     # A curve that can follow anything would imitate the names.
     last = state.steps[-1].winner.lead.effect if state.steps else None
     if len(state.steps) < 2 or not isinstance(last, Curve) or not last.of_anything:
-        return None
+        return state, None
     without = refit_without(state, state.steps[-1:])
-    return with_errors(without, state.data, state.noise) if without else None
+    return state, with_errors(without, state.data, state.noise) if without else None
 
 
-def _baseline_alone(state: State, beginning: Beginning) -> Fit:
+def _baseline_alone(state: Hypothesis, beginning: Beginning) -> Fit:
     """Refit the baseline with the final noise, at the recorded times."""
     model, data = state.fit.model.bare(), state.data
     # Readings at the end may have been left out meanwhile.
@@ -239,7 +169,7 @@ def _baseline_alone(state: State, beginning: Beginning) -> Fit:
         data = replace(data, time_s=read.time_s, values=read.values, uniform=read.uniform)
     starts = [beginning.value]
     for share in LESS_FRICTION:
-        starts.append(state.bare.copy())
+        starts.append(state.baseline.value.copy())
         starts[-1][C] *= share
     fit = best_fit(model, data, state.noise, starts, held=beginning.held)
     if fit is None:
@@ -247,22 +177,21 @@ def _baseline_alone(state: State, beginning: Beginning) -> Fit:
     return fit
 
 
-def _add_one(state: State, task: Task, *, names_first: bool) -> bool:
-    """Scan the catalogue and add the best effect, or name; return whether one was added."""
+def _add_one(state: Hypothesis, task: Task, *, names_first: bool) -> Hypothesis:
+    """Scan the catalogue and add the best effect, or name."""
     gross, progress = is_gross(state.fit, state.data), task.progress
-    effects = task.scanned(state)
-    assert state.now is not None
-    chance = state.now.p_value > task.threshold
+    state = task.scanned(state)
+    chance = state.scan.p_value > task.threshold
     if state.noise.coloured and not state.noise.known and not gross and (chance or not state.steps):
-        reconsider_red_noise(state, effects, task.level, task.seed, progress)
-    if state.now.p_value > task.threshold or _ends_with_curve(state):
-        return False
-    p_value = state.now.p_value / CATALOGUE_SHARE
+        state = reconsider_red_noise(state, task.level, task.seed, progress)
+    if state.scan.p_value > task.threshold or _ends_with_curve(state):
+        return state
+    p_value = state.scan.p_value / CATALOGUE_SHARE
     progress(f"chance does not explain the residual ({printed(p_value)}): refitting leads")
     rare = [effect for effect in task.rare(state) if effect.rare]
     unscanned = [*undrawn(FOLLOW_UP_CURVES, state.fit), *rare]
     closer = more_leads(state.fit, state.noise, unscanned)
-    found = replace(state.now, leads=(*state.now.leads, *closer))
+    found = replace(state.scan, leads=(*state.scan.leads, *closer))
     rivals = refit_leads(
         state.fit,
         state.data,
@@ -279,27 +208,28 @@ def _add_one(state: State, task: Task, *, names_first: bool) -> bool:
         rivals.sort(key=lambda rival: rival.drawn)
     if rivals:
         rivals = prefer_rare(state, rivals, task)
-    if not rivals or (not gross and task.forensics.kicked_at_random(state, rivals[0], progress)):
-        return False
+    if not rivals:
+        return state
+    if not gross and (kicked := random_torque(state, rivals[0], task)):
+        return kicked
     step = _first_that_predicts(state, rivals, p_value, progress) or _on_trial(
         Step(tuple(rivals), p_value, state.fit), state
     )
     if step is None:
-        return False
+        return state
     winner = step.winner
     released = winner.lead.effect
+    held = state.held
     if isinstance(released, ReleasedParameter):
-        state.held = released.without(state.held)
+        held = released.without(held)
     unit, fits = state.data.unit, (state.fit, winner.fit)
     before, after = (compact(_rms(fit, state.data), unit) for fit in fits)
     progress(f"adding {winner.name}: the residual falls from {before} to {after} rms")
-    state.steps.append(step)
-    state.settle(winner.fit)
-    return True
+    return replace(state, held=held, steps=(*state.steps, step)).settle(winner.fit)
 
 
 def _first_that_predicts(
-    state: State, rivals: Sequence[Rival], p_value: float, progress: Progress
+    state: Hypothesis, rivals: Sequence[Rival], p_value: float, progress: Progress
 ) -> Step | None:
     """Return the best effect that pays its price and predicts cycles left out no worse.
 
@@ -321,7 +251,7 @@ def _first_that_predicts(
     return None
 
 
-def _on_trial(step: Step, state: State) -> Step | None:
+def _on_trial(step: Step, state: Hypothesis) -> Step | None:
     """Return a name that does not pay its price alone, but takes a good part of a misfit."""
     best = step.winner
     before, left = (remainder_of(fit, state.data, state.noise) for fit in (state.fit, best.fit))
@@ -340,6 +270,6 @@ def _rms(fit: Fit, data: Data) -> float:
     return float(np.sqrt(np.mean(residual**2)))
 
 
-def _ends_with_curve(state: State) -> bool:
+def _ends_with_curve(state: Hypothesis) -> bool:
     """Whether the last effect is a curve without a name: no name is added after it."""
     return bool(state.steps) and state.steps[-1].winner.lead.effect.kind == "unnamed"

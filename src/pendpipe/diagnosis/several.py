@@ -24,8 +24,8 @@ from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.evidence import Scale
-from pendpipe.diagnosis.faults import Forensics
 from pendpipe.diagnosis.held_out import held_out
+from pendpipe.diagnosis.hypothesis import Hypothesis, Step, loses_phase, price
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
@@ -38,8 +38,7 @@ from pendpipe.diagnosis.result import (
     swinging,
 )
 from pendpipe.diagnosis.run import LEVEL, Answer, Outcome, diagnose_recording
-from pendpipe.diagnosis.search import LESS_FRICTION, Search, grown
-from pendpipe.diagnosis.state import State, Step, loses_phase, price
+from pendpipe.diagnosis.search import LESS_FRICTION, grown
 from pendpipe.diagnosis.statement import DOUBTFUL, listed, statement
 from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.diagnosis.task import Task
@@ -165,7 +164,7 @@ def diagnose_several(
         remedy = "diagnose them one by one"
         raise NotAnalysableError("diagnose", f"no model follows all ({error})", remedy) from error
     law = with_other_descriptions(law_of(found, weighed), found, weighed)
-    after = _Answer(found, found.improved, law, outcomes, names, own)
+    after = _Answer(found, found.fit, law, outcomes, names, own)
     before = replace(after, improved=found.baseline, law=found.baseline)
     named, differing = [], []
     for step, each in zip(found.steps, weighed, strict=True):
@@ -197,7 +196,7 @@ def diagnose_several(
     missing = any(not (each.presumed or each.identifier == COLOURED_NOISE) for each in effects)
     noise_rms = _rms([outcome.diagnosis.noise_rms_rad for outcome in outcomes])
     held = (
-        held_out(found.baseline, found.improved, found.data, found.noise, found.held, found.held)
+        held_out(found.baseline, found.fit, found.data, found.noise, found.held, found.held)
         if named
         else None
     )
@@ -241,31 +240,6 @@ def diagnose_several(
         name=f"{listed(names)} together",
     )
     return JointOutcome(diagnosis, told, tuple(outcomes))
-
-
-class _TestedAlone(Forensics):
-    """The tests of the measurement: they are made on each recording alone."""
-
-    def __init__(self) -> None:
-        self.clock_notes = []
-
-    def p_value(self, *_: object) -> float:
-        """One: nothing was tested."""
-        return 1.0
-
-    def before(self, *_: object) -> None:
-        """Nothing is corrected."""
-
-    def after(self, *_: object) -> None:
-        """Nothing is tested."""
-
-    def again(self, *_: object) -> bool:
-        """Nothing was masked."""
-        return False
-
-    def kicked_at_random(self, *_: object) -> bool:
-        """Random kicks are no law."""
-        return False
 
 
 @dataclass(frozen=True)
@@ -386,8 +360,8 @@ def search_together(
     same_sensor: bool,
     own: Sequence[str],
     progress: Progress,
-) -> tuple[Search, tuple[Weighed, ...]]:
-    """Search for what all recordings lack, or do not share, and weigh it.
+) -> tuple[Hypothesis, tuple[Weighed, ...]]:
+    """Hypothesis for what all recordings lack, or do not share, and weigh it.
 
     Parameters
     ----------
@@ -430,10 +404,9 @@ def search_together(
         if name not in own
         for number in range(len(searches) == 2, len(searches))
     ]
-    task = Task(CATALOGUE, differing, baseline, level, seed, _TestedAlone(), progress)
-    state = State(fit, data, noise, held, fit.value)
-    state.settle(fit)
-    _known_first(state, task, searches)
+    task = Task(CATALOGUE, differing, baseline, level, seed, progress)
+    state = Hypothesis(fit, data, noise, tuple(held), fit).settle(fit)
+    state = _known_first(state, task, searches)
     return swap_in_likelier(grown(state, task, beginning), beginning, progress)
 
 
@@ -450,7 +423,7 @@ def _member(outcome: Outcome) -> Model:
         if laws.intersection(dict(e.indistinguishable))
     }
     model = found.baseline.model.bare().at_times(found.data.time_s)
-    for effect in found.improved.model.effects:
+    for effect in found.fit.model.effects:
         if happened(effect) and effect.identifier not in doubted:
             model = model.adding(effect)
     return model
@@ -462,17 +435,17 @@ def happened(effect: Effect) -> bool:
     return effect.local or effect.spectral or wanders
 
 
-def _of_baseline(found: Search) -> list[int]:
+def _of_baseline(found: Hypothesis) -> list[int]:
     return [index for index in found.held if index < len(BASELINE)]
 
 
-def _misfit(found: Search) -> float:
+def _misfit(found: Hypothesis) -> float:
     """Return the factor by which the misfit that a recording's own law leaves widens its errors.
 
     A curve of the motion against the time is no law: what it describes is a misfit too.
     """
-    drawn = [effect for effect in found.improved.model.effects if effect.in_time]
-    law = found.improved if all(map(happened, drawn)) else found.named
+    drawn = [effect for effect in found.fit.model.effects if effect.in_time]
+    law = found.fit if all(map(happened, drawn)) else found.named
     return remainder_of(law, found.data, found.noise).error_scale
 
 
@@ -480,13 +453,13 @@ def _fitted(
     model: Stack,
     data: Data,
     noise: Noise,
-    searches: Sequence[Search],
+    searches: Sequence[Hypothesis],
     held: Sequence[int],
 ) -> Fit | None:
     """Fit each recording by itself, then all from there."""
     sizes = [
         {effect.key: fit.value[place] for effect, place in fit.model.places()}
-        for fit in (found.improved for found in searches)
+        for fit in (found.fit for found in searches)
     ]
     fits = []
     of_each = zip(model.members, model.mixings(), searches, sizes, strict=True)
@@ -494,7 +467,7 @@ def _fitted(
         known = ChainMap(own, *sizes)
         starts = [
             np.concatenate([base.value[: len(BASELINE)], *(known[e.key] for e in member.effects)])
-            for base in (found.improved, found.baseline)
+            for base in (found.fit, found.baseline)
         ]
         # What another recording shows may stop the motion in this one.
         starts.append(starts[1].copy())
@@ -517,18 +490,18 @@ def _fitted(
     return best_fit(model, data, noise, starts, held=held)
 
 
-def _known_first(state: State, task: Task, searches: Sequence[Search]) -> None:
+def _known_first(state: Hypothesis, task: Task, searches: Sequence[Hypothesis]) -> Hypothesis:
     """Begin with the names that the recordings have alone, where Eq. 8 loses the motion."""
     named: dict[str, list[Step]] = {}
     for found in searches:
         for step in found.steps:
             named.setdefault(step.winner.lead.effect.key, []).append(step)
     if loses_phase(state.fit):
-        task.scanned(state)
+        state = task.scanned(state)
     order = sorted(named.values(), key=lambda steps: -sum(step.winner.gain for step in steps))
     for steps in order:
         if not loses_phase(state.fit) or len(state.steps) == _MOST_EFFECTS:
-            return
+            return state
         model, before = state.fit.model, state.fit
         assert isinstance(model, Stack)
         step = max(steps, key=lambda each: each.winner.gain)
@@ -551,15 +524,15 @@ def _known_first(state: State, task: Task, searches: Sequence[Search]) -> None:
         if winner.worth < price([*state.steps, added]) - price(state.steps):
             continue
         task.progress(f"beginning with {winner.name}")
-        state.steps.append(added)
-        state.settle(fit)
+        state = replace(state, steps=(*state.steps, added)).settle(fit)
+    return state
 
 
 @dataclass(frozen=True)
 class _Answer:
     """What a fit of all recordings says of each."""
 
-    found: Search
+    found: Hypothesis
     improved: Fit
     law: Fit
     outcomes: Sequence[Outcome]

@@ -3,13 +3,13 @@
 import operator
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.detect import CATALOGUE_SHARE, detect, prepare
-from pendpipe.diagnosis.faults import Forensics
+from pendpipe.diagnosis.hypothesis import Hypothesis
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.state import State
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.reading import SoftClipping
 from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN, circular_error
@@ -68,10 +68,10 @@ class Task:
         The effects that may be missing, and the held parameters that may be wrong.
     baseline, level, seed
         As in `search`.
-    forensics
-        The tests of the measurement.
     progress
         Receives one line for each step.
+    samples
+        The readings as they were recorded; None where the measurement is not tested.
     """
 
     catalogue: Sequence[Effect]
@@ -79,30 +79,28 @@ class Task:
     baseline: str
     level: float
     seed: int
-    forensics: Forensics
     progress: Progress
+    samples: Samples | None = None
 
     @property
     def threshold(self) -> float:
         """The catalogue's part of the significance level."""
         return self.level * CATALOGUE_SHARE
 
-    def rare(self, state: State) -> list[Effect]:
+    def rare(self, state: Hypothesis) -> list[Effect]:
         """Return the names that are asked where a curve would be added."""
         return applicable(self.catalogue, state.fit, self.baseline, state.data.unit, rare=True)
 
-    def scanned(self, state: State) -> list[Effect]:
-        """Score all that may be missing on a state's residual (into `state.now`), once."""
+    def scanned(self, state: Hypothesis) -> Hypothesis:
+        """Score all that may be missing on a hypothesis's residual (into `now`), once."""
         asked = state.fit, state.data, state.noise
         if state.scanned is not None and all(map(operator.is_, asked, state.scanned)):
-            return state.scanned[-1]
+            return state
         effects = [
             *applicable(self.catalogue, state.fit, self.baseline, state.data.unit),
             *(entry for entry in self.released if entry not in state.fit.model.effects),
         ]
         self.progress(f"scanning {len(effects)} effects")
         scanner = prepare(state.fit, state.data, state.noise, effects)
-        state.now = detect(scanner, state.fit, seed=self.seed, known=state.now)
-        state.first = state.first or state.now
-        state.scanned = (*asked, effects)
-        return effects
+        now = detect(scanner, state.fit, seed=self.seed, known=state.now)
+        return replace(state, now=now, first=state.first or now, scanned=(*asked, effects))

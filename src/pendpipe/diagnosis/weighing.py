@@ -14,15 +14,14 @@ from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.evidence import Rival, Scale, class_width, of_one_class, probabilities
 from pendpipe.diagnosis.faults import RANDOM
 from pendpipe.diagnosis.gauss_newton import SETTLED
+from pendpipe.diagnosis.hypothesis import Fault, Hypothesis, Step, is_further, is_gross
 from pendpipe.diagnosis.instants import with_instants
 from pendpipe.diagnosis.location import locate, near_harmonic_by_chance, off_harmonics
 from pendpipe.diagnosis.refine import Fit, best_fit, misfit
 from pendpipe.diagnosis.refits import NEAR, useful_chi2
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.remainder import remainder_of, with_errors
+from pendpipe.diagnosis.remainder import with_errors
 from pendpipe.diagnosis.result import FoundEffect
-from pendpipe.diagnosis.search import Search
-from pendpipe.diagnosis.state import Fault, Step, is_further, is_gross
 from pendpipe.diagnosis.values import curve_values, effect_parameters
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
@@ -71,12 +70,12 @@ class Weighed(NamedTuple):
     rivals: tuple[Rival, ...]
 
 
-def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
+def weigh(found: Hypothesis, beginning: Beginning, step: Step) -> Weighed:
     """Compare one effect with its rivals, beside all other effects."""
     effect = step.winner.lead.effect
     found = beside(found, effect)
     without, rivals = _rivalry(found, beginning, step)
-    gain = without.chi2 - found.improved.chi2
+    gain = without.chi2 - found.fit.chi2
     own = next((rival for rival in rivals if rival.lead.effect.key == effect.key), step.winner)
     others = [rival for rival in rivals if rival.identifier != effect.identifier]
     mates = _best_of_each([mate for mate in others if of_one_class(own, mate)])
@@ -87,49 +86,48 @@ def weigh(found: Search, beginning: Beginning, step: Step) -> Weighed:
     if effect.kind != "unnamed":
         none += _charge_for_several(found)
     # Any law of the motion that nobody knows makes lines at its harmonics.
-    none -= 2.0 * math.log(near_harmonic_by_chance(found.improved, effect))
+    none -= 2.0 * math.log(near_harmonic_by_chance(found.fit, effect))
     weights = probabilities([own, *mates], none)
     # What every pendulum has, and a line off the harmonics, no misfit can be mistaken for.
-    if not (effect.expected or off_harmonics(found.improved, effect)):
+    if not (effect.expected or off_harmonics(found.fit, effect)):
         weights = weights * _explained(found, effect, gain)
     return Weighed(without, gain, tuple(mates), weights, tuple(rivals))
 
 
-def beside(found: Search, effect: Effect) -> Search:
+def beside(found: Hypothesis, effect: Effect) -> Hypothesis:
     """Return the search in which an effect is assessed: without a curve, unless it is one."""
     if effect.kind == "unnamed":
         return found
     # A curve added to the named effects could imitate any of them.
-    left = remainder_of(found.named, found.data, found.noise)
-    return replace(found, improved=found.named, remainder=left)
+    return replace(found, fit=found.named)
 
 
-def law_of(found: Search, weighed: Sequence[Weighed]) -> Fit:
+def law_of(found: Hypothesis, weighed: Sequence[Weighed]) -> Fit:
     """Return the fit with the names that are more probable, with their rivals, than not.
 
     A curve without a name, or a doubtful name, would take from the values of a, b and c.
     """
-    model, value = found.improved.model, found.improved.value
+    model, value = found.fit.model, found.fit.value
     for step, each in zip(found.steps, weighed, strict=True):
         if step.winner.drawn or float(np.sum(each.weights[:-1])) < 0.5:
             model, value = model.dropping(step.winner.lead.effect, value)
-    if model is found.improved.model:
-        return found.improved
+    if model is found.fit.model:
+        return found.fit
     bare = np.concatenate([found.baseline.value, value[found.baseline.model.size :]])
     starts = [value, bare]
     if len(found.named.value) == len(value):
         starts.append(found.named.value)
-    fit = best_fit(model, found.data, found.noise, starts, held=found.held) or found.improved
+    fit = best_fit(model, found.data, found.noise, starts, held=found.held) or found.fit
     return with_errors(fit, found.data, found.noise)
 
 
-def with_other_descriptions(law: Fit, found: Search, weighed: Sequence[Weighed]) -> Fit:
+def with_other_descriptions(law: Fit, found: Hypothesis, weighed: Sequence[Weighed]) -> Fit:
     """Count in the variance of a law's first values what they would be with other effects.
 
     With what was left out of the law, and with each rival, as much as it is probable.
     """
     size = found.baseline.model.size
-    own = found.improved.value[:size]
+    own = found.fit.value[:size]
     variance = (law.value[:size] - own) ** 2
     for each in weighed:
         for mate, weight in zip(each.mates, each.weights[1:], strict=False):
@@ -137,7 +135,7 @@ def with_other_descriptions(law: Fit, found: Search, weighed: Sequence[Weighed])
     return replace(law, variance=variance)
 
 
-def effect_named(found: Search, step: Step, weighed: Weighed) -> FoundEffect:
+def effect_named(found: Hypothesis, step: Step, weighed: Weighed) -> FoundEffect:
     """Return one effect with its final values, probability and location."""
     effect = step.winner.lead.effect
     found = beside(found, effect)
@@ -148,11 +146,11 @@ def effect_named(found: Search, step: Step, weighed: Weighed) -> FoundEffect:
         effect.kind,
         effect.equation,
         with_instants(
-            effect_parameters(found.improved, effect, found.data.unit),
+            effect_parameters(found.fit, effect, found.data.unit),
             effect,
             without,
             found.noise,
-            found.improved.error_scale,
+            found.fit.error_scale,
         ),
         gain,
         step.p_value,
@@ -163,10 +161,8 @@ def effect_named(found: Search, step: Step, weighed: Weighed) -> FoundEffect:
             if weight > _LISTED_FROM or not mate.drawn
         ),
         effect.discriminating_test,
-        locate(without, found.improved, found.data, effect),
-        curve_values(found.improved, effect, found.data.unit)
-        if isinstance(effect, Curve)
-        else None,
+        locate(without, found.fit, found.data, effect),
+        curve_values(found.fit, effect, found.data.unit) if isinstance(effect, Curve) else None,
     )
 
 
@@ -178,7 +174,7 @@ def _best_of_each(rivals: Sequence[Rival]) -> list[Rival]:
     return list(best.values())
 
 
-def _explained(found: Search, effect: Effect, gain: float) -> float:
+def _explained(found: Hypothesis, effect: Effect, gain: float) -> float:
     """Return the part of the misfit that an effect explains, an upper limit of its probability.
 
     What an unnamed curve describes beside it is not explained.
@@ -190,7 +186,7 @@ def _explained(found: Search, effect: Effect, gain: float) -> float:
     return max(gain, 0.0) / max(max(gain, 0.0) + open_still, 1.0)
 
 
-def fault_named(found: Search, fault: Fault, weighed: Sequence[Weighed]) -> FoundEffect:
+def fault_named(found: Hypothesis, fault: Fault, weighed: Sequence[Weighed]) -> FoundEffect:
     """Return a fault of the measurement found by its own test.
 
     A random cause takes what a wrong name leaves: it is no more probable than each name beside it,
@@ -228,12 +224,12 @@ def fault_named(found: Search, fault: Fault, weighed: Sequence[Weighed]) -> Foun
     )
 
 
-def _clean_charge(found: Search) -> float:
+def _clean_charge(found: Hypothesis) -> float:
     """Return the charge against "none of these" if the model leaves only noise."""
     return _CLEAN_CHARGE if found.unexplained > 0.01 else 0.0
 
 
-def _charge_for_several(found: Search) -> float:
+def _charge_for_several(found: Hypothesis) -> float:
     """Return the charge for "none of these" of several names.
 
     Together they leave only noise more easily than one does by itself.
@@ -244,25 +240,25 @@ def _charge_for_several(found: Search) -> float:
     return _OF_A_FURTHER_NAME * max(names - alone, 0)
 
 
-def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequence[Rival]]:
+def _rivalry(found: Hypothesis, beginning: Beginning, step: Step) -> tuple[Fit, Sequence[Rival]]:
     """Return the fit without one effect, and the rivals that could replace it."""
     effect = step.winner.lead.effect
     held = list(found.held)
-    model, value = found.improved.model.dropping(effect, found.improved.value)
+    model, value = found.fit.model.dropping(effect, found.fit.value)
     if isinstance(effect, ReleasedParameter) and effect.index is not None:
         held.append(effect.index)
         value[effect.index] = beginning.value[effect.index]
     bare = np.concatenate([found.baseline.value, value[found.baseline.model.size :]])
     starts = [value, bare, step.before.value]
     without = best_fit(model, found.data, found.noise, starts, held=held) or step.before
-    gain = without.chi2 - found.improved.chi2
+    gain = without.chi2 - found.fit.chi2
     same = abs(gain - step.winner.gain) < _SAME_GAIN * gain
     if len(found.steps) == 1 and same and not is_gross(without, found.data):
         return without, step.rivals
     # Refit what was behind in the search, but not far: noise and other effects have changed.
     hopeless = step.winner.evidence - 2.0 * (class_width(step.winner) + NEAR)
-    scale = Scale.of(found.improved, found.data, found.noise)
-    useful = useful_chi2(found.improved.chi2, gain, drawn=step.winner.drawn)
+    scale = Scale.of(found.fit, found.data, found.noise)
+    useful = useful_chi2(found.fit.chi2, gain, drawn=step.winner.drawn)
     if found.remainder.systematic:
         useful = scale.within(NEAR)
     fits = []
@@ -273,14 +269,14 @@ def _rivalry(found: Search, beginning: Beginning, step: Step) -> tuple[Fit, Sequ
         own = rival.lead.effect.key == effect.key
         if not (own or rival.lead.effect.expected) and rival.evidence < hopeless:
             continue
-        fit = found.improved if own else refitted(without, found, held, rival, useful)
+        fit = found.fit if own else refitted(without, found, held, rival, useful)
         if fit is not None:
             fits.append((rival, fit))
     return without, [rival.again(fit, without.chi2, scale) for rival, fit in fits]
 
 
 def refitted(
-    without: Fit, found: Search, held: Sequence[int], rival: Rival, useful: float = math.inf
+    without: Fit, found: Hypothesis, held: Sequence[int], rival: Rival, useful: float = math.inf
 ) -> Fit | None:
     """Refit a rival in the final model, from its earlier result, as far as it is useful."""
     effect = rival.lead.effect
@@ -297,7 +293,7 @@ def refitted(
     return best_fit(model, found.data, found.noise, starts, held=held, useful=useful)
 
 
-def _is_of(fit: Fit, without: Fit, effect: Effect, found: Search) -> bool:
+def _is_of(fit: Fit, without: Fit, effect: Effect, found: Hypothesis) -> bool:
     """Whether a fit is that of an effect beside those of another, on the same readings."""
     keys = [each.key for each in (*without.model.effects, effect)]
     if [each.key for each in fit.model.effects] != keys:
@@ -311,8 +307,8 @@ def _is_of(fit: Fit, without: Fit, effect: Effect, found: Search) -> bool:
 
 
 def swap_in_likelier(
-    found: Search, beginning: Beginning, progress: Progress = silent
-) -> tuple[Search, tuple[Weighed, ...]]:
+    found: Hypothesis, beginning: Beginning, progress: Progress = silent
+) -> tuple[Hypothesis, tuple[Weighed, ...]]:
     """Replace each added effect by a likelier rival, if there is one, and weigh all steps.
 
     The last goes first. After a replacement all are weighed anew: what each was compared beside has
@@ -324,16 +320,16 @@ def swap_in_likelier(
 
     Returns
     -------
-    Search
+    Hypothesis
         With the swaps made.
     tuple of Weighed
         One for each of its steps.
     """
     # Names under a curve stay: their probabilities show how little they explain.
-    may_change = found.named.model is found.improved.model
+    may_change = found.named.model is found.fit.model
     tried: list[set[str]] = []
     while True:
-        tried.append({effect.key for effect in found.improved.model.effects})
+        tried.append({effect.key for effect in found.fit.model.effects})
         weighed: list[Weighed] = []
         for number in reversed(range(len(found.steps))):
             weighed.append(weigh(found, beginning, found.steps[number]))
@@ -347,19 +343,19 @@ def swap_in_likelier(
 
 
 def _with_a_likelier(
-    found: Search, number: int, weighed: Weighed, tried: Sequence[set[str]]
-) -> Search | None:
+    found: Hypothesis, number: int, weighed: Weighed, tried: Sequence[set[str]]
+) -> Hypothesis | None:
     """Exchange a step's winner for a likelier rival, if there is one, and the set is new."""
     best = _likelier(found, found.steps[number], weighed)
     after = _exchanged(found, number, best, weighed) if best else None
-    if after and {effect.key for effect in after.improved.model.effects} not in tried:
+    if after and {effect.key for effect in after.fit.model.effects} not in tried:
         return after
     return None
 
 
-def _likelier(found: Search, step: Step, weighed: Weighed) -> Rival | None:
+def _likelier(found: Hypothesis, step: Step, weighed: Weighed) -> Rival | None:
     """Return the likelier rival that may replace a step's winner."""
-    present = {effect.key for effect in found.improved.model.effects}
+    present = {effect.key for effect in found.fit.model.effects}
     own = step.winner
     if own.lead.effect.parameter_free and _has_curve(found.steps, step):
         return None  # the curve follows what differs from it
@@ -379,7 +375,7 @@ def _has_curve(steps: Sequence[Step], but: Step) -> bool:
     return any(step.winner.drawn for step in steps if step is not but)
 
 
-def _exchanged(found: Search, number: int, best: Rival, weighed: Weighed) -> Search | None:
+def _exchanged(found: Hypothesis, number: int, best: Rival, weighed: Weighed) -> Hypothesis | None:
     """Replace a step's winner by a rival; None where the model has no such motion."""
     step, effect = found.steps[number], best.lead.effect
     own, held = step.winner.lead.effect, set(found.held)
@@ -394,11 +390,10 @@ def _exchanged(found: Search, number: int, best: Rival, weighed: Weighed) -> Sea
     fit = with_errors(fit, found.data, found.noise)
     return replace(
         found,
-        improved=fit,
+        fit=fit,
         steps=_reordered(found.steps, number, effect, weighed),
-        remainder=remainder_of(fit, found.data, found.noise),
         held=tuple(sorted(held)),
-        named=fit,
+        without_curve=None,
     )
 
 

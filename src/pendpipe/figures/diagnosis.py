@@ -127,7 +127,7 @@ class Shown:
 def shown(outcome: Outcome) -> Shown:
     """Take from an outcome what is drawn."""
     found = outcome.search
-    extended = found.improved if outcome.diagnosis.missing else None
+    extended = found.fit if outcome.diagnosis.missing else None
     return Shown(outcome.diagnosis, found.data, found.noise, found.baseline, extended)
 
 

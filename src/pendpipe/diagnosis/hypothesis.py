@@ -1,22 +1,27 @@
-"""The state of a search, and the joint estimate of a fit and its noise."""
+"""A hypothesis: a set of effects with its fit, its noise, and the faults of the measurement."""
 
-from collections.abc import Sequence
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 
-from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.analysis.turning_points.measure import Samples
+from pendpipe.arrays import BoolArray
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data, with_lattice
-from pendpipe.diagnosis.detect import Detection
+from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Detection
 from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise
 from pendpipe.diagnosis.refine import LARGE_PHASE_ERROR, Fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.remainder import INCOMPLETE
+from pendpipe.diagnosis.remainder import INCOMPLETE, Remainder, remainder_of
 from pendpipe.diagnosis.result import Finding
+from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
 
@@ -90,40 +95,94 @@ class Fault:
     mask: BoolArray | None = None
 
 
-@dataclass
-class State:
-    """The state of a search.
+@dataclass(frozen=True)
+class Hypothesis:
+    """What may be true of a recording; a search goes from one to the next.
 
     Parameters
     ----------
     fit, data, noise
-        The present model, the readings (masked, with corrected times), and their noise.
+        The model, the readings (masked, with corrected times), and their noise.
     held
         Indices of values that are not fitted.
-    bare
-        The values of the baseline fitted alone.
+    baseline
+        The baseline fitted alone; once the search is over, with the final noise.
+    samples
+        The readings as recorded, less what was corrected; None where they are not tested.
+    steps
+        One for each effect.
+    faults
+        Of the measurement, found by their own tests.
+    quiet
+        By name, the p-values of the tests that found nothing.
+    squares
+        By name of a slip, the sum of squares at which none was found.
+    clock_notes
+        What the tests of the time stamps found, a clause each.
+    first, now
+        The scans of the baseline's residual and of the present one.
     scanned
-        Fit, data and noise of the last scan (`now`), and the effects that it asked.
+        Fit, data and noise of the last scan, and the effects that it asked.
+    without_curve
+        The fit with the named effects only: probabilities of names refer to it. None where that
+        is `fit` itself.
     """
 
     fit: Fit
     data: Data
     noise: Noise
-    held: list[int]
-    bare: FloatArray
-    steps: list[Step] = field(default_factory=list)
-    faults: list[Fault] = field(default_factory=list)
+    held: tuple[int, ...]
+    baseline: Fit
+    samples: Samples | None = None
+    steps: tuple[Step, ...] = ()
+    faults: tuple[Fault, ...] = ()
+    quiet: Mapping[str, float] = field(default_factory=dict)
+    squares: Mapping[str, float] = field(default_factory=dict)
+    clock_notes: tuple[str, ...] = ()
     first: Detection | None = None
     now: Detection | None = None
     scanned: tuple[Fit, Data, Noise, list[Effect]] | None = None
+    without_curve: Fit | None = None
 
-    def settle(self, fit: Fit, data: Data | None = None, noise: Noise | None = None) -> None:
-        """Accept a new fit, and estimate the noise from it."""
+    def settle(self, fit: Fit, data: Data | None = None, noise: Noise | None = None) -> Hypothesis:
+        """Return the hypothesis with a new fit, and the noise estimated from it."""
         data, noise = data or self.data, noise or self.noise
         fit = with_better_instants(fit, data, noise, self.held)
-        self.fit, self.data, self.noise = settled(fit, data, noise, self.held)
-        if not fit.model.effects:
-            self.bare = self.fit.value
+        fit, data, noise = settled(fit, data, noise, self.held)
+        baseline = self.baseline if fit.model.effects else fit
+        return replace(self, fit=fit, data=data, noise=noise, baseline=baseline)
+
+    @property
+    def scan(self) -> Detection:
+        """The last scan."""
+        assert self.now is not None
+        return self.now
+
+    @property
+    def named(self) -> Fit:
+        """The fit with the named effects only."""
+        return self.without_curve or self.fit
+
+    @cached_property
+    def remainder(self) -> Remainder:
+        """Misfit of the model beyond the noise."""
+        return remainder_of(self.fit, self.data, self.noise)
+
+    @property
+    def p_value(self) -> float:
+        """Global, on the baseline: of the catalogue's largest score, and of the tests.
+
+        Properties of the record that do no harm (a coarse step at large amplitude) don't count,
+        nor does the colour of its noise.
+        """
+        assert self.first is not None
+        faults = [each.p_value for each in self.faults if each.finding.identifier != COLOURED_NOISE]
+        return min(self.first.p_value / CATALOGUE_SHARE, *self.quiet.values(), *faults, 1.0)
+
+    @property
+    def unexplained(self) -> float:
+        """Global p-value of the residual."""
+        return min(self.scan.p_value / CATALOGUE_SHARE, 1.0)
 
 
 def is_gross(fit: Fit, data: Data) -> bool:
