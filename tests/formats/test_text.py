@@ -314,3 +314,14 @@ def test_a_missing_file_and_a_wrong_column_are_said(tmp_path: Path) -> None:
         read(path, ReadOptions(column="phi"))
     with pytest.raises(InputError, match="there is no sample between"):
         read(path, ReadOptions(start_s=100.0))
+
+
+def test_a_zero_before_every_number_is_whole_or_its_own_column(tmp_path: Path) -> None:
+    """``12,0,37856`` is two numbers or three: refused with both, and settled by --decimal."""
+    size = 0.38 + 0.08 * np.cos(0.3 * np.arange(400))
+    path = tmp_path / "a.txt"
+    path.write_text("".join(f"{20 * n},{x:.5f}\n".replace(".", ",") for n, x in enumerate(size)))
+    with pytest.raises(InputError, match=r"'0 \| 0 \| 46000' or '0 \| 0.46000'; give --decimal"):
+        read(path)
+    np.testing.assert_allclose(read(path, ReadOptions(decimal=",")).values, size, atol=1e-5)
+    np.testing.assert_allclose(read(path, ReadOptions(decimal=".")).values, 1e5 * size, atol=1.0)

@@ -178,11 +178,12 @@ def layouts(lines: Sequence[str], options: ReadOptions, *, strict: bool = True) 
     sample = _some(lines) or _some([line for line in lines if not is_comment(line)])
     # "0,025","0,5": the same sign twice, separated by the quotes alone.
     quoted = any('"' in line for line in sample)
+    decimals = _wanted("--decimal", options.decimal, _DECIMALS, ".,", r"[.,]")
     candidates = [
-        Layout(delimiter, decimal)
+        # Commas between cells and in them: pieces that are joined later.
+        Layout(delimiter, decimal if delimiter != decimal or quoted else ".")
         for delimiter in _wanted("--delimiter", options.delimiter, _NAMES, "\t;|, ", r"[^\w.+\"-]")
-        for decimal in _wanted("--decimal", options.decimal, _DECIMALS, ".,", r"[.,]")
-        if delimiter != decimal or (quoted and delimiter == ",")
+        for decimal in (decimals if delimiter != "," or quoted else decimals[:1])
     ]
     scored = [(_score(sample, layout, strict=strict), layout) for layout in candidates]
     kept = [(score[:2], replace(of, width=score[2])) for score, of in scored if score[0] > 0.0]
@@ -266,7 +267,9 @@ def first_row(lines: Sequence[str], layout: Layout) -> int | None:
     return first
 
 
-def joined_commas(lines: Sequence[str], layout: Layout, names: int) -> list[tuple[int, ...]]:
+def joined_commas(
+    lines: Sequence[str], layout: Layout, names: int, decimal: str | None = None
+) -> list[tuple[int, ...]]:
     """Find how pieces between commas make numbers with decimal commas; all ways that are left.
 
     Parameters
@@ -275,6 +278,8 @@ def joined_commas(lines: Sequence[str], layout: Layout, names: int) -> list[tupl
         Rows.
     names
         Names of the header; 0 without one.
+    decimal
+        The sign that the user gives, which decides.
 
     Returns
     -------
@@ -288,17 +293,25 @@ def joined_commas(lines: Sequence[str], layout: Layout, names: int) -> list[tupl
     parts = [_often(r"[0-9]+", column) > 0.98 for column in columns]
     pairs = [a and b for a, b in zip(whole, parts[1:], strict=False)]
     plain = (1,) * layout.width
-    if layout.delimiter != "," or layout.decimal != "." or not any(pairs) or names == layout.width:
+    said = _DECIMALS.get(decimal or "", decimal)
+    commas = (layout.delimiter, layout.decimal) == (",", ".") and said != "."
+    if not commas or not any(pairs) or names == layout.width:
         return [plain]
     ways = list(islice(_ways(pairs, names), _MOST_WAYS)) or [plain]
+    ways = [way for way in ways if said is None or way != plain] or ways
     for fits in (_is_whole, _parts_change):
         ways = [way for way in ways if fits(way, columns)] or ways
     # Where one number has a decimal comma for certain, the others have it too.
     fewest = min(map(len, ways))
     ways = ways if plain in ways else [way for way in ways if len(way) == fewest]
-    # Whole numbers under no names are whole numbers, unless that leaves no time.
+    # Whole numbers under no names are whole numbers, unless that leaves no time, or one that never
+    # changes stands before others of one length, as the 0 of 0,38 does.
     if not names and plain in ways and _evenness(_numbers(columns, plain)):
-        return [plain]
+        fixed = [_often(re.escape(c[0]), c) > 0.98 for c in columns]
+        alike = [_often(rf"\d{{{max(2, len(c[0]))}}}", c) > 0.98 for c in columns]
+        zeros = [at for at, pair in enumerate(pairs) if pair and fixed[at] and alike[at + 1]]
+        either = [way for way in ways if {(at, 2) for at in zeros} <= {*_placed(way)}]
+        return [plain, *(either[:1] if zeros else [])]
     ranks = [_evenness(_numbers(columns, way)) for way in ways]
     ways = [way for way, rank in zip(ways, ranks, strict=True) if rank == max(ranks)]
     rough = [_roughness(_numbers(columns, way)) for way in ways]
@@ -369,7 +382,7 @@ def _evenness(numbers: Sequence[FloatArray]) -> int:
 
 def _roughness(numbers: Sequence[FloatArray]) -> float:
     """Sum the logarithms of how rough the columns are: what is torn from a number is noise."""
-    turns = [float(np.median(np.abs(np.diff(values, 2)))) for values in numbers]
+    turns = [float(np.percentile(np.abs(np.diff(values, 2)), 90)) for values in numbers]
     spans = [float(np.ptp(values)) or 1.0 for values in numbers]
     return float(np.sum(np.log(np.array(turns) / np.array(spans) + 1e-6)))
 

@@ -148,25 +148,30 @@ def _plain_table(
             "give a table with a row a sample",
         )
         try:
-            return _table(place, lines, first, _with_decimals(place, lines, first, layout), form)
+            return _table(
+                place, lines, first, _with_decimals(place, lines, first, layout, options), form
+            )
         except InputError as fault:
             reason = reason if isinstance(reason, InputError) else fault
     raise reason
 
 
-def _with_decimals(place: Path, lines: Sequence[str], first: int, layout: Layout) -> Layout:
+def _with_decimals(
+    place: Path, lines: Sequence[str], first: int, layout: Layout, options: ReadOptions
+) -> Layout:
     """Find which commas between commas are decimal; refuse where two ways keep all rows."""
     rows = lines[first : first + 1000]
     above = [line.strip().lstrip("#% ") for line in lines[:first] if line.strip()]
-    names = [cell for cell in layout.split(above[-1]) if cell] if above else []
-    texts = 0 if any(map(layout.is_number, names)) or len(names) > layout.width else len(names)
-    ways = joined_commas(rows, layout, texts if len(above) < 3 or texts > 1 else 0)
+    cells = [cell for cell in layout.split(above[-1]) if cell] if above else []
+    texts = 0 if any(map(layout.is_number, cells)) or len(cells) > layout.width else len(cells)
+    names = texts if len(above) < 3 or texts > 1 else 0
+    ways = joined_commas(rows, layout, names, options.decimal)
     refuse_if(
         len(ways) > 1,
         place,
         "commas stand between its numbers and in them: a row may be "
         + " or ".join(f"'{named(way, lines[first], layout)}'" for way in ways[:3]),
-        "export it with semicolons or tabs between the columns",
+        "give --decimal , or --decimal . (or export it with semicolons)",
     )
     way = ways[0]
     return layout if len(way) == layout.width else replace(layout, joined=way, width=len(way))
