@@ -26,6 +26,7 @@ MOST_DAMAGED: Final = 0.01
 """Share of the rows that may be garbled or torn."""
 MOST_COLUMNS: Final = 1024
 """A row of more cells is no sample of an instrument."""
+_LONGEST_CELL: Final = 500
 _SAMPLES, _TOGETHER = 15, 20
 """Places at which a reading is chosen, and lines at each that follow one another."""
 _NAMES: Final = {
@@ -124,7 +125,9 @@ class Layout:
     def kinds(self, cells: Iterable[str]) -> str:
         """Say what each cell is by a letter: number, clock time, blank, dressed number, text."""
         return "".join(
-            "n"
+            "t"
+            if len(cell) > _LONGEST_CELL
+            else "n"
             if self.is_number(cell)
             else "b"
             if is_blank(cell)
@@ -306,12 +309,13 @@ def joined_commas(
     ways = ways if plain in ways else [way for way in ways if len(way) == fewest]
     # Whole numbers under no names are whole numbers, unless that leaves no time, or one that never
     # changes stands before others of one length, as the 0 of 0,38 does.
+    fixed = [_often(re.escape(column[0]), column) > 0.98 for column in columns]
+    alike = [_often(rf"\d{{{max(2, len(c[0]))}}}", c) > 0.98 for c in columns]
+    zeros = {(at, 2) for at, pair in enumerate(pairs) if pair and fixed[at] and alike[at + 1]}
+    joined = [way for way in ways if zeros and zeros <= {*_placed(way)}]
     if not names and plain in ways and _evenness(_numbers(columns, plain)):
-        fixed = [_often(re.escape(c[0]), c) > 0.98 for c in columns]
-        alike = [_often(rf"\d{{{max(2, len(c[0]))}}}", c) > 0.98 for c in columns]
-        zeros = [at for at, pair in enumerate(pairs) if pair and fixed[at] and alike[at + 1]]
-        either = [way for way in ways if {(at, 2) for at in zeros} <= {*_placed(way)}]
-        return [plain, *(either[:1] if zeros else [])]
+        return [plain, *joined[:1]]
+    ways = joined or ways if said else ways
     ranks = [_evenness(_numbers(columns, way)) for way in ways]
     ways = [way for way, rank in zip(ways, ranks, strict=True) if rank == max(ranks)]
     rough = [_roughness(_numbers(columns, way)) for way in ways]

@@ -340,8 +340,10 @@ def _text_of(cells: Sequence[str], layout: Layout) -> tuple[bool, bool]:
 
     A row with one cell that is no number is a row with a fault.
     """
+    if not re.match(r"[^\W\d]{3}|\D*$", cells[0]):
+        return False, False
     kinds = layout.kinds(filter(None, cells)).replace("d", "t")
-    begins = kinds[:1] == "t" and re.match(r"[^\W\d]{3}|\D*$", cells[0]) is not None
+    begins = kinds[:1] == "t"
     return begins and (set(kinds) == {"t"} or len(cells) != layout.width), begins
 
 
