@@ -256,21 +256,6 @@ def test_the_printed_digit_is_the_one_that_was_printed(place: int, scale: float)
     assert units._printed_digit(decay(1.0) * np.pi, scale) is None
 
 
-@pytest.mark.parametrize("turn", [2 * np.pi, 360.0])
-@pytest.mark.parametrize(
-    ("counts", "is_one"),
-    [(400, True), (1000, True), (1024, True), (4096, True), (20_000, True), (33_084, False)],
-)
-def test_a_turn_over_an_encoder_s_counts_tells_the_unit(
-    turn: float, counts: int, is_one: bool
-) -> None:
-    step = turn / counts
-    found = units._by_lines(np.rint(decay(1.0) * turn / 8 / step) * step)
-    printed = float(f"{step:.3g}") == pytest.approx(step, rel=1e-9)
-    assert (found is not None) == (is_one and not printed)
-    assert found is None or str(counts) in found.why
-
-
 @given(bits=st.integers(8, 20), zero=st.floats(-0.2, 0.2))
 def test_an_encoder_s_counts_go_on_over_its_zero(bits: int, zero: float) -> None:
     turn = 2.0**bits

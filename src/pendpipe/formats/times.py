@@ -170,16 +170,13 @@ def _period(reading: Column, values: FloatArray) -> float:
 
 def _time_by_size(column: Column, period: float, values: FloatArray) -> tuple[float, str, bool]:
     """Take seconds, unless no pendulum would be so slow."""
-    step = float(np.median(np.abs(np.diff(values)))) if len(values) > 1 else 1.0
     whole = bool(np.all(values[:1000] == np.rint(values[:1000])))
     taken = f"'{column.label}' is taken to be in"
-    if period > _LONGEST_S or (not period and whole and step >= 500):
-        cycle, seen = period or 50.0 * step, f"a period of {period:.4g}"
+    if period > _LONGEST_S:
         ticks = ((3e7, 1e-9, "nanoseconds"), (3e4, 1e-6, "microseconds"), (0, 1e-3, "milliseconds"))
-        factor, name = next((size, name) for least, size, name in ticks if cycle > least)
-        seen = seen if period else f"steps of {step:.4g}"
-        note = f"'{column.label}' has no unit: taken to be {name} by {seen} (--unit s: for seconds)"
-        return factor, note, True
+        factor, name = next((size, name) for least, size, name in ticks if period > least)
+        note = f"'{column.label}' has no unit: taken to be {name} by a period of {period:.4g}"
+        return factor, f"{note} (--unit s: for seconds)", True
     if 0.0 < period < _SHORTEST_S < 86400.0 * period < _LONGEST_S * 1e3:
         dated = 2e4 < float(np.abs(values).max(initial=0.0)) < 1e6
         return 86400.0, f"{taken} days, as spreadsheets count (--unit s: for s)", not dated
@@ -207,16 +204,13 @@ def _in_order(
         base.keep(slice(late.min(initial=len(base.time_s)) + 1))
         early = np.flatnonzero(base.time_s <= (-np.inf if start_s is None else start_s))
         base.keep(slice(early.max(initial=0), None))
-    for repaired in (
-        _drop_torn,
-        _count_rows,
-        _keep_last,
-        _drop_repeats,
-        _lone_stamps,
-        _first_of_stacked,
-    ):
+    repairs = [_count_rows, _keep_last, _drop_repeats, _first_of_stacked]
+    # Where stamps are rounded, rows of one time are no copies.
+    rounded = len(base.time_s) > 1 and np.mean(np.diff(base.time_s) == 0.0) > 0.02
+    repairs.insert(0 if rounded else 3, _interpolate_torn)
+    for repair in repairs:
         if np.diff(base.time_s).min(initial=1.0) <= 0:
-            repaired(choice, base)
+            repair(choice, base)
     steps = np.diff(base.time_s)
     if steps.min(initial=1.0) > 0:
         _count_late_rows(choice, base)
@@ -334,34 +328,19 @@ def _first_of_stacked(_choice: Choice, base: TimeBase) -> None:
     base.keep(slice(starts[0]))
 
 
-def _fallen(time: FloatArray) -> IntArray:
-    """Find stamps that fall out of a time that rises without them."""
-    padded = np.concatenate(([-np.inf], time, [np.inf]))
-    at = np.flatnonzero(np.diff(time) < 0)
-    # Either the stamp before a fall is too late, or the one behind it too early.
-    return np.where(padded[at + 3] >= padded[at + 1], at + 1, at)
-
-
-def _drop_torn(_choice: Choice, base: TimeBase) -> None:
-    """Leave out rows with torn stamps among those that are rounded, up to one in a hundred."""
-    wrong, steps = _fallen(base.time_s), np.diff(base.time_s)
-    good = np.delete(base.time_s, wrong)
-    rare = 0 < len(wrong) <= MOST_DAMAGED * len(steps) and np.mean(steps == 0.0) > 0.02
-    if rare and np.diff(good).min(initial=0.0) >= 0.0:
-        kept = np.delete(np.arange(len(base.time_s)), wrong)
-        base.keep(kept, f"{len(wrong)} row(s) with a stamp that falls out of order left out")
-
-
-def _lone_stamps(_choice: Choice, base: TimeBase) -> None:
+def _interpolate_torn(_choice: Choice, base: TimeBase) -> None:
     """Interpolate stamps that fall out of a time that rises without them."""
-    wrong = _fallen(base.time_s)
+    padded = np.concatenate(([-np.inf], base.time_s, [np.inf]))
+    at = np.flatnonzero(np.diff(base.time_s) < 0)
+    # Either the stamp before a fall is too late, or the one behind it too early.
+    wrong = np.where(padded[at + 3] >= padded[at + 1], at + 1, at)
     good = np.delete(np.arange(len(base.time_s)), wrong)
-    inside = not {0, len(base.time_s) - 1} & set(wrong.tolist())
     rows, steps = np.diff(good), np.diff(base.time_s[good])
     # Behind a clock that was set back the next row comes too soon.
     soon = np.any(steps[rows > 1] < 0.5 * rows[rows > 1] * np.median(steps))
-    rises = steps.min(initial=1.0) > 0 and not soon
-    if inside and rises and len(wrong) <= 0.05 * len(good):
+    inside = not {0, len(base.time_s) - 1} & set(wrong.tolist())
+    few = 0 < len(wrong) <= 0.05 * len(good)
+    if few and inside and not soon and steps.min(initial=0.0) >= 0.0:
         base.time_s = np.interp(np.arange(len(base.time_s)), good, base.time_s[good])
         base.notes.append(f"{len(wrong)} time stamp(s) that fall out of order interpolated")
 

@@ -20,7 +20,7 @@ from pendpipe.formats.table import (
 )
 from pendpipe.formats.times import TimeBase
 from pendpipe.formats.words import Unit, unit_of
-from pendpipe.recording import Quantity, find_step, from_below, jumps_of_a_turn
+from pendpipe.recording import Quantity, from_below, jumps_of_a_turn
 
 _RADIAN = Unit("angle", 1.0, "rad")
 _DEGREE = Unit("angle", np.pi / 180, "rad")
@@ -179,8 +179,7 @@ def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray
     """Find an angle's unit in the header's words, or by a test of physics; ``None`` without either.
 
     In this order: the derivative beside it in a known unit; the period, which lengthens as that
-    of sin x does in one unit only; numbers that are round in the other unit; jumps of a turn; a
-    step that is a turn over the number of an encoder's lines.
+    of sin x does in one unit only; numbers that are round in the other unit; jumps of a turn.
     """
     finite = column.values[np.isfinite(column.values)]
     if not len(finite):
@@ -189,14 +188,12 @@ def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray
     stated = re.search(
         r"\b(deg|degs|degrees?|grad|grado|gradi|grados)\b(?! c)|_deg|°(?!\s*[cf])", words
     )
-    named = column.role == "angle"
     if stated and column.role != "length" and "rad" not in words.replace("grad", ""):
         return _Guess(_DEGREE, "is taken to be in degrees (the header names them)")
     return (
         _by_rate(choice, column, time_s)
         or _by_period(column, time_s)
         or (_by_digits(finite) if column.role != "length" else None)
-        or (_by_lines(finite) if named else None)
         or (_Guess(_RADIAN, "jumps by 2 pi: it is in radians") if jumps_of_a_turn(finite) else None)
     )
 
@@ -231,24 +228,6 @@ def _by_digits(finite: FloatArray) -> _Guess | None:
         if digit := _printed_digit(finite, scale):
             why = f"converted to {other}, its values are multiples of {digit:.4g}"
             return _Guess(unit, f"is in {name} ({why})")
-    return None
-
-
-def _by_lines(finite: FloatArray) -> _Guess | None:
-    """Compare the step of a column that is named an angle with a turn over an encoder's counts.
-
-    These are 2^k, or 1, 2, 4, 5, 8 times a power of ten: forty numbers, to six digits, are met by
-    chance once in ten thousand times.
-    """
-    step = find_step(finite)
-    for turn, unit, name in ((2 * np.pi, _RADIAN, "radians"), (360.0, _DEGREE, "degrees")):
-        counts = turn / step if step else 0.0
-        whole = round(counts)
-        usual = whole & (whole - 1) == 0 or re.fullmatch("[12458]0+", str(whole))
-        # A step of three digits may as well be one that was printed.
-        printed = not step or abs(float(f"{step:.3g}") / step - 1.0) < 1e-6
-        if 100 <= whole <= 1 << 20 and usual and not printed and abs(counts / whole - 1.0) < 2e-6:
-            return _Guess(unit, f"is in {name} (its step is a turn over {whole})")
     return None
 
 
