@@ -1,6 +1,6 @@
 """Eq. 8 on all the readings of a free decay, by Gauss-Newton with the engine's exact sensitivities.
 
-How b divides into its two parts is not told: any share is as likely beforehand.
+How b divides into its two parts is not told: any roots of them are as likely beforehand.
 
 Rounded readings say only between which limits the angle lay. With noise of rms s before the
 rounding, a reading r stands for the interval r -+ step/2, and its probability is
@@ -592,7 +592,7 @@ def fitted_waveform(
     The motion is started at a turning point before the first reading, so that every reading
     counts; with sin x and a large amplitude at the first turning point, since there may be none
     before it below pi. b is one parameter; how it divides into hysteretic and viscous is
-    marginalised: any share from 0 to 1 is as likely beforehand.
+    marginalised, the roots of both as likely beforehand.
     """
     fixed = fixed or {}
     held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
@@ -707,7 +707,8 @@ def _judged(fitted: Fitted, samples: Samples, points: TurningPoints) -> Goodness
 class _Shared(NamedTuple):
     """The parameters where b's hysteretic share is what the readings expect of it.
 
-    Any two parts of b are as likely beforehand.
+    Any roots of both parts are as likely beforehand (Jeffreys' prior of rates): one part alone is
+    no rarity.
     """
 
     value: FloatArray
@@ -723,20 +724,20 @@ class _Shared(NamedTuple):
 def _over_shares(fitted: Fitted, noise_rms: float | None = None, enlarged: float = 1.0) -> _Shared:
     """Average over the share: at each the others are at their bounded minimum."""
     losses = _Losses.of(fitted, noise_rms or fitted.noise_rms, enlarged)
-    low, high = (0.0, 1.0) if SHARE not in fitted.held else 2 * (float(fitted.value[SHARE]),)
+    low, high = (0.0, 0.5 * math.pi) if SHARE not in fitted.held else (0.0, 0.0)
     for _ in range(_ZOOMS):
-        shares = np.linspace(low, high, _SHARES if low < high else 1)
+        arc = np.linspace(low, high, _SHARES if low < high else 1)
+        shares = np.sin(arc) ** 2 if low < high else fitted.value[[SHARE]]
         found = losses.at(shares)
-        width = np.sqrt(np.maximum(found.covariance[:, B, B], 0.0))
-        # Parts of b are as likely beforehand, so that at a share b counts as b db.
-        likely = np.maximum(np.maximum(losses.value[B] + found.step[:, B], width) * width, _LEAST)
-        likely *= np.exp(0.5 * (found.chi2.min() - found.chi2))
+        # At a share b counts as wide as it is known.
+        width = np.sqrt(np.maximum(found.covariance[:, B, B], _LEAST))
+        likely = width * np.exp(0.5 * (found.chi2.min() - found.chi2))
         likely /= likely.max()
         inside = np.flatnonzero(likely > _UNLIKELY)
         if len(inside) >= min(_ENOUGH, len(shares)):
             break
         first, last = max(int(inside[0]) - 1, 0), min(int(inside[-1]) + 1, _SHARES - 1)
-        low, high = float(shares[first]), float(shares[last])
+        low, high = float(arc[first]), float(arc[last])
     likely[[0, -1]] *= 0.5
     likely /= likely.sum()
     share = float(likely @ shares)

@@ -82,8 +82,8 @@ def fit_period(
     if share is None:
         ends = [(found[end] - found[0], begun[end] - begun[0]) for end in (1, 2)]
         off_by = max(ends, key=lambda change: abs(change[0]))
-        matrix += np.outer(off_by, off_by) / 3.0
+        matrix += np.outer(off_by, off_by) / 2.0
         # All times share what the unknown division of b does to the half cycles' shape.
-        matrix[1, 1] += (b / (4.0 * float(found[0]) ** 2)) ** 2 / 3.0
+        matrix[1, 1] += (b / (4.0 * float(found[0]) ** 2)) ** 2 / 2.0
     omega = float(found[0])
     return Period(omega, first_s + float(begun[0]), matrix, chi2, omega * late)
