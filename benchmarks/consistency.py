@@ -1,6 +1,6 @@
 """Whether fit and diagnosis give the numbers of clean recordings of the law within their errors.
 
-    python -m benchmarks.consistency [--number 200] [--seed N] [--fits] [--diagnoses N]
+    python -m benchmarks.consistency [--number 200] [--seed N] [--fits] [--jobs 2]
 
 The recordings are integrated by `benchmarks.apparatus.motion`, which shares no code with the
 library: pendulums (sin x, angles) and every fourth a spring (x, displacements), Q 5 to 5000 at the
@@ -8,7 +8,9 @@ first amplitude, 0.01 to 2.5 rad, white noise of 1e-6 to 1e-2 of that amplitude,
 a cycle, 5 to 1000 cycles; each loss alone and all together, the drag in the paper's energy form or
 v|v|. A recording ends where the amplitude meets the noise. Where the Cramer-Rao error of Q exceeds
 20 % a refusal is right: these are counted apart. It prints a line a recording as it goes, then the
-rates, over all and by region. Exit status 1 where a rate misses what is asked of it.
+rates, over all and by region, and every recording that is wrong. What is done is kept (`.evidence`)
+for as long as the code is the same: a run that was stopped goes on. Exit status 1 where a rate
+misses what is asked of it.
 """
 
 from __future__ import annotations
@@ -17,16 +19,20 @@ import argparse
 import math
 import sys
 import time
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
 import numpy as np
 
 import pendpipe as pp
+from benchmarks import journal
 from benchmarks.apparatus.motion import PARAMETERS, TIMES, Array, P, T, integrate
 from pendpipe.dynamics import Eq8, Release, sample_with_jacobian
 from pendpipe.errors import InputError
 
+CODE: Final = ("pendpipe.api", "benchmarks/consistency.py", "benchmarks/apparatus/motion.py")
 MOST_READINGS: Final = 300_000
 FEWEST_CYCLES: Final = 5.0
 _PIECE: Final = 1 << 17
@@ -197,9 +203,23 @@ class Found:
     diagnosed_noise: float = math.nan
     same_test: bool = True
 
+    @classmethod
+    def kept(cls, content: dict[str, Any]) -> Found:
+        """Read what `asdict` has made."""
+        truth = Truth(**content["truth"])
+        return cls(**content | {"truth": truth, "names": tuple(content["names"])})
+
     @property
     def decidable(self) -> bool:
         return self.bound < UNDECIDABLE
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether it alone misses what is asked of each."""
+        far = any(abs(pull) > 3.0 for pull in self.pulls.values())
+        diagnosed = bool(self.verdict) and not _right_noise(self.diagnosed_noise, self)
+        lost = bool(self.refused) or self.light == "red" or not self.noise_is_right
+        return lost or far or diagnosed or bool(self.names) or not self.same_test
 
     @property
     def noise_is_right(self) -> bool:
@@ -238,7 +258,9 @@ def judge(truth: Truth, seed: int, *, diagnose: bool) -> Found:
         found.names = tuple(each["id"] for each in effects)
         found.diagnosed_noise = answer.get("noise_rms_rad") or math.nan
         p = answer.get("baseline", {}).get("fit_p_value")
+        # One p is one verdict: that of the fit is whether it lies below the level.
         found.same_test = found.p_value is None or p == found.p_value
+        found.seconds = time.process_time() - begun
     return found
 
 
@@ -260,7 +282,7 @@ def _compare(found: Found, result: Any) -> None:
         if bounded:
             low, high = estimate.bounds95
             slack = 1e-6 * abs(truth.value(name))
-            found.covered[name] = low - slack <= truth.value(name) <= high + slack
+            found.covered[name] = bool(low - slack <= truth.value(name) <= high + slack)
         elif estimate.sd > 0.0:
             found.pulls[name] = (estimate.value - truth.value(name)) / estimate.sd
 
@@ -391,21 +413,44 @@ def main() -> int:
     parser.add_argument("--number", type=int, default=200, help="recordings")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--fits", action="store_true", help="no diagnoses")
-    parser.add_argument("--diagnoses", type=int, metavar="N", help="of the first N alone")
     parser.add_argument("--only", type=int, metavar="K", help="recording K alone")
+    parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--minutes", type=float, default=20.0, help="none is begun after these")
     arguments = parser.parse_args([each for each in sys.argv[1:] if each != "consistency"])
-    begun, found = time.monotonic(), list[Found]()
     numbers = range(arguments.number) if arguments.only is None else [arguments.only]
-    for number in numbers:
-        if time.monotonic() - begun > 60.0 * arguments.minutes:
-            print(f"stopped after {arguments.minutes:g} minutes")
-            break
-        most = arguments.number if arguments.diagnoses is None else arguments.diagnoses
-        diagnose = not arguments.fits and number < most
-        found.append(judge(draw(number, arguments.seed), arguments.seed, diagnose=diagnose))
-        print(line(found[-1]), flush=True)
-    return report(found)
+    name = f"consistency-{arguments.seed}{'-fits' if arguments.fits else ''}"
+    done: dict[str, Any] = journal.read(name, {}, CODE)
+    for found in _judged([n for n in numbers if str(n) not in done], arguments):
+        print(line(found), flush=True)
+        done[str(found.truth.number)] = asdict(found)
+        journal.keep(name, done, CODE)
+    return report([Found.kept(done[str(n)]) for n in numbers if str(n) in done])
+
+
+def _judged(numbers: list[int], arguments: argparse.Namespace) -> Iterator[Found]:
+    """Judge recordings side by side, and begin none after the minutes given."""
+    until, left = time.monotonic() + 60.0 * arguments.minutes, iter(numbers)
+    with ProcessPoolExecutor(arguments.jobs) as pool:
+        running: set[Any] = set()
+        while True:
+            while len(running) < arguments.jobs and time.monotonic() < until:
+                if (number := next(left, None)) is None:
+                    break
+                seed, diagnose = arguments.seed, not arguments.fits
+                running.add(pool.submit(_judge, number, seed, diagnose))
+            if not running:
+                break
+            ended = next(as_completed(running))
+            running.remove(ended)
+            yield ended.result()
+    if (number := next(left, None)) is not None:
+        print(
+            f"stopped before {number}, after {arguments.minutes:g} minutes: run it again to go on"
+        )
+
+
+def _judge(number: int, seed: int, diagnose: bool) -> Found:
+    return judge(draw(number, seed), seed, diagnose=diagnose)
 
 
 def report(found: list[Found]) -> int:
@@ -420,6 +465,10 @@ def report(found: list[Found]) -> int:
             print(row(name, some))
     if apart:
         print(row("apart", apart))
+    print()
+    for each in decidable:
+        if each.is_wrong:
+            print(f"wrong: {line(each)}")
     print()
     asked = checks(decidable)
     for what, holds in asked:
