@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import pendpipe as pp
+from pendpipe.analysis.fit.consequence import unsure
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.arrays import FloatArray
 
@@ -71,6 +73,30 @@ def test_amber_names_what_cannot_be_quoted() -> None:
     assert "Q at" in fit.light_reason
     assert "Q" not in fit.quotable
     assert fit.light_reason in str(fit)
+
+
+@pytest.mark.parametrize(("p_value", "doubted"), [(0.4, []), (1e-6, [0])])
+def test_a_loss_is_doubted_only_where_more_than_noise_is_left(
+    p_value: float, doubted: list[int]
+) -> None:
+    """Turning points 2.6 of their errors, and 8 %, off: chance, unless the law misses something."""
+    fit = fitted(viscous(TIME))
+    large = fit.decrement_check[0]
+    chance = large._replace(seen=large.fitted / 1.08, seen_sd=0.08 * large.fitted / 1.08 / 2.6)
+    checks = (chance, *fit.decrement_check[1:])
+    off, unseen = unsure(replace(fit, decrement_check=checks, fit_p_value=p_value))
+    assert [checks.index(each) for each in off] == doubted
+    assert not unseen
+
+
+def test_small_and_noisy_swings_of_the_law_itself_are_green() -> None:
+    """Sixteen decays whose turning points show Q to 3 to 10 %: chance lights nothing."""
+    lights = []
+    for seed in range(16):
+        noise = 2e-3 * np.random.default_rng(seed).standard_normal(len(TIME))
+        recording = pp.Recording(time_s=TIME, angle_rad=0.1 * viscous(TIME) / 0.3 + noise)
+        lights.append(pp.fit(recording).light)
+    assert lights.count("green") >= 15
 
 
 def test_red_keeps_the_period_and_q_of_the_turning_points() -> None:

@@ -127,8 +127,9 @@ def _remarks(result: FitResult) -> Iterator[str]:
         period = Estimate(1.0 / other.value, other.sd / other.value**2, "s")
         text = with_error(period.value, period.sd, "s", short=True)
         yield f"as a spring or torsion wheel (--restoring linear) its period would be {text}"
-    for cut in result.cuts:
-        yield f"left out: {stretch(cut['start_s'], cut['stop_s'])}, {cut['reason']}"
+    if result.cuts:
+        cuts = (f"{stretch(cut['start_s'], cut['stop_s'])}, {cut['reason']}" for cut in result.cuts)
+        yield f"left out: {'; '.join(cuts)}"
 
 
 def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
