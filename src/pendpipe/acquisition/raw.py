@@ -333,6 +333,38 @@ def _header(place: str, content: bytes) -> tuple[Mapping[str, Any], int]:
     return header, end + 1
 
 
+def parse_header(line: bytes) -> dict[str, Any]:
+    """Read the first line of a file that is being recorded.
+
+    Raises
+    ------
+    InputError
+        If it is no description.
+    """
+    header = _description(line)
+    if header is None:
+        raise InputError("raw recording", "its first line is no description", "give another file")
+    return header
+
+
+def whole_frames(content: bytes) -> tuple[list[Frame], int]:
+    """Read the frames of a file that is being recorded, up to one that is not whole yet.
+
+    Returns
+    -------
+    list of Frame
+        In order.
+    int
+        Where the first begins that is not whole.
+    """
+    frames: list[Frame] = []
+    begin = 0
+    for _, frame in _frames(content, 0):
+        frames.append(frame)
+        begin += _HEAD.size + _CHECK.size + len(frame.content)
+    return frames, begin
+
+
 def _description(line: bytes) -> dict[str, Any] | None:
     """Read a line that describes a recording; ``None`` if it is none, or damaged."""
     header = _json(line)

@@ -2,7 +2,7 @@
 
 pendpipe acquire --list
 pendpipe acquire --port /dev/ttyUSB0 --model di154rs --rate 60 --duration 300 --out decay.csv
-pendpipe acquire --device simulated:di2108 --rate 110 --duration 60 --out decay.csv
+pendpipe acquire --device simulated:di2108 --rate 110 --duration 60 --view --out decay.csv
 pendpipe acquire --recover decay.raw --out decay.csv
 pendpipe acquire --campaign config/config.yaml --record decay-1 --anew
 pendpipe acquire --serve di2108 --signal config/model.toml
@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 from types import FrameType
 from typing import Any, Final
@@ -75,6 +75,10 @@ _OWN: Final[Flags] = {
         "action": "store_true",
         "help": "take what was kept when the line was lost for the recording",
     },
+    "--view": {
+        "action": "store_true",
+        "help": "show what is recorded on a page of this machine; its address is printed",
+    },
     "--volts-per-radian": {"type": float, "help": "sensor constant, for the metadata"},
     "--seed": {"type": natural, "default": 0, "help": "of the simulated noise (0)"},
     "--clock-scale": {
@@ -105,6 +109,12 @@ def run(arguments: Arguments) -> None:
     if arguments.list:
         _list(arguments.port)
         return
+    refuse_if(
+        arguments.view and not (arguments.port or arguments.device),
+        "--view",
+        "nothing is recorded here that could be shown",
+        "give --port PORT or --device simulated:di2108",
+    )
     kinds = {"serve": _serve, "caliper": _caliper, "campaign": _stage}
     work = next((each for name, each in kinds.items() if getattr(arguments, name)), _record)
     with _signals_end_like_ctrl_c():
@@ -167,7 +177,8 @@ def _record(arguments: Arguments) -> None:
         )
     else:
         raw = Path(arguments.raw) if arguments.raw else decode.new_path_beside(out)
-        _from_device(arguments, raw)
+        with _view(arguments, raw):
+            _from_device(arguments, raw)
         if not arguments.accept_short:
             (attempt,) = decode.read_attempts([raw])
             remedy = "call again to record anew, or with --accept-short to take what is kept"
@@ -233,6 +244,15 @@ def _stage(arguments: Arguments) -> None:
         refused=refused,
         sources=[record.file] if record.file else [],
     )
+
+
+def _view(arguments: Arguments, raw: Path) -> AbstractContextManager[None]:
+    """Show the recording meanwhile, where that is asked for."""
+    if not arguments.view:
+        return nullcontext()
+    from pendpipe.acquisition.view import shown
+
+    return shown(raw)
 
 
 def _from_device(arguments: Arguments, raw: Path) -> None:

@@ -1,0 +1,181 @@
+"""The live page shows what is recorded, and nothing that happens to it costs a reading."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import pytest
+
+from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition.drivers.text import DI2108
+from pendpipe.acquisition.raw import read_raw
+from pendpipe.acquisition.recorder import acquire_simulated, example_signal
+from pendpipe.acquisition.view import Follower, thinned
+from pendpipe.cli import main
+from pendpipe.recording import read_plain
+
+SCALE = 20.0
+"""Simulated seconds in a real one."""
+
+
+class Recorder:
+    """`pendpipe acquire --view` at work, for far longer than any test."""
+
+    def __init__(self, folder: Path) -> None:
+        self.out, self.raw = folder / "decay.csv", folder / "decay.raw"
+        self.said = folder / "said.txt"
+        words = ["acquire", "--device", "simulated:di2108", "--rate", "110", "--duration", "1e6"]
+        words += ["--clock-scale", str(SCALE), "--view", "--raw", str(self.raw)]
+        # A shell may have left SIGINT ignored to what runs behind it.
+        code = (
+            "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler);"
+            "from pendpipe.cli import main; sys.exit(main(sys.argv[1:]))"
+        )
+        with self.said.open("wb") as stream:
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", code, *words, "--out", str(self.out)], stderr=stream
+            )
+        self.until(lambda: "http" in self.said.read_text())
+        self.address = re.findall(r"http://[\d.:]+/", self.said.read_text())[0]
+        children = psutil.Process(self.process.pid).children(recursive=True)
+        (self.viewer,) = [
+            each for each in children if "pendpipe.acquisition.view" in each.cmdline()
+        ]
+
+    def until(self, met: Callable[[], bool]) -> None:
+        """Wait for what the recorder does; if it ends before, that is the answer."""
+        while not met():
+            assert self.process.poll() is None, self.said.read_text()
+            time.sleep(0.01)
+
+    def data(self) -> dict[str, Any]:
+        """What the page asks for."""
+        with urllib.request.urlopen(f"{self.address}data") as answer:
+            return dict(json.load(answer))
+
+    def kept(self) -> int:
+        """How many bytes off the wire the raw file holds."""
+        return len(read_raw(self.raw).data)
+
+
+@pytest.fixture
+def recorder(tmp_path: Path) -> Iterator[Recorder]:
+    if sys.platform == "win32":
+        pytest.skip("signals end no process there as they do elsewhere")
+    running = Recorder(tmp_path)
+    yield running
+    running.process.kill()
+    running.process.wait()
+
+
+def killed(recorder: Recorder) -> None:
+    recorder.viewer.kill()
+
+
+def stopped(recorder: Recorder) -> None:
+    recorder.viewer.suspend()
+
+
+def never_read(recorder: Recorder) -> None:
+    """A browser that asks and takes no answer; the system closes the connection at the end."""
+    port = int(recorder.address.rstrip("/").rpartition(":")[2])
+    deaf = socket.create_connection(("127.0.0.1", port))
+    deaf.sendall(b"GET /data HTTP/1.0\r\nHost: 127.0.0.1:1\r\n\r\n" * 50)
+    recorder.deaf = deaf  # type: ignore[attr-defined]
+
+
+def left_alone(recorder: Recorder) -> None:
+    """Nothing happens to it."""
+
+
+@pytest.mark.parametrize("happens", [left_alone, killed, stopped, never_read])
+def test_nothing_that_happens_to_the_view_costs_a_scan(
+    recorder: Recorder, happens: Callable[[Recorder], None]
+) -> None:
+    recorder.until(lambda: recorder.data()["scans"] > 200)
+    happens(recorder)
+    before = recorder.kept()
+    recorder.until(lambda: recorder.kept() > before + 20_000)
+    recorder.process.send_signal(signal.SIGINT)
+    assert recorder.process.wait() == 0, recorder.said.read_text()
+    if happens is never_read:
+        recorder.deaf.close()  # type: ignore[attr-defined]
+    raw, recording = read_raw(recorder.raw), read_plain(recorder.out)
+    assert raw.damaged_bytes == 0
+    assert len(recording) == len(decode_recording(recorder.raw))
+    assert bool(np.all(recording.usable)), "a gap"
+    assert not recorder.viewer.is_running() or recorder.viewer.status() == psutil.STATUS_ZOMBIE
+
+
+def test_a_view_ends_with_a_recorder_that_was_killed(recorder: Recorder) -> None:
+    os.kill(recorder.process.pid, signal.SIGKILL)
+    recorder.process.wait()
+    recorder.viewer.wait()
+    assert not recorder.viewer.is_running()
+
+
+def test_the_page_is_for_this_machine_alone(recorder: Recorder) -> None:
+    """A page of the web that resolves its name to 127.0.0.1 gets nothing."""
+    with urllib.request.urlopen(recorder.address) as answer:
+        assert b"The last minute" in answer.read()
+    for host, path in (("evil.example:80", "data"), ("127.0.0.1:1", "etc/passwd")):
+        asked = urllib.request.Request(recorder.address + path, headers={"Host": host})
+        with pytest.raises(urllib.error.HTTPError) as fault:
+            urllib.request.urlopen(asked)
+        fault.value.close()
+        assert fault.value.code == 404
+
+
+def test_a_growing_file_is_followed_to_the_count(tmp_path: Path) -> None:
+    """Handed over in pieces that end anywhere, it comes to what the whole file holds."""
+    raw, growing = tmp_path / "whole.raw", tmp_path / "growing.raw"
+    options = {"channels": (1,), "rate_hz": 110.0, "duration_s": 90.0, "raw_path": raw}
+    acquire_simulated("di2108", example_signal(1, 3.85), clock_scale=200.0, **options)
+    counts = DI2108.decoder(1).feed(read_raw(raw).data).counts[:, 0]
+    volts_of = read_raw(raw).header["range_volts"] / 2**15 * counts
+    content, follower = raw.read_bytes(), Follower(growing)
+    assert follower.state() == {"scans": 0}
+    cuts = np.sort(np.random.default_rng(5).integers(0, len(content), 40))
+    for begin, end in zip([0, *cuts], [*cuts, len(content)], strict=True):
+        with growing.open("ab") as stream:
+            stream.write(content[begin:end])
+        follower.read()
+    state = follower.state()
+    assert state["scans"] == len(counts)
+    assert state["reason"] == "scans"
+    assert state["duration_s"] == 90.0
+    time_s, volts = np.array(state["last"]).T
+    assert time_s[-1] - time_s[0] == pytest.approx(60.0, abs=0.1)
+    recent = volts_of[-6600:]
+    assert (volts.min(), volts.max()) == pytest.approx((recent.min(), recent.max()), abs=1e-9)
+    at, amplitude = np.array(state["amplitude"])[0]
+    first = volts_of[: int(2 * at * 110)]
+    assert amplitude == pytest.approx(0.5 * np.ptp(first), rel=0.02)
+
+
+def test_thinning_keeps_every_extreme() -> None:
+    values = np.random.default_rng(4).normal(size=50_000)
+    kept = np.array([value for _, value in thinned(np.arange(50_000.0), values)])
+    assert len(kept) <= 1200
+    assert (kept.min(), kept.max()) == (values.min(), values.max())
+
+
+def test_where_nothing_is_recorded_there_is_nothing_to_view(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["acquire", "--view", "--serve", "di2108"]) == 2
+    assert capsys.readouterr().err.startswith("pendpipe: --view: nothing is recorded here")
