@@ -43,7 +43,7 @@ def compact(value: float, unit: str) -> str:
     factor, short = prefixed(abs(value), unit)
     shown = factor * value
     digits = f"{shown:#.3g}".rstrip(".") if abs(shown) < 999.5 else f"{shown:.0f}"
-    return f"{digits} {short}".rstrip()
+    return f"{digits}{after_number(short)}"
 
 
 def stretch(start_s: float, stop_s: float) -> str:

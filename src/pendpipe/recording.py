@@ -239,12 +239,27 @@ class Recording:
         Raises
         ------
         InputError
-            If the recording's own constant is no number, or 0; or if the numbers are such as
+            If the recording's own constant is no number, or 0; if it is an accelerometer's pull
+            along the string, whose frequency is twice the pendulum's; or if the numbers are such as
             no pendulum gives, and their squares or their differences no computer holds.
         """
         motion = self._in_radians(volts_per_radian, place)
         motion._check_scale(place)
+        motion._refuse_pull(place)
         return motion
+
+    def _refuse_pull(self, place: str | Path) -> None:
+        """Refuse an accelerometer's pull along the string."""
+        values = self.values[self.usable]
+        if self.unit != "m/s^2" or not self.unit_is_stated or not len(values):
+            return
+        refuse_if(
+            abs(abs(float(np.median(values))) / _GRAVITY - 1.0) < 0.03,
+            place,
+            "it hangs about 9.8 m/s^2: the pull along the string, which swings twice in a period",
+            "give the axis along the swing, or the gyroscope, with --column (--unit counts takes it"
+            " as it stands)",
+        )
 
     def _check_scale(self, place: str | Path) -> None:
         """Refuse a span of time or of readings that is beyond any pendulum."""
@@ -284,6 +299,8 @@ class Recording:
         )
 
 
+_GRAVITY: Final = 9.8
+"""Where an accelerometer's axis along the string hangs, m/s^2."""
 _LARGEST: Final = 1e60
 """Of readings, whose fourth powers must be numbers as well; they move by its inverse at least."""
 _SHORTEST_S, _LONGEST_S = 1e-60, 1e14

@@ -33,6 +33,14 @@ def test_every_digit_survives_the_disk(
     assert dict(again.metadata) == dict(recording.metadata)
 
 
+CASES_OF_A_PULL = [
+    (9.81, "m/s^2", True),
+    (-9.7, "m/s^2", True),
+    (0.2, "m/s^2", False),
+    (9.81, "counts", False),
+]
+
+
 def test_a_gap_survives_the_disk(tmp_path: Path) -> None:
     recording = Recording(
         np.array([0.0, 1.0, 2.0, 7.0]),
@@ -164,3 +172,16 @@ def test_angles_given_as_arrays_hang_at_zero_and_do_not_jump(level: float) -> No
     assert motion.as_motion() is motion
     if level != 2 * np.pi:  # so many turns leave nothing to do
         assert "hangs near 0" in motion.notes[-1]
+
+
+@pytest.mark.parametrize(("level", "unit", "refused"), CASES_OF_A_PULL)
+def test_a_pull_along_the_string_is_refused(level: float, unit: str, refused: bool) -> None:
+    """It swings twice in a period; an axis along the swing hangs about zero."""
+    time = np.arange(0.0, 20.0, 0.01)
+    pull = level + 0.3 * np.exp(-time / 20.0) * np.cos(6.0 * time)
+    phone = Recording(time, pull, "reading", metadata={"unit": unit})
+    if not refused:
+        assert phone.as_motion() is phone
+        return
+    with pytest.raises(InputError, match=r"twice in a period; give the axis along the swing"):
+        phone.as_motion()

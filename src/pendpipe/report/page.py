@@ -6,6 +6,7 @@ import base64
 import hashlib
 import io
 import json
+import math
 import os
 import re
 from collections import Counter
@@ -497,6 +498,7 @@ def render_recording(
                 cause(each),
             )
             for each in result.quality_factors
+            if math.isfinite(each.period_s)
         ],
         sheet=_inlined(draw_sheet(decay, recording), "sheet", _SHEET),
         diagnosis=None if outcome is None else outcome.diagnosis.summary,

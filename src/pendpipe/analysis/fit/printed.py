@@ -146,6 +146,8 @@ def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
     elif result.restoring == "sine" and qualities:
         large = qualities[0]
         text += f"  ({large.period_s:.5g} s at {short_size(large.amplitude_rad, unit)})"
+    if unit == "m/s^2":
+        text += "; twice that, if the axis lies along the string (--column)"
     yield small, text + _widened(wide.period if result.light != "red" else 1.0)
     by_clock = period.sd < _CLOCK * period.value and result.method != "amplitudes"
     if by_clock and result.clock_ppm is None:
