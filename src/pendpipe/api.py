@@ -225,6 +225,7 @@ def fit(
     volts_per_radian: float | None = None,
     points: TurningPoints | None = None,
     clock_ppm: float | None = None,
+    scale_percent: float | None = None,
     length_m: float | None = None,
     period: float | Estimate | None = None,
     name: str | None = None,
@@ -259,6 +260,9 @@ def fit(
         Turning points measured before (`turning_points`): they name the decay.
     clock_ppm
         What the clock may be off by, in parts per million; it enters the errors.
+    scale_percent
+        What the scale of the readings may be off by (V/rad, a camera's); it enters those of a, c
+        and the amplitude.
     length_m
         Length of the pendulum whose displacement is read as L sin x (with ``restoring="sine"``);
         amplitudes in m, and speeds in m/s, become angles by it.
@@ -301,7 +305,7 @@ def fit(
     from pendpipe.analysis.fit import fit_recording, fit_turning_points
     from pendpipe.analysis.fit.by_amplitudes import fit_amplitudes
     from pendpipe.analysis.fit.by_points import as_angles
-    from pendpipe.analysis.fit.result import with_clock
+    from pendpipe.analysis.fit.result import with_clock, with_scale
     from pendpipe.analysis.free_decay import measure_recording
     from pendpipe.analysis.turning_points import (
         TurningPoints,
@@ -344,14 +348,14 @@ def fit(
         length_m=length_m,
         place=place,
     )
-    if clock_ppm is not None:
-        refuse_if(
-            not 0.0 <= clock_ppm < 1e6,
-            "clock_ppm",
-            f"{clock_ppm!r} is no part of a million",
-            "give a number from 0 on",
-        )
-        result = with_clock(result, clock_ppm)
+    for given, most, word, widened in (
+        (clock_ppm, 1e6, "clock_ppm", with_clock),
+        (scale_percent, 100.0, "scale_percent", with_scale),
+    ):
+        if given is not None:
+            known = 0.0 <= given < most
+            refuse_if(not known, word, f"{given!r} is no such part", "give a number from 0 on")
+            result = widened(result, given)
     if points.unit != result["amplitude"].unit:
         # Of its rate, or of a position, the angle was fitted.
         points, _ = as_angles(points, position=points.unit == "m")

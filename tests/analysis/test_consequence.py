@@ -131,3 +131,17 @@ def test_what_the_clock_leaves_out_is_said_or_enters_the_error() -> None:
     both = math.hypot(fit["period"].sd, 2e-5 * PERIOD)
     assert known["period"].sd == pytest.approx(both, rel=1e-3)
     assert "50 ppm" not in str(known)
+
+
+def test_a_scale_that_may_be_off_enters_amplitude_a_and_c_and_the_period_by_sin_x() -> None:
+    """The amplitude of the small-angle period's correction A^2/16 is known as well as the scale."""
+    plain, wide = (pp.fit("examples/string-pendulum.csv", scale_percent=p) for p in (None, 2.0))
+    for name in ("amplitude", "a"):
+        sd = math.hypot(plain[name].sd, 0.02 * plain[name].value)
+        assert wide[name].sd == pytest.approx(sd)
+    assert wide["b"].sd == plain["b"].sd
+    moved = math.sqrt(wide["frequency"].sd ** 2 - plain["frequency"].sd ** 2)
+    assert moved / plain["frequency"].value == pytest.approx(0.02 * 0.42**2 / 8.0, rel=0.1)
+    assert wide.to_dict()["scale_percent"] == 2.0
+    with pytest.raises(pp.InputError, match="scale_percent"):
+        pp.fit("examples/string-pendulum.csv", scale_percent=-1.0)

@@ -38,7 +38,7 @@ from pendpipe.arguments import (
 )
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import over
-from pendpipe.files import is_stream, write_json
+from pendpipe.files import is_stream, read_json, write_json
 from pendpipe.report.class_table import Fitted, form_of, printed, together, write_fits
 
 _OWN: Final[Flags] = {
@@ -74,6 +74,12 @@ _OWN: Final[Flags] = {
         "type": number_within(0),
         "metavar": "PPM",
         "help": "what the clock may be off by, parts per million: it enters the errors",
+    },
+    "--scale-percent": {
+        "type": number_within(0, 100),
+        "metavar": "P",
+        "help": "what V/rad, or a camera's scale, may be off by, in percent: in the errors of"
+        " a, c and the amplitude; by default that of --calibration",
     },
     "--gravity": {
         "type": number_within(0),
@@ -175,6 +181,7 @@ def _fit(arguments: Arguments, say: Callable[[str], None] = tell) -> FitResult:
         fixed=fixed,
         length_m=arguments.length.value if arguments.length else None,
         clock_ppm=arguments.clock_ppm,
+        scale_percent=_scale_percent(arguments),
         period=over(1.0, frequency, "s") if frequency else period,
         name=arguments.file,
     )
@@ -188,6 +195,15 @@ def _fit(arguments: Arguments, say: Callable[[str], None] = tell) -> FitResult:
             "fixed": list(arguments.fix),
         },
     )
+
+
+def _scale_percent(arguments: Arguments) -> float | None:
+    """What the scale may be off by; a campaign has the calibration's error as a common one."""
+    given: float | None = arguments.scale_percent
+    if given is not None or arguments.calibration is None or arguments.record is not None:
+        return given
+    constant = read_json(arguments.calibration).get("volts_per_radian")
+    return None if constant is None else 100.0 * float(constant["sd"]) / float(constant["value"])
 
 
 def _write(arguments: Arguments, result: FitResult) -> None:

@@ -140,6 +140,9 @@ class FitResult:
     clock_ppm
         What the clock may be off by, in parts per million, where that is in the error of the
         period.
+    scale_percent
+        What the scale of the readings (V/rad, a camera's) may be off by, in percent; None where
+        that is not in the errors.
     name
         Of the file that was fitted.
     motion
@@ -182,6 +185,7 @@ class FitResult:
     widening: Widening = field(default_factory=Widening)
     hysteretic_share: float = 0.5
     clock_ppm: float | None = None
+    scale_percent: float | None = None
     name: str = field(default="", compare=False)
     motion: tuple[Eq8, Release] | None = field(default=None, repr=False, compare=False)
     points: TurningPoints | None = field(default=None, repr=False, compare=False)
@@ -413,6 +417,7 @@ class FitResult:
             "light_reason": self.light_reason,
             "hysteretic_share": self.hysteretic_share,
             "clock_ppm": self.clock_ppm,
+            "scale_percent": self.scale_percent,
             "quotable": list(self.quotable),
             "widening": self.widening._asdict(),
             "period_check": [check._asdict() for check in self.period_check],
@@ -472,6 +477,7 @@ class FitResult:
             light_reason=content["light_reason"],
             hysteretic_share=content.get("hysteretic_share", 0.5),
             clock_ppm=content.get("clock_ppm"),
+            scale_percent=content.get("scale_percent"),
             quotable=tuple(content.get("quotable", ())),
             widening=Widening(**content.get("widening", {})),
             period_check=tuple(PeriodCheck(**check) for check in content.get("period_check", ())),
@@ -594,18 +600,37 @@ def with_clock(result: FitResult, clock_ppm: float) -> FitResult:
 
     Every time is stretched alike: the frequency, and the rates b (1/s), a and c, by the same part.
     """
-    part = 1e-6 * clock_ppm
-    names = ("frequency", "a", "b", "c")
-    slope = np.array([result.value(n) if n in names else 0.0 for n in result.covariance_order])
+    powers = dict.fromkeys(("frequency", "a", "b", "c"), 1.0)
+    return replace(_stretched(result, powers, 1e-6 * clock_ppm), clock_ppm=clock_ppm)
+
+
+def with_scale(result: FitResult, scale_percent: float) -> FitResult:
+    """Add to the errors what a scale of the readings adds that may be off by some percent.
+
+    Volts per radian, or a camera's length: the amplitude, the offset and c grow with it, a falls;
+    and with sin x the frequency of small swings moves by A^2/8 of it.
+    """
+    powers = {"amplitude": 1.0, "offset": 1.0, "c": 1.0, "a": -1.0}
+    if result.restoring == "sine":
+        squares = [each.amplitude_rad**2 for each in result.quality_factors]
+        powers["frequency"] = sum(squares) / max(len(squares), 1) / 8.0
+    return replace(_stretched(result, powers, 0.01 * scale_percent), scale_percent=scale_percent)
+
+
+def _stretched(result: FitResult, powers: Mapping[str, float], part: float) -> FitResult:
+    """Add the error of one factor, known to a part, of which the parameters are powers."""
+    order = result.covariance_order
+    slope = np.array([powers.get(name, 0.0) * result.value(name) for name in order])
     covariance = result.covariance + part**2 * np.outer(slope, slope)
     parameters = dict(result.parameters)
-    for name in names:
+    for name, power in powers.items():
         old = parameters[name]
-        sd = math.hypot(old.sd, part * old.value)
+        sd = math.hypot(old.sd, part * power * old.value)
         factor = sd / old.sd if old.sd > 0.0 else 1.0
         low, high = (old.value + factor * (end - old.value) for end in old.bounds95)
-        parameters[name] = replace(old, sd=sd, interval95=(low, high))
-    return replace(result, parameters=parameters, covariance=covariance, clock_ppm=clock_ppm)
+        least = min(0.0, old.bounds95[0]) if name in "abc" else -math.inf
+        parameters[name] = replace(old, sd=sd, interval95=(max(low, least), high))
+    return replace(result, parameters=parameters, covariance=covariance)
 
 
 def read_fit(path: str | Path) -> FitResult:
