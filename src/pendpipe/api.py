@@ -445,8 +445,9 @@ def diagnose(
     ('consistent', 'circular-error', True)
     """
     torque = None if restoring in (None, "auto") else restoring
-    known, problem = torque in (None, "linear", "sine"), f"{restoring!r} is no choice"
-    refuse_if(not known, "restoring", problem, "give 'linear' or 'sine', or leave it out")
+    _check_choice("restoring", torque, ("linear", "sine"))
+    _check_choice("baseline", baseline, ("eq8", "viscous"))
+    refuse_if(not 0.0 < level < 1.0, "level", f"{level!r} is no probability", "give 0.01")
     refuse_if(seed < 0, "seed", f"{seed} is negative", "give 0 or more")
     if not isinstance(recording, Recording | str | Path):
         from pendpipe.diagnosis.several import diagnose_several
