@@ -136,3 +136,10 @@ def in_columns(rows: Sequence[Sequence[str]]) -> str:
         "  ".join(cell.ljust(size) for cell, size in zip(row, width, strict=True)).rstrip()
         for row in rows
     )
+
+
+def listed(items: Sequence[str], last: str = "and") -> str:
+    """Join items to "x, y and z"."""
+    if len(items) < 2:
+        return "".join(items)
+    return f"{', '.join(items[:-1])} {last} {items[-1]}"

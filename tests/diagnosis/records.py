@@ -18,10 +18,10 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import silent
 from pendpipe.diagnosis.begin import Beginning, begin
 from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.hypothesis import Task
 from pendpipe.diagnosis.noise import Noise, white_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.run import Outcome, _fit_of, diagnose_recording
-from pendpipe.diagnosis.task import Task
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.any_law import Motion
 from pendpipe.effects import Effect

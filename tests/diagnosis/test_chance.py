@@ -11,11 +11,21 @@ from hypothesis import strategies as st
 from scipy.stats import binom, kstest
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.detect import Chance, Lead, Scanner, Trials, detect, draw_chance, prepare
-from pendpipe.diagnosis.evidence import Rival, Scale, evidence
+from pendpipe.diagnosis.detect import (
+    Bank,
+    Candidate,
+    Chance,
+    Lead,
+    Scanner,
+    Trials,
+    detect,
+    draw_chance,
+    local_p_values,
+    prepare,
+)
+from pendpipe.diagnosis.hypothesis import applicable
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.scores import Bank, Candidate, local_p_values
-from pendpipe.diagnosis.task import applicable
+from pendpipe.diagnosis.rivals import Rival, Scale, evidence
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 
 from .records import null_fit

@@ -11,16 +11,15 @@ import pytest
 from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.detect import Detection
-from pendpipe.diagnosis.evidence import NO_SCAN
 from pendpipe.diagnosis.faults import correct, examine_again
 from pendpipe.diagnosis.forensics import TESTS
-from pendpipe.diagnosis.hypothesis import Fault, Hypothesis, is_gross
+from pendpipe.diagnosis.hypothesis import Fault, Hypothesis, Task, is_gross
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Finding, nothing
+from pendpipe.diagnosis.rivals import NO_SCAN
 from pendpipe.diagnosis.run import diagnose_recording
-from pendpipe.diagnosis.task import Task
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model

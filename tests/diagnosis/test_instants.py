@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.detect import finer_shape
 from pendpipe.diagnosis.instants import with_instants
 from pendpipe.diagnosis.refine import refine
-from pendpipe.diagnosis.scores import finer_shape
 from pendpipe.diagnosis.values import effect_parameters
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model

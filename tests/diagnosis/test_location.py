@@ -7,10 +7,11 @@ import pytest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.location import locate, near_harmonic_by_chance
+from pendpipe.diagnosis.location import locate
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Location
+from pendpipe.diagnosis.rivals import near_harmonic_by_chance
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
 

@@ -16,15 +16,14 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import silent
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import Lead
-from pendpipe.diagnosis.evidence import NO_SCAN, Rival, Scale, lines
 from pendpipe.diagnosis.faults import SLIPS, _examined, _slips
 from pendpipe.diagnosis.forensics import TESTS, corrections
 from pendpipe.diagnosis.hypothesis import CHOICE, FURTHER, Hypothesis, Step, price
-from pendpipe.diagnosis.location import off_harmonics
 from pendpipe.diagnosis.moves import describe, improve
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import Finding
+from pendpipe.diagnosis.rivals import NO_SCAN, Rival, Scale, lines, off_harmonics
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.search import _on_trial
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.gauss_newton import damping_for
 from pendpipe.diagnosis.noise import white_noise
-from pendpipe.diagnosis.refine import best_fit, refine
+from pendpipe.diagnosis.refine import best_fit, damping_for, refine
 from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Evaluated, Model

@@ -9,9 +9,17 @@ import pytest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.detect import Detection, Lead
-from pendpipe.diagnosis.evidence import NO_SCAN, Rival, of_one_class
 from pendpipe.diagnosis.refine import pulled, refine
-from pendpipe.diagnosis.refits import NEAR, _names_first, refit_leads, side_by_side, useful_chi2
+from pendpipe.diagnosis.rivals import (
+    NEAR,
+    NO_SCAN,
+    Rival,
+    _names_first,
+    of_one_class,
+    refit_leads,
+    side_by_side,
+    useful_chi2,
+)
 from pendpipe.effects.baseline import OMEGA, A, C
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model

@@ -11,17 +11,18 @@ from scipy.stats import chi2, kstest
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import blocks
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.detect import detect, prepare
-from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit, refine
-from pendpipe.diagnosis.scores import (
+from pendpipe.diagnosis.detect import (
     Bank,
     build_bank,
+    detect,
     local_p_values,
+    prepare,
     scores_and_lengths,
     tangent_basis,
 )
-from pendpipe.diagnosis.task import applicable
+from pendpipe.diagnosis.hypothesis import applicable
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model
 

@@ -11,9 +11,9 @@ import pytest
 from pendpipe.diagnosis.state import Fault
 
 from pendpipe.diagnosis.detect import Chance, Lead, Trials
-from pendpipe.diagnosis.evidence import Rival, Scale, class_width, evidence, probabilities
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Finding
+from pendpipe.diagnosis.rivals import Rival, Scale, class_width, evidence, probabilities
 from pendpipe.diagnosis.run import Outcome, diagnose_recording
 from pendpipe.diagnosis.weighing import fault_named, law_of, weigh
 from pendpipe.effects import Effect

@@ -31,12 +31,12 @@ from pendpipe.arguments import (
 )
 from pendpipe.diagnosis.result import FILE_NAME, not_analysable
 from pendpipe.diagnosis.run import Outcome, diagnose_decay, diagnose_recording
-from pendpipe.diagnosis.statement import listed
 from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
 from pendpipe.files import check_output, distinct_names, make_folder, write_json, write_whole
 from pendpipe.manifest import check, job
 from pendpipe.process import keep_memory
+from pendpipe.quantities import listed
 from pendpipe.recording import Recording
 from pendpipe.stages.refusal import reason_of, within_results
 

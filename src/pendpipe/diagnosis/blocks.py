@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 from scipy.fft import idct
 
 from pendpipe.arrays import FloatArray, IntArray
-from pendpipe.diagnosis.gauss_newton import Evaluation
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.refine import Evaluation, Fit
 
 _MANY: Final = 16_000
 """Readings from which on they are compared in blocks."""

@@ -14,13 +14,13 @@ import numpy as np
 from pendpipe.arrays import BoolArray
 from pendpipe.diagnosis.data import Data, at_even_times
 from pendpipe.diagnosis.detect import TESTS_SHARE
-from pendpipe.diagnosis.evidence import Rival
 from pendpipe.diagnosis.forensics import TESTS, Test, corrections
 from pendpipe.diagnosis.forensics.glitches import find_in_misfit
-from pendpipe.diagnosis.gauss_newton import SETTLED
 from pendpipe.diagnosis.hypothesis import (
+    RANDOM,
     Fault,
     Hypothesis,
+    Task,
     is_further,
     is_gross,
     loses_phase,
@@ -28,10 +28,10 @@ from pendpipe.diagnosis.hypothesis import (
 )
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import TAPS, white_noise
-from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.refine import SETTLED, refine
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import Finding, Location
-from pendpipe.diagnosis.task import Task
+from pendpipe.diagnosis.rivals import Rival
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.estimate import Estimate
 
@@ -43,8 +43,6 @@ _TESTED_AFTER: Final = (
     "coloured-noise",
     "broadband-drive",
 )
-RANDOM: Final = ("jitter", "broadband-drive")
-"""Faults that count as names: a random cause can take what a wrong name leaves."""
 _SHARE_OF_EACH: Final = TESTS_SHARE / (len(_TESTED_BEFORE) + len(_TESTED_AFTER))
 _ROUNDS: Final = 3
 _FAR: Final = 8.0

@@ -1,8 +1,10 @@
-"""A hypothesis: a set of effects with its fit, its noise, and the faults of the measurement."""
+"""A set of effects with its fit, its noise and its faults; and what a search is to do."""
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
@@ -11,25 +13,31 @@ import numpy as np
 
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray
+from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data, with_lattice
-from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Detection
-from pendpipe.diagnosis.evidence import Rival
+from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Detection, detect, prepare
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise
 from pendpipe.diagnosis.refine import LARGE_PHASE_ERROR, Fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import INCOMPLETE, Remainder, remainder_of
 from pendpipe.diagnosis.result import Finding
+from pendpipe.diagnosis.rivals import Rival
 from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
+from pendpipe.effects.catalogue.reading import SoftClipping
+from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN, circular_error
+from pendpipe.effects.curves import CURVES, Curve
 
 CHOICE: Final = 7.4
 """Price of a name or curve beside a remaining misfit: it is one of some forty (2 ln 40)."""
 FURTHER: Final = 22.0
 """Price of each further name: a choice, in a recording that needs two at once, which is as rare
 again as two choices."""
+RANDOM: Final = ("jitter", "broadband-drive")
+"""Faults that count as names: a random cause can take what a wrong name leaves."""
 GROSS: Final = 2.0
 """chi^2 per degree of freedom above which first-order scores are meaningless."""
 _ESTIMATE_AGAIN: Final = 0.95
@@ -247,3 +255,93 @@ def settled(
             break
         left, better = again, refine(fit.model, finer, again, better.value, held=held)
     return better, finer, left
+
+
+def applicable(
+    catalogue: Sequence[Effect], fit: Fit, baseline: str, unit: str, *, rare: bool = False
+) -> list[Effect]:
+    """Return the effects that a baseline may lack, and curves for what has no name.
+
+    Or, with `rare`, those that are asked where a curve would be added: rare effects, and what every
+    pendulum has.
+
+    What happens at an instant may happen twice: a second one is a copy, so that the model can
+    tell their values apart.
+    """
+    value = fit.value
+    present = {"a": value[0] > 0.0, "b": value[1] > 0.0, "c": value[2] > 0.0}
+    used = {effect.identifier for effect in fit.model.effects}
+    named = [
+        copy(effect) if effect.identifier in used else effect
+        for effect in catalogue
+        if effect.has_signature
+        and (effect.rare or (rare and effect.expected)) == rare
+        and baseline not in effect.inside
+        and (unit in ("rad", "rad/s") or not effect.angular)
+        and not (effect.form and fit.at.span.pendulum.has(effect.form))
+        and all(present[name] for name in effect.needs)
+        and (effect.identifier not in used or effect.local)
+    ]
+    if rare:
+        return list(fit.model.admitted(named))
+    keys = {effect.key for effect in fit.model.effects}
+    forms: list[Effect | None] = [SoftClipping()]
+    if any(effect.identifier == circular_error.identifier for effect in catalogue):
+        forms.append(CIRCULAR_ERROR_IN.get(unit))
+    named += [form for form in forms if form and form.key not in keys]
+    return [*fit.model.admitted(named), *undrawn(CURVES, fit)]
+
+
+def undrawn(curves: Sequence[type[Curve]], fit: Fit) -> list[Effect]:
+    """Return the curves along a fitted motion, without those in its model."""
+    present = {effect.key for effect in fit.model.effects}
+    made = fit.model.admitted([curve(fit.at.span) for curve in curves])
+    return [curve for curve in made if curve.key not in present]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a search is to do.
+
+    Parameters
+    ----------
+    catalogue, released
+        The effects that may be missing, and the held parameters that may be wrong.
+    baseline, level, seed
+        As in `search`.
+    progress
+        Receives one line for each step.
+    samples
+        The readings as they were recorded; None where the measurement is not tested.
+    """
+
+    catalogue: Sequence[Effect]
+    released: Sequence[Effect]
+    baseline: str
+    level: float
+    seed: int
+    progress: Progress
+    samples: Samples | None = None
+
+    @property
+    def threshold(self) -> float:
+        """The catalogue's part of the significance level."""
+        return self.level * CATALOGUE_SHARE
+
+    def rare(self, state: Hypothesis) -> list[Effect]:
+        """Return the names that are asked where a curve would be added."""
+        return applicable(self.catalogue, state.fit, self.baseline, state.data.unit, rare=True)
+
+    def scanned(self, state: Hypothesis) -> Hypothesis:
+        """Score all that may be missing on a hypothesis's residual (into `now`), once."""
+        asked = state.fit, state.data, state.noise
+        if state.scanned is not None and all(map(operator.is_, asked, state.scanned)):
+            return state
+        effects = [
+            *applicable(self.catalogue, state.fit, self.baseline, state.data.unit),
+            *(entry for entry in self.released if entry not in state.fit.model.effects),
+        ]
+        self.progress(f"scanning {len(effects)} effects")
+        scanner = prepare(state.fit, state.data, state.noise, effects)
+        now = detect(scanner, state.fit, seed=self.seed, known=state.now)
+        return replace(state, now=now, first=state.first or now, scanned=(*asked, effects))

@@ -10,9 +10,9 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.detect import scores_and_lengths
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit, better
-from pendpipe.diagnosis.scores import scores_and_lengths
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.reading import DroppedSamples, OffsetStep
 from pendpipe.estimate import Z95, Estimate

@@ -11,13 +11,10 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.remainder import by_cycle
 from pendpipe.diagnosis.result import Location
-from pendpipe.diagnosis.spectrum import OFF_HARMONIC
-from pendpipe.diagnosis.statement import listed
+from pendpipe.diagnosis.rivals import last_in
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
-from pendpipe.estimate import Estimate
-from pendpipe.quantities import after_number, with_error
+from pendpipe.quantities import after_number, listed, with_error
 
 _INTERVAL_SHARE: Final = 0.9
 """Part of what an effect explains that its intervals hold."""
@@ -53,7 +50,7 @@ def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
     harmonics = _harmonics(sampled.phase, difference)
     frequency = sampled.motion.angular_frequency / (2.0 * math.pi)
     lines: tuple[float, ...] = tuple(round(h * frequency, 9) for h in harmonics if h > 0)
-    tone = _last_in(after, effect, "Hz") if effect.spectral else None
+    tone = last_in(after, effect, "Hz") if effect.spectral else None
     if tone is not None:
         lines, harmonics = (tone.value,), ()
     found = Location(time, amplitude, phase, lines, harmonics)
@@ -114,42 +111,8 @@ def _harmonics(phase: FloatArray, difference: FloatArray) -> tuple[int, ...]:
 def instant_of(fit: Fit, effect: Effect) -> tuple[float, float] | None:
     """Return the 95 % interval of the instant at which a sudden effect happens; else None."""
     sudden = any(parameter.name == "time" for parameter in effect.parameters)
-    found = _last_in(fit, effect, "s") if sudden else None
+    found = last_in(fit, effect, "s") if sudden else None
     return None if found is None else (found.value - 1.96 * found.sd, found.value + 1.96 * found.sd)
-
-
-def off_harmonics(fit: Fit, effect: Effect) -> bool:
-    """Whether an effect is a line off the motion's harmonics: no misfit of the motion makes one."""
-    off = _from_harmonic(fit, effect)
-    return off is not None and off.value > OFF_HARMONIC
-
-
-def near_harmonic_by_chance(fit: Fit, effect: Effect) -> float:
-    """Return the probability that a line is by chance as near a harmonic; 1 for what is no line.
-
-    Of a line anywhere, twice the distance in units of the motion's frequency, with its error. Any
-    law of the motion makes lines at the harmonics. So does any periodic error of the sensor at
-    their aliases, and an error of every second reading at those of half the sampling rate.
-    """
-    rate = 1.0 / fit.at.span.interval_s
-    found = [_from_harmonic(fit, effect, about) for about in (0.0, 0.5 * rate, rate)]
-    off = [each.value + each.sd for each in found if each is not None]
-    if not off:
-        return 1.0
-    return min(max(2.0 * off[0], 1e-9), 2.0 * len(off) * max(min(off), 1e-9), 1.0)
-
-
-def _from_harmonic(fit: Fit, effect: Effect, about_hz: float = 0.0) -> Estimate | None:
-    """Return the distance of a line from the nearest harmonic about a frequency, over the motion's.
-
-    None for what is no line.
-    """
-    tone = _last_in(fit, effect, "Hz") if effect.spectral else None
-    if tone is None:
-        return None
-    motion = 0.5 * float(fit.value[OMEGA]) / math.pi
-    off = abs(math.remainder(tone.value - about_hz, motion))
-    return Estimate(off / motion, tone.sd / motion, "")
 
 
 def beat_of(fit: Fit, effect: Effect) -> float | None:
@@ -161,19 +124,11 @@ def beat_of(fit: Fit, effect: Effect) -> float | None:
     phase, time = fit.at.sampled.phase, fit.at.sampled.time_s
     own = float(phase[-1] - phase[0]) / float(time[-1] - time[0]) / (2.0 * math.pi)
     beside = isinstance(effect, PlaneCoupling)
-    found = _last_in(fit, effect, "Hz") if beside or effect.spectral else None
+    found = last_in(fit, effect, "Hz") if beside or effect.spectral else None
     if found is None:
         return None
     off = abs(found.value if beside else found.value - own)
     return 1.0 / off if 0.0 < off < 0.5 * own else None
-
-
-def _last_in(fit: Fit, effect: Effect, unit: str) -> Estimate | None:
-    """Return an effect's last parameter in that unit: instant and frequency follow the sizes."""
-    from pendpipe.diagnosis.values import effect_parameters
-
-    found = [each for each in effect_parameters(fit, effect).values() if each.unit == unit]
-    return found[-1] if found else None
 
 
 def _summary(found: Location, data: Data, amplitude: FloatArray, opposite: str) -> str:

@@ -1,10 +1,11 @@
 """Held parameters that may be wrong: fitting them separates this from missing physics."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.refine import Fit
 from pendpipe.effects.baseline import (
     HYSTERETIC,
     OFFSET,
@@ -18,6 +19,9 @@ from pendpipe.effects.baseline import (
     share_by_b,
 )
 from pendpipe.effects.effect import Effect
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.refine import Fit
 
 _INDEX: Final[Mapping[str, int]] = {
     "a": A,

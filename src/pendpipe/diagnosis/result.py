@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.torque import Restoring
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.diagnosis.cycles import SmallSwings
-from pendpipe.diagnosis.held_out import HeldOut
-from pendpipe.diagnosis.remainder import Remainder
 from pendpipe.diagnosis.summary import Summary, summarise
 from pendpipe.estimate import Estimate
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.cycles import SmallSwings
+    from pendpipe.diagnosis.held_out import HeldOut
+    from pendpipe.diagnosis.remainder import Remainder
 
 FILE_NAME: Final = "diagnosis.json"
 BASELINES: Final = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}

@@ -20,6 +20,7 @@ from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning, begin
 from pendpipe.diagnosis.cycles import SmallSwings, small_swings
 from pendpipe.diagnosis.data import with_scatter
+from pendpipe.diagnosis.detect import whitened
 from pendpipe.diagnosis.forensics.codes import with_true_step
 from pendpipe.diagnosis.forensics.colour import level_note, wander_note
 from pendpipe.diagnosis.forensics.corrections import loss_confirmed
@@ -37,7 +38,6 @@ from pendpipe.diagnosis.result import (
     Location,
     swinging,
 )
-from pendpipe.diagnosis.scores import whitened
 from pendpipe.diagnosis.search import search
 from pendpipe.diagnosis.statement import statement
 from pendpipe.diagnosis.summary import COLOURED_NOISE, Summary, html_of

@@ -8,34 +8,73 @@ import numpy as np
 
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.diagnosis import Progress, silent
-from pendpipe.diagnosis.alternatives import prefer_parameters, reconsider_red_noise
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.detect import CATALOGUE_SHARE, more_leads, printed
-from pendpipe.diagnosis.evidence import Rival, Scale
+from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Lead, more_leads, printed
 from pendpipe.diagnosis.faults import correct, examine, examine_again, random_torque
 from pendpipe.diagnosis.held_out import predicts_worse
 from pendpipe.diagnosis.hypothesis import (
     Hypothesis,
     Step,
+    Task,
     first_noise,
     is_gross,
     loses_phase,
     price,
+    undrawn,
 )
-from pendpipe.diagnosis.moves import describe, improve, prefer_rare, refit_without
+from pendpipe.diagnosis.moves import (
+    describe,
+    improve,
+    prefer_parameters,
+    prefer_rare,
+    reconsider_red_noise,
+    refit_without,
+)
 from pendpipe.diagnosis.refine import Fit, best_fit, fitted_from
-from pendpipe.diagnosis.refits import refit_leads
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
 from pendpipe.diagnosis.result import BASELINES
-from pendpipe.diagnosis.second_mode import second_mode_first
-from pendpipe.diagnosis.task import Task, undrawn
+from pendpipe.diagnosis.rivals import NO_SCAN, Rival, Scale, refit_leads
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C
+from pendpipe.effects.catalogue.in_time import BEATING_MODE
 from pendpipe.effects.curves import FOLLOW_UP_CURVES, Curve
 from pendpipe.quantities import compact
+
+
+def second_mode_first(beginning: Beginning, state: Hypothesis, task: Task) -> Hypothesis:
+    """Fit it from its own start, and take it as the first effect if it leaves less.
+
+    Parameters
+    ----------
+    beginning
+        Its `second_mode` is the start.
+    state
+        After the baseline's fit.
+    task
+        What the search is to do.
+    """
+    if beginning.second_mode is None:
+        return state
+    task.progress(f"the turning points beat: fitting {BEATING_MODE.name} first")
+    before, data, noise = state.fit, state.data, state.noise
+    start = np.concatenate([beginning.value, beginning.second_mode])
+    fit = fitted_from(before.model.adding(BEATING_MODE), data, noise, start, held=state.held)
+    # Without its phase a model's chi^2 says less than the squares of what it leaves.
+    if fit is None or not _square(fit, state) < _square(before, state):
+        return state
+    state = task.scanned(state)
+    lead = Lead(BEATING_MODE, (), before.chi2 - fit.chi2, 0.0)
+    rival = Rival.of(lead, fit, before.chi2, Scale.of(fit, data, noise), NO_SCAN)
+    step = Step((rival,), state.scan.p_value / CATALOGUE_SHARE, before)
+    return replace(state, steps=(step,)).settle(fit)
+
+
+def _square(fit: Fit, state: Hypothesis) -> float:
+    return float(np.sum((state.data.residual(fit.at.reading) * state.data.weight) ** 2))
+
 
 _MOST_EFFECTS: Final = 4
 _GOOD_PART: Final = 1.0 / 3.0

@@ -23,9 +23,8 @@ from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.evidence import Scale
 from pendpipe.diagnosis.held_out import held_out
-from pendpipe.diagnosis.hypothesis import Hypothesis, Step, loses_phase, price
+from pendpipe.diagnosis.hypothesis import Hypothesis, Step, Task, loses_phase, price
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
@@ -37,11 +36,11 @@ from pendpipe.diagnosis.result import (
     Location,
     swinging,
 )
+from pendpipe.diagnosis.rivals import Scale
 from pendpipe.diagnosis.run import LEVEL, Answer, Outcome, diagnose_recording
 from pendpipe.diagnosis.search import LESS_FRICTION, grown
-from pendpipe.diagnosis.statement import DOUBTFUL, listed, statement
+from pendpipe.diagnosis.statement import DOUBTFUL, statement
 from pendpipe.diagnosis.summary import COLOURED_NOISE
-from pendpipe.diagnosis.task import Task
 from pendpipe.diagnosis.values import constants_of
 from pendpipe.diagnosis.weighing import (
     Weighed,
@@ -59,7 +58,7 @@ from pendpipe.effects.stack import MAY_DIFFER, Differs, Stack
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.estimate import Z95, Estimate
 from pendpipe.files import write_json, writing
-from pendpipe.quantities import compact
+from pendpipe.quantities import compact, listed
 from pendpipe.recording import Recording
 
 _HEAD: Final = 0.25

@@ -14,7 +14,7 @@ from pendpipe.diagnosis.result import BASELINES, FittedModel, FoundEffect
 from pendpipe.diagnosis.summary import COLOURED_NOISE, name_of
 from pendpipe.effects.catalogue import CATALOGUE
 from pendpipe.estimate import Estimate
-from pendpipe.quantities import compact, with_error
+from pendpipe.quantities import compact, listed, with_error
 
 _PROBABLE: Final = 0.5
 """Probability from which an effect is reported without "possibly"."""
@@ -330,13 +330,6 @@ def _percent(share: float) -> str:
 def _factor(ratio: float) -> str:
     """A ratio to two digits, without a power of ten."""
     return f"{float(f'{ratio:.2g}'):,.0f}" if ratio > 9.95 else f"{ratio:.2g}"
-
-
-def listed(items: Sequence[str], last: str = "and") -> str:
-    """Join items to "x, y and z"."""
-    if len(items) < 2:
-        return "".join(items)
-    return f"{', '.join(items[:-1])} {last} {items[-1]}"
 
 
 def _capital(text: str) -> str:

@@ -1,15 +1,19 @@
 """Readings beside a model's motion, cycle by cycle: amplitude, phase, and the residual along it."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
-from pendpipe.diagnosis.data import Data
 from pendpipe.dynamics.any_law import Sampled
 from pendpipe.effects.model import Evaluated
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.data import Data
 
 _LARGE_DIFFERENCE: Final = 0.15
 """Phase difference in rad, and relative difference of amplitude, from which the simple difference

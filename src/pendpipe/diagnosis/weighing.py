@@ -11,17 +11,24 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
-from pendpipe.diagnosis.evidence import Rival, Scale, class_width, of_one_class, probabilities
-from pendpipe.diagnosis.faults import RANDOM
-from pendpipe.diagnosis.gauss_newton import SETTLED
-from pendpipe.diagnosis.hypothesis import Fault, Hypothesis, Step, is_further, is_gross
+from pendpipe.diagnosis.hypothesis import RANDOM, Fault, Hypothesis, Step, is_further, is_gross
 from pendpipe.diagnosis.instants import with_instants
-from pendpipe.diagnosis.location import locate, near_harmonic_by_chance, off_harmonics
-from pendpipe.diagnosis.refine import Fit, best_fit, misfit
-from pendpipe.diagnosis.refits import NEAR, useful_chi2
+from pendpipe.diagnosis.location import locate
+from pendpipe.diagnosis.refine import SETTLED, Fit, best_fit, misfit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import with_errors
 from pendpipe.diagnosis.result import FoundEffect
+from pendpipe.diagnosis.rivals import (
+    NEAR,
+    Rival,
+    Scale,
+    class_width,
+    near_harmonic_by_chance,
+    of_one_class,
+    off_harmonics,
+    probabilities,
+    useful_chi2,
+)
 from pendpipe.diagnosis.values import curve_values, effect_parameters
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
