@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from pendpipe.analysis.free_decay import FreeDecay
     from pendpipe.analysis.torque import Restoring
     from pendpipe.analysis.turning_points import TurningPoints
-    from pendpipe.diagnosis.run import Outcome
-    from pendpipe.diagnosis.several import JointOutcome
+    from pendpipe.diagnosis.result import Diagnosis
     from pendpipe.estimate import Estimate
     from pendpipe.formats import Inspection
 
@@ -392,7 +391,7 @@ def diagnose(
     own: Sequence[str] = (),
     same_sensor: bool = False,
     together: bool = False,
-) -> Outcome | JointOutcome:
+) -> Diagnosis:
     """Find what physics a fit of Eq. 8 leaves out of a recording.
 
     Eq. 8 is fitted to the free decay; its residual is searched for every effect of the catalogue
@@ -428,7 +427,7 @@ def diagnose(
 
     Returns
     -------
-    Outcome, or JointOutcome of several recordings
+    Diagnosis
         Prints as a dozen lines; ``.summary``, ``.verdict``, ``.effects``, ``.plot()``,
         ``.to_dict()``,
         ``.save(folder)``.

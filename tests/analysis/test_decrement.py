@@ -294,7 +294,7 @@ def test_fit_and_diagnosis_print_the_same_baseline(
     points, part = measure_recording(recording, "recording")
     fitted = fit_recording(part, points=points)
     assert fitted.method == method
-    diagnosed = diagnose_recording(recording).diagnosis.baseline
+    diagnosed = diagnose_recording(recording).baseline
     for name, estimate in fitted.parameters.items():
         found = diagnosed.parameters[name]
         assert abs(found.value - estimate.value) < 0.1 * estimate.sd

@@ -18,10 +18,11 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import silent
 from pendpipe.diagnosis.begin import Beginning, begin
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.hypothesis import Task
+from pendpipe.diagnosis.hypothesis import Hypothesis, Task
 from pendpipe.diagnosis.noise import Noise, white_noise
 from pendpipe.diagnosis.refine import Fit, refine
-from pendpipe.diagnosis.run import Outcome, _fit_of, diagnose_recording
+from pendpipe.diagnosis.result import Diagnosis
+from pendpipe.diagnosis.run import _fit_of, diagnose_recording
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.any_law import Motion
 from pendpipe.effects import Effect
@@ -83,6 +84,15 @@ def beginning_of(record: Recording, restoring: Restoring | None = None) -> Begin
     points, part = measure_recording(record, "the test")
     fit = fit_recording(part, points=points, restoring=restoring)
     return begin(prepare(part, "the test"), points, fit, baseline="eq8", fixed={})
+
+
+def hypothesis_of(
+    fit: Fit, data: Data, noise: Noise, held: tuple[int, ...], *more: Any, **names: Any
+) -> Hypothesis:
+    """What may be true of readings that were chosen as they are; then the fields as they come."""
+    points: Any = None
+    begun = Beginning(data, fit.model.bare(), fit.value[: len(TRUTH)], held, NOISE_RAD, points)
+    return Hypothesis(begun, fit, data, noise, held, *more, **names)
 
 
 def task_of(samples: Samples | None = None) -> Task:
@@ -148,7 +158,7 @@ _READINGS: dict[str, Callable[[], FloatArray]] = {
 
 
 @functools.cache
-def diagnosed(name: str, seed: int = 1) -> Outcome:
+def diagnosed(name: str, seed: int = 1) -> Diagnosis:
     """The diagnosis of an effect's recording, or of one of the others above: wheels and springs."""
     if name == "circular-error":
         return scanned(name)
@@ -157,7 +167,7 @@ def diagnosed(name: str, seed: int = 1) -> Outcome:
 
 
 @functools.cache
-def scanned(name: str) -> Outcome:
+def scanned(name: str) -> Diagnosis:
     """The same where the fit takes x, so that the scan finds whatever else there is."""
 
     def linear(*given: Any) -> FitResult | None:
@@ -167,11 +177,11 @@ def scanned(name: str) -> Outcome:
         return diagnose_recording(recording(with_effects(name), 1))
 
 
-def classes_found(outcome: Outcome) -> list[set[str]]:
+def classes_found(outcome: Diagnosis) -> list[set[str]]:
     """The identifiers of each found effect's class."""
     return [
         {effect.identifier, *(name for name, _ in effect.indistinguishable)}
-        for effect in outcome.diagnosis.effects
+        for effect in outcome.effects
     ]
 
 

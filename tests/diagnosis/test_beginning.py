@@ -73,7 +73,7 @@ def test_a_short_record_of_a_pendulum_is_a_pendulums_first() -> None:
     found = diagnose_recording(Recording(time_s, readings, "angle_rad"))
     presumed = found.effects[0]
     assert (presumed.identifier, presumed.presumed) == ("circular-error", True)
-    assert "cubic-stiffness" not in {each.identifier for each in found.diagnosis.missing}
+    assert "cubic-stiffness" not in {each.identifier for each in found.missing}
 
 
 def test_time_stamps_are_corrected_after_sin_x_was_fitted_to_them() -> None:
@@ -100,14 +100,14 @@ def test_two_coupled_pendulums_are_two_modes_at_their_frequencies() -> None:
     assert [each.identifier for each in found.effects] == ["second-mode"]
     assert found.effects[0].probability > 0.95
     own, other = (
-        found.diagnosis.improved.parameters["frequency"],
+        found.improved.parameters["frequency"],
         found.effects[0].parameters["f_2"],
     )
     modes = sorted((2.0 * np.pi * each.value, 2.0 * np.pi * each.sd) for each in (own, other))
     for (value, sd), truth in zip(modes, (low, high), strict=True):
         # Damping lowers a frequency by loss^2/(2 omega).
         assert value == pytest.approx(truth, abs=4.0 * sd + loss**2 / (2.0 * truth))
-    assert found.diagnosis.improved.chi2_per_dof == pytest.approx(1.0, abs=0.1)
+    assert found.improved.chi2_per_dof == pytest.approx(1.0, abs=0.1)
 
 
 @pytest.mark.parametrize(
@@ -132,8 +132,8 @@ def test_a_gyroscope_shows_sin_x_and_no_lost_samples(
     answer = diagnose_recording(readings)
     names = {each.identifier for each in answer.effects if each.presumed}
     assert names == {"circular-error", "drag-form"}
-    assert "dropped-samples" not in {each.identifier for each in answer.diagnosis.missing}
-    value = answer.diagnosis.improved.parameters["frequency"].value
+    assert "dropped-samples" not in {each.identifier for each in answer.missing}
+    value = answer.improved.parameters["frequency"].value
     assert 2.0 * np.pi * value == pytest.approx(omega, rel=2e-4)
 
 

@@ -71,7 +71,7 @@ def test_a_step_of_any_size_before_the_converter_is_a_coarser_step(times: float)
 def test_a_coarse_step_before_the_converter_is_all_that_is_reported(code: FloatArray) -> None:
     readings = rounded(rounded(STEP_16 * code, 12.62 * STEP_16), STEP_16)
     record = Recording(AIR.times(), readings, "angle_rad", resolution=STEP_16)
-    effects = diagnose_recording(record).diagnosis.effects
+    effects = diagnose_recording(record).effects
     assert [effect.identifier for effect in effects] == ["coarse-quantisation"]
     assert effects[0].parameters["step"].value == pytest.approx(12.62 * STEP_16, rel=1e-3)
 
@@ -146,7 +146,7 @@ def test_one_stuck_bit_may_be_either_effect(code: FloatArray) -> None:
     time = AIR.times()
     readings = STEP_16 * 2.0 * np.floor(code / 2.0)
     record = Recording(time, readings, "angle_rad", resolution=STEP_16)
-    effect = diagnose_recording(record).diagnosis.effects[0]
+    effect = diagnose_recording(record).effects[0]
     assert effect.identifier == "coarse-quantisation"
     ((other, probability),) = effect.indistinguishable
     assert other == "missing-codes"

@@ -33,7 +33,7 @@ SLOW = {"offset-drift", "equilibrium-creep", "ac-coupling", "equilibrium-step"}
 
 
 def named(readings: FloatArray, seed: int) -> set[str]:
-    found = diagnose_recording(recording(readings, seed)).diagnosis.effects
+    found = diagnose_recording(recording(readings, seed)).effects
     return {
         name
         for effect in found
@@ -57,7 +57,7 @@ def test_red_noise_is_not_reported_as_a_drift() -> None:
     for seed in range(24):
         cosines = np.sqrt(spectrum) * np.random.default_rng(seed).standard_normal(len(TIME_S))
         noise = NOISE_RAD * idct(cosines, norm="ortho")
-        found = diagnose_recording(Recording(TIME_S, CLEAN + noise, "angle_rad")).diagnosis
+        found = diagnose_recording(Recording(TIME_S, CLEAN + noise, "angle_rad"))
         reported += any(effect.identifier in SLOW for effect in found.effects)
     assert binom.sf(reported - 1, 24, 0.01) > 1e-3
 
@@ -83,7 +83,7 @@ def test_what_wanders_more_slowly_than_the_motion_is_told_beside_what_is_faster(
     time_s = TIME_S + np.where(np.arange(len(TIME_S)) % 2, 0.0, uneven * INTERVAL_S)
     wander = 5e-3 * np.exp(-(((time_s - 30.0) / 8.0) ** 2))
     angle_rad = other_engine(TRUTH, time_s) + wander + white(3)
-    found = diagnose_recording(Recording(time_s, angle_rad, "angle_rad")).diagnosis
+    found = diagnose_recording(Recording(time_s, angle_rad, "angle_rad"))
     assert not found.effects
     assert found.details.startswith("Eq. 8 describes the motion of this recording, whose zero")
     assert "the zero wanders by 1.4" in found.details

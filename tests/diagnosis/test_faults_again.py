@@ -25,7 +25,17 @@ from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
 
-from .records import INTERVAL_S, NOISE_RAD, TIME_S, TRUTH, other_engine, prepared, task_of, white
+from .records import (
+    INTERVAL_S,
+    NOISE_RAD,
+    TIME_S,
+    TRUTH,
+    hypothesis_of,
+    other_engine,
+    prepared,
+    task_of,
+    white,
+)
 
 LEVEL, ODD = 0.01, 812
 NOTHING = Detection((), 1.0, NO_SCAN)
@@ -43,7 +53,7 @@ def blamed(error: float, odd: int = ODD) -> tuple[Task, Hypothesis]:
     fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
     faults = (Fault(Finding("glitches", 1e-9, mask=mask), 1e-7, 0, mask),)
     samples = prepare(Recording(TIME_S, readings, "angle_rad"), "the test")
-    state = Hypothesis(fit, data, noise, (), fit, samples, faults=faults, first=NOTHING)
+    state = hypothesis_of(fit, data, noise, (), fit, samples, faults=faults, first=NOTHING)
     return task_of(samples), state
 
 
@@ -111,7 +121,7 @@ def test_glitches_are_masked_before_a_model_that_is_far_off_is_mended() -> None:
     off[OMEGA] *= 1.01
     fit = refine(right.fit.model, data, noise, off, held=(OMEGA,))
     assert is_gross(fit, data)
-    begun = Hypothesis(fit, data, noise, (OMEGA,), fit, right.samples)
+    begun = hypothesis_of(fit, data, noise, (OMEGA,), fit, right.samples)
     state = correct(begun, task)
     (fault,) = state.faults
     assert fault.finding.identifier == "glitches"
@@ -127,7 +137,7 @@ def test_clipping_is_reported_once() -> None:
     """A nonlinear sensor is tried first; with the clipped readings masked it is not needed."""
     level = 0.9 * float(other_engine(TRUTH).max())
     record = Recording(TIME_S, clipped_at(level), "angle_rad")
-    found = diagnose_recording(record).diagnosis
+    found = diagnose_recording(record)
     (effect,) = found.effects
     assert effect.identifier == "clipping"
     assert effect.parameters["upper_level"].value == pytest.approx(level, rel=1e-6)

@@ -17,7 +17,6 @@ from pendpipe.diagnosis.forensics import TESTS
 from pendpipe.diagnosis.forensics.corrections import LostSamples, find_lost_samples
 from pendpipe.diagnosis.forensics.glitches import _smallest_p_value, find_in_misfit
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
-from pendpipe.diagnosis.hypothesis import Hypothesis
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Finding
@@ -29,7 +28,7 @@ from pendpipe.recording import Recording
 from .decays import FREQUENCY_HZ, Fitted, Pendulum, fitted, rounded
 from .examine import examine
 from .faults import AIR, FAULTS, NOISE, STEP_12, STEP_16, speed, white
-from .records import null_fit, task_of
+from .records import hypothesis_of, null_fit, task_of
 
 FOUND = 1e-3
 
@@ -357,7 +356,7 @@ def test_lost_samples_that_no_motion_could_follow_are_not_corrected(
         "pendpipe.diagnosis.faults.corrections.find_lost_samples", lambda *_: [late]
     )
     samples = prepare(Recording(data.time_s, data.values, "angle_rad"), "the test")
-    state = correct(Hypothesis(fit, data, noise, (), fit, samples), task_of(samples))
+    state = correct(hypothesis_of(fit, data, noise, (), fit, samples), task_of(samples))
     assert np.array_equal(state.data.time_s, data.time_s)
     assert "dropped-samples" not in [fault.finding.identifier for fault in state.faults]
 
@@ -375,7 +374,7 @@ def test_a_loss_that_is_placed_a_reading_off_makes_no_glitch(
     monkeypatch.setattr(
         "pendpipe.diagnosis.faults.corrections.find_lost_samples", lambda *_: [placed]
     )
-    begun = Hypothesis(record.fit, record.data, record.noise, (), record.fit, record.samples)
+    begun = hypothesis_of(record.fit, record.data, record.noise, (), record.fit, record.samples)
     state = correct(begun, task_of(record.samples))
     (fault,) = state.faults
     assert fault.finding.identifier == "dropped-samples"
@@ -389,7 +388,7 @@ def test_readings_left_out_beside_a_step_are_no_gain_of_a_correction() -> None:
     weight = data.weight.copy()
     weight[np.arange(50, len(data), 30)] = 0.0
     samples = prepare(Recording(data.time_s, data.values, "angle_rad"), "the test")
-    state = Hypothesis(fit, data, noise, (), fit, samples)
+    state = hypothesis_of(fit, data, noise, (), fit, samples)
     unchanged = replace(data, weight=weight)
     found = corrected_by(state, task_of(samples), unchanged, Finding("clock-slips", 1e-9))
     assert found is state

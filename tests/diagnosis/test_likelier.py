@@ -12,7 +12,8 @@ import pytest
 from pendpipe.diagnosis import weighing
 from pendpipe.diagnosis.hypothesis import Hypothesis, Step
 from pendpipe.diagnosis.refine import refine
-from pendpipe.diagnosis.run import Outcome, diagnose_recording
+from pendpipe.diagnosis.result import Diagnosis
+from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.weighing import Weighed, swap_in_likelier, weigh
 from pendpipe.effects.baseline import B
 
@@ -20,13 +21,13 @@ from .records import TRUTH, diagnosed, other_engine, recording, scanned
 
 
 @functools.cache
-def wrong_loss() -> Outcome:
+def wrong_loss() -> Diagnosis:
     """A prediction with a wrong b: nothing is missing."""
     given = {"b": 1.1 * float(TRUTH[B])}
     return diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
 
 
-def having_taken(outcome: Outcome, name: str) -> Hypothesis:
+def having_taken(outcome: Diagnosis, name: str) -> Hypothesis:
     """The same search as if it had added another of the refitted effects."""
     found = outcome.search
     (step,) = found.steps
@@ -46,9 +47,9 @@ def having_taken(outcome: Outcome, name: str) -> Hypothesis:
     )
 
 
-def led(outcome: Outcome, name: str) -> tuple[Step, float, dict[str, float], Hypothesis]:
+def led(outcome: Diagnosis, name: str) -> tuple[Step, float, dict[str, float], Hypothesis]:
     """Return the final leader if another was added first, and all probabilities."""
-    found, (weighed,) = swap_in_likelier(having_taken(outcome, name), outcome.beginning)
+    found, (weighed,) = swap_in_likelier(having_taken(outcome, name))
     (step,) = found.steps
     own, *others = weighed.weights[:-1].tolist()
     mates = {mate.identifier: each for mate, each in zip(weighed.mates, others, strict=True)}
@@ -96,7 +97,7 @@ def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
 
     monkeypatch.setattr(weighing, "weigh", weighed)
     outcome = scanned("circular-error")
-    found, _ = swap_in_likelier(outcome.search, outcome.beginning)
+    found, _ = swap_in_likelier(outcome.search)
     assert [effect.identifier for effect in found.fit.model.effects] == [leads]
     assert found.steps[0].winner.identifier == leads
 
@@ -105,7 +106,7 @@ def test_no_second_curve_is_swapped_in() -> None:
     """One curve follows what no name explains; a second would only share it."""
     found = scanned("circular-error").search
     (step,) = found.steps
-    each = weigh(found, scanned("circular-error").beginning, step)
+    each = weigh(found, step)
     curve = next(rival for rival in step.rivals if rival.drawn)
     each = each._replace(mates=(curve,), weights=np.array([0.0, 1.0, 0.0]))
     assert weighing._likelier(found, step, each) is curve
@@ -135,7 +136,7 @@ def test_the_next_effect_is_compared_beside_the_new_leader(
     first = outcome.search.steps[0]
     other = first.rivals[1]
     monkeypatch.setattr(weighing, "_likelier", lambda _, step, __: other if step is first else None)
-    found, _ = swap_in_likelier(outcome.search, outcome.beginning)
+    found, _ = swap_in_likelier(outcome.search)
     assert found.steps[0].winner.identifier == other.identifier
     assert found.steps[1].before is found.steps[0].winner.fit
     assert found.steps[1].winner is outcome.search.steps[1].winner
@@ -161,7 +162,7 @@ def test_after_a_swap_every_effect_is_weighed_beside_the_new_ones(
     )
     # Trial models overflow, as in `diagnose_decay`.
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        found, weighed = swap_in_likelier(outcome.search, outcome.beginning)
+        found, weighed = swap_in_likelier(outcome.search)
     names = {rival.identifier for rival in wanted}
     assert {step.winner.identifier for step in found.steps} == names
     assert {effect.identifier for effect in found.fit.model.effects} == names

@@ -33,7 +33,7 @@ LARGE = np.where(TRUTH == 0.15, 0.4, TRUTH)
 
 
 def location_of(name: str) -> Location:
-    return diagnosed(name).diagnosis.effects[0].location
+    return diagnosed(name).effects[0].location
 
 
 def test_a_step_lies_at_its_instant() -> None:

@@ -38,6 +38,7 @@ from .records import (
     VALUES,
     classes_found,
     diagnosed,
+    hypothesis_of,
     null_fit,
     other_engine,
     prepared,
@@ -72,7 +73,7 @@ def state_with(readings: FloatArray, *names: str) -> Hypothesis:
         lead = Lead(effect, (), gain, 1e-12)
         rival = Rival.of(lead, fit, bare.chi2, Scale(fit.chi2), NO_SCAN)
         steps.append(Step((rival,), 1e-9, bare))
-    return Hypothesis(fit, data, noise, (), bare, steps=tuple(steps))
+    return hypothesis_of(fit, data, noise, (), bare, steps=tuple(steps))
 
 
 @given(scale=SCALES, behind=st.floats(0.0, 1e6))
@@ -152,7 +153,7 @@ def test_no_name_for_a_part_of_a_misfit_is_confident() -> None:
 def test_what_chance_does_not_explain_is_never_called_consistent(first_hz: float) -> None:
     """A line that sweeps by the fundamental, or the second harmonic, and is in no catalogue."""
     sweep = 1e-3 * np.sin(2.0 * np.pi * (first_hz + 4e-4 * TIME_S) * TIME_S)
-    found = diagnose_recording(recording(other_engine(TRUTH) + sweep, 5)).diagnosis
+    found = diagnose_recording(recording(other_engine(TRUTH) + sweep, 5))
     assert found.p_value < 0.01
     assert found.verdict == "missing-physics"
     assert found.effects
@@ -236,7 +237,7 @@ def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
     data, noise = prepared(other_engine(TRUTH) + bent + white(6))
     fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
     before = remainder_of(fit, data, noise)
-    state = describe(Hypothesis(fit, data, noise, (), fit), 1e-9, task_of())
+    state = describe(hypothesis_of(fit, data, noise, (), fit), 1e-9, task_of())
     assert state.steps[-1].winner.lead.effect.kind == "unnamed"
     after = remainder_of(state.fit, state.data, state.noise)
     assert after.excess < 0.2 * before.excess
@@ -250,13 +251,13 @@ def test_what_is_left_is_described_where_only_sin_x_was_found() -> None:
     fit = refine(model, data, noise, value)
     known = Step((Rival(Lead(sine, (), 9.0, 0.0), fit, 9.0, 9.0, 9.0),), 0.0, fit)
     bare = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
-    state = describe(Hypothesis(fit, data, noise, (), bare, steps=(known,)), 1e-9, task_of())
+    state = describe(hypothesis_of(fit, data, noise, (), bare, steps=(known,)), 1e-9, task_of())
     assert state.steps[-1].winner.drawn
 
 
 def test_noise_is_not_described() -> None:
     fit, data, noise = null_fit()
-    state = Hypothesis(fit, data, noise, (), fit)
+    state = hypothesis_of(fit, data, noise, (), fit)
     assert describe(state, 0.1, task_of()) is state
 
 
@@ -272,7 +273,7 @@ def test_a_rolling_shutter_is_no_second_mode(seed: int) -> None:
     angle = CubicSpline(finer, other_engine(TRUTH, finer) - TRUTH[7])
     late_s = -0.008 * angle(TIME_S)
     outcome = diagnose_recording(recording(angle(TIME_S + late_s) + TRUTH[7], seed))
-    (found,) = outcome.diagnosis.effects
+    (found,) = outcome.effects
     assert found.identifier == "rolling-shutter"
     kappa = found.parameters["kappa"]
     assert abs(kappa.value + 0.008) < 4.0 * kappa.sd

@@ -93,7 +93,7 @@ def test_a_ships_righting_moment_hardens() -> None:
 
 def test_a_ship_hardens_rather_than_drifts() -> None:
     """A clock that drifts by 0.7 % would fit as well, and has a lower prior."""
-    named = diagnose_recording(whole(SHIP)).diagnosis.missing
+    named = diagnose_recording(whole(SHIP)).missing
     assert named[0].identifier == "cubic-stiffness"
     k3 = named[0].parameters["k3"]
     # The coefficient is known to 0.08, and has its own error beside the misfit that is left.
@@ -135,7 +135,7 @@ def test_bearing_and_air_share_the_loss_of_a_rig() -> None:
 @pytest.mark.xfail(strict=True, reason="beside sin x presumed, presliding friction is likelier")
 def test_the_sine_precedes_a_clock_that_fits_slightly_better() -> None:
     """At 0.7 rad and without Eq. 3's quadratic drag a drift of the clock gains more."""
-    named = diagnose_recording(whole(VIDEO), baseline="viscous").diagnosis.effects
+    named = diagnose_recording(whole(VIDEO), baseline="viscous").effects
     assert named[0].identifier == "circular-error"
     assert named[0].probability > 0.5
     odds = {named[1].identifier: named[1].probability, **dict(named[1].indistinguishable)}

@@ -39,7 +39,7 @@ NAMES = tuple(VALUES)
 
 def test_eq_8_by_the_other_engine_is_consistent_but_for_one_in_a_hundred() -> None:
     seeds = range(1, 9)
-    alarms = sum(diagnosed("null", seed).diagnosis.p_value < 0.01 for seed in seeds)
+    alarms = sum(diagnosed("null", seed).p_value < 0.01 for seed in seeds)
     assert alarms <= binom.ppf(0.999, len(seeds), 0.01)
 
 
@@ -51,7 +51,7 @@ def test_what_lacks_nothing_is_scanned_once() -> None:
 
 @pytest.mark.parametrize("seed", range(1, 5))
 def test_the_verdict_is_that_of_the_p_value_and_the_noise_is_that_put_in(seed: int) -> None:
-    found = diagnosed("null", seed).diagnosis
+    found = diagnosed("null", seed)
     assert (found.verdict == "consistent") == (found.p_value > 0.01) == (found.effects == ())
     assert found.noise_rms_rad == pytest.approx(NOISE_RAD, rel=4.0 / np.sqrt(2 * 1500))
     for name, truth in (("frequency", FREQUENCY_HZ), ("offset", TRUTH[OFFSET])):
@@ -63,7 +63,7 @@ def test_a_coarse_step_that_does_no_harm_leaves_the_record_consistent() -> None:
     """Noise far below the step, and amplitudes far above it: p is that of the verdict."""
     step = 7.9e-5
     readings = rounded(other_engine(TRUTH) + white(1, rms=0.05 * step), step)
-    found = diagnose_recording(Recording(TIME_S, readings, "angle_rad", resolution=step)).diagnosis
+    found = diagnose_recording(Recording(TIME_S, readings, "angle_rad", resolution=step))
     assert found.verdict == "consistent"
     assert found.p_value > 0.01
 
@@ -72,11 +72,11 @@ def test_a_coarse_step_that_does_no_harm_leaves_the_record_consistent() -> None:
 def test_an_effect_is_named(name: str) -> None:
     """It leads, or is in the leader's class; and nothing else is reported."""
     outcome = diagnosed(name)
-    assert outcome.diagnosis.verdict == "missing-physics"
-    assert len(outcome.diagnosis.effects) == 1
+    assert outcome.verdict == "missing-physics"
+    assert len(outcome.effects) == 1
     assert name in classes_found(outcome)[0]
-    assert outcome.diagnosis.effects[0].p_value < 0.01
-    assert outcome.diagnosis.p_value < 0.01
+    assert outcome.effects[0].p_value < 0.01
+    assert outcome.p_value < 0.01
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if not by_identifier(name).parameter_free])
@@ -93,7 +93,7 @@ def test_its_parameters_are_those_that_were_put_in(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_improved_model_leaves_noise(name: str) -> None:
-    found = diagnosed(name).diagnosis
+    found = diagnosed(name)
     assert found.unexplained_p_value > 0.001
     assert found.improved.chi2_per_dof == pytest.approx(1.0, abs=4.0 * np.sqrt(2 / 1500))
     assert found.improved.residual_rms_rad < found.baseline.residual_rms_rad
@@ -109,7 +109,7 @@ def test_the_improved_model_leaves_noise(name: str) -> None:
     ],
 )
 def test_the_missing_effect_had_biased_the_fit(name: str, parameter: str, truth: float) -> None:
-    found = diagnosed(name).diagnosis
+    found = diagnosed(name)
     before, after = found.baseline.parameters[parameter], found.improved.parameters[parameter]
     assert abs(before.value - truth) > 5.0 * before.sd
     assert abs(after.value - truth) < 4.0 * after.sd
@@ -118,13 +118,13 @@ def test_the_missing_effect_had_biased_the_fit(name: str, parameter: str, truth:
 
 def test_lost_samples_are_counted_where_they_were_lost() -> None:
     outcome = diagnosed("dropped-samples")
-    assert [effect.identifier for effect in outcome.diagnosis.effects] == ["dropped-samples"]
-    effect = outcome.diagnosis.effects[0]
+    assert [effect.identifier for effect in outcome.effects] == ["dropped-samples"]
+    effect = outcome.effects[0]
     assert effect.parameters["samples"].value == 3.0
     assert effect.location.time_s is not None
     low, high = effect.location.time_s
     assert low - 0.6 < 700 / 15.0 < high + 0.6
-    assert outcome.diagnosis.improved.chi2_per_dof == pytest.approx(1.0, abs=0.15)
+    assert outcome.improved.chi2_per_dof == pytest.approx(1.0, abs=0.15)
 
 
 def test_two_effects_are_both_named() -> None:
@@ -133,11 +133,11 @@ def test_two_effects_are_both_named() -> None:
     assert len(classes) == 2
     assert sum("equilibrium-step" in names for names in classes) == 1
     assert sum("tone-pickup" in names for names in classes) == 1
-    assert outcome.diagnosis.unexplained_p_value > 0.001
+    assert outcome.unexplained_p_value > 0.001
 
 
 def test_what_happens_twice_is_reported_twice_each_with_its_own_size_and_instant() -> None:
-    effects = diagnosed("two steps").diagnosis.effects
+    effects = diagnosed("two steps").effects
     assert [effect.identifier for effect in effects] == ["equilibrium-step"] * 2
     size, instant_s = VALUES["equilibrium-step"]
     for effect, sign, at_s in zip(effects, (1.0, -0.5), (instant_s, LATER_S), strict=True):
@@ -150,17 +150,17 @@ def test_a_viscous_baseline_lacks_coulomb_friction() -> None:
     truth = LINEAR.copy()
     truth[2] = 3e-4
     outcome = diagnose_recording(recording(other_engine(truth), 3), baseline="viscous")
-    effect = outcome.diagnosis.effects[0]
+    effect = outcome.effects[0]
     assert effect.identifier == "coulomb-friction"
     (estimate,) = effect.parameters.values()
     assert abs(estimate.value - 3e-4) < 4.0 * estimate.sd
-    assert len(outcome.diagnosis.effects) == 1
+    assert len(outcome.effects) == 1
 
 
 def test_a_viscous_pendulum_is_consistent_with_a_viscous_baseline() -> None:
     outcome = diagnose_recording(recording(other_engine(LINEAR), 4), baseline="viscous")
-    assert outcome.diagnosis.verdict == "consistent"
-    linear = outcome.diagnosis.baseline.parameters["b"]
+    assert outcome.verdict == "consistent"
+    linear = outcome.baseline.parameters["b"]
     assert abs(linear.value - LINEAR[B]) < 4.0 * linear.sd
 
 
@@ -169,17 +169,17 @@ def test_a_wrong_prediction_of_the_loss_is_corrected_to_the_truth(factor: float)
     """If only b was given, and wrong, b is released and comes out right."""
     given = {"b": factor * float(TRUTH[B])}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
-    assert [effect.identifier for effect in outcome.diagnosis.effects] == ["parameter-b"]
-    assert outcome.diagnosis.effects[0].kind == "parameter"
-    found = outcome.diagnosis.improved.parameters["b"]
+    assert [effect.identifier for effect in outcome.effects] == ["parameter-b"]
+    assert outcome.effects[0].kind == "parameter"
+    found = outcome.improved.parameters["b"]
     assert abs(found.value - TRUTH[B]) < 4.0 * found.sd
 
 
 def test_a_right_prediction_is_consistent() -> None:
     given = {"a": float(TRUTH[0]), "b": float(TRUTH[B]), "c": float(TRUTH[2])}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
-    assert outcome.diagnosis.verdict == "consistent"
-    assert outcome.diagnosis.baseline.parameters["b"].value == TRUTH[B]
+    assert outcome.verdict == "consistent"
+    assert outcome.baseline.parameters["b"].value == TRUTH[B]
 
 
 def quality_factor(rate: float) -> float:
@@ -193,11 +193,11 @@ def test_no_part_of_the_loss_is_more_than_the_whole(part: str) -> None:
     name = f"quality_factor_{part}"
     given = {name: quality_factor(1.2 * float(TRUTH[B]))}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
-    assert [effect.identifier for effect in outcome.diagnosis.effects] == [f"parameter-{name}"]
-    least = outcome.diagnosis.baseline.parameters["b"]
+    assert [effect.identifier for effect in outcome.effects] == [f"parameter-{name}"]
+    least = outcome.baseline.parameters["b"]
     assert least.at_bound
     assert least.value == pytest.approx(1.2 * TRUTH[B], rel=1e-4)  # by the apparent frequency
-    found = outcome.diagnosis.improved.parameters["b"]
+    found = outcome.improved.parameters["b"]
     assert abs(found.value - TRUTH[B]) < 4.0 * found.sd
 
 
@@ -206,11 +206,11 @@ def test_a_part_of_the_loss_is_held_while_the_other_is_fitted(part: str, share: 
     rate = share * float(TRUTH[B])
     given = {f"quality_factor_{part}": quality_factor(rate)}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
-    assert outcome.diagnosis.verdict == "consistent"
+    assert outcome.verdict == "consistent"
     fit = outcome.search.baseline
     kept = getattr(pendulum_of(fit.value), part)
     assert kept == pytest.approx(rate, rel=1e-4)  # by the apparent frequency
-    found = outcome.diagnosis.baseline.parameters["b"]
+    found = outcome.baseline.parameters["b"]
     assert 0.0 < abs(found.value - TRUTH[B]) < 4.0 * found.sd
 
 
@@ -218,9 +218,9 @@ def test_a_viscous_baseline_has_one_part_and_holds_it() -> None:
     given = {"quality_factor_viscous": quality_factor(1.1 * float(LINEAR[B]))}
     record = recording(other_engine(LINEAR), 4)
     outcome = diagnose_recording(record, baseline="viscous", fixed=given)
-    names = [effect.identifier for effect in outcome.diagnosis.effects]
+    names = [effect.identifier for effect in outcome.effects]
     assert names == ["parameter-quality_factor_viscous"]
-    held = outcome.diagnosis.baseline.parameters["b"]
+    held = outcome.baseline.parameters["b"]
     assert held.sd == 0.0
 
 
@@ -237,16 +237,14 @@ def test_gaps_of_the_whole_recording_are_told_though_the_decay_has_none() -> Non
     points, part = measure_recording(record, "the test")
     rest = np.arange(TIME_S[0] - 12.0, TIME_S[0] - 7.0, TIME_S[1])
     whole = Recording(np.append(rest, TIME_S), np.append(0.0 * rest, record.values), "angle_rad")
-    told, silent = (
-        diagnose_decay(part, points, whole=given).diagnosis.warnings for given in (whole, record)
-    )
+    told, silent = (diagnose_decay(part, points, whole=given).warnings for given in (whole, record))
     (gap,) = set(told) - set(silent)
     assert f"a gap of {TIME_S[0] - rest[-1]:.4g} s" in gap
 
 
 @pytest.mark.parametrize("name", [*NAMES, "null", "two", "dropped-samples"])
 def test_probabilities_are_shared_by_the_class_and_none_of_these(name: str) -> None:
-    for effect in diagnosed(name).diagnosis.effects:
+    for effect in diagnosed(name).effects:
         rest = sum(probability for _, probability in effect.indistinguishable)
         assert effect.probability > 0.0
         assert effect.probability + rest <= 1.0 + 1e-12
@@ -254,7 +252,7 @@ def test_probabilities_are_shared_by_the_class_and_none_of_these(name: str) -> N
 
 @pytest.mark.parametrize("name", [*NAMES, "null", "two", "dropped-samples"])
 def test_the_result_is_json_without_nan(name: str) -> None:
-    content = diagnosed(name).diagnosis.to_dict()
+    content = diagnosed(name).to_dict()
     again = json.loads(json.dumps(content, allow_nan=False))
     assert set(again) >= {
         "schema_version",
@@ -291,10 +289,9 @@ def test_the_result_is_json_without_nan(name: str) -> None:
 def test_the_seed_decides_the_draws_and_nothing_else() -> None:
     record = recording(other_engine(TRUTH), 1)
     again, other = (
-        diagnose_recording(record, restoring="linear", seed=seed).diagnosis.to_dict()
-        for seed in (0, 1)
+        diagnose_recording(record, restoring="linear", seed=seed).to_dict() for seed in (0, 1)
     )
-    once = diagnosed("null").diagnosis.to_dict()
+    once = diagnosed("null").to_dict()
     assert again == once
     # Only p-values count trials by random draws.
     assert {key for key in once if other[key] != once[key]} == {"excluded"}
@@ -307,7 +304,7 @@ def test_noise_with_a_memory_is_noise_and_no_missing_physics() -> None:
     outcome = diagnose_recording(Recording(TIME_S, other_engine(TRUTH) + noise, "angle_rad"))
     assert [effect.identifier for effect in outcome.effects] == ["coloured-noise"]
     assert outcome.verdict == "consistent"
-    assert outcome.diagnosis.p_value > 0.01
+    assert outcome.p_value > 0.01
     assert str(outcome).startswith("nothing is missing")
     assert "its noise is coloured" in str(outcome)
 
@@ -321,7 +318,7 @@ def test_red_noise_beside_sin_x_is_noise(seed: int) -> None:
     assert not found.search.steps
     assert found.search.baseline.model.restoring == "sine"
     assert found.search.noise.coloured
-    b = found.diagnosis.improved.parameters["b"]
+    b = found.improved.parameters["b"]
     assert abs(b.value - TRUTH[B]) < 4.0 * b.sd
 
 
@@ -361,6 +358,6 @@ def test_of_noise_below_the_rounding_nothing_is_said() -> None:
     angle_rad = 1.79 * np.exp(-0.0036 * time_s) * np.cos(2.0 * np.pi / 1.822 * (time_s - 0.28))
     found = diagnose_recording(Recording(time_s, rounded(angle_rad, step_rad), "angle_rad"))
     assert found.verdict == "consistent"
-    assert not [line for line in found.diagnosis.warnings if "noise" in line]
-    assert found.diagnosis.improved.residual_rms_rad < step_rad / 12.0**0.5
-    assert "less than the rounding adds (3.14 mrad)" in found.diagnosis.details
+    assert not [line for line in found.warnings if "noise" in line]
+    assert found.improved.residual_rms_rad < step_rad / 12.0**0.5
+    assert "less than the rounding adds (3.14 mrad)" in found.details

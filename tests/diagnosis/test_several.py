@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 import pendpipe as pp
 from pendpipe.cli import main
-from pendpipe.diagnosis.several import JointOutcome
+from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.effects.baseline import A as QUADRATIC
 from pendpipe.effects.baseline import B as LINEAR
 from pendpipe.effects.baseline import C as FRICTION
@@ -46,7 +46,7 @@ def swing(amplitude: float, seed: int, *effects: dict[str, Any], **pendulum: flo
 
 
 @cache
-def together(kind: str) -> JointOutcome:
+def together(kind: str) -> Diagnosis:
     effects = {
         "nothing": [],
         "cubic": [{"id": "cubic-damping", "d": 0.1, "position_form": 0.0}],
@@ -57,7 +57,7 @@ def together(kind: str) -> JointOutcome:
         name = f"{1e3 * amplitude:.0f} mrad"
         releases[name] = swing(amplitude, 40 + number, *effects.get(kind, []), **odd)
     found = pp.diagnose(releases, volts_per_radian=1.0, together=True)
-    assert isinstance(found, JointOutcome)
+    assert isinstance(found, Diagnosis)
     return found
 
 
@@ -72,7 +72,7 @@ def test_three_releases_share_their_values_and_lack_nothing() -> None:
 
 def test_shared_values_are_better_known_than_in_the_best_recording() -> None:
     found = together("nothing")
-    best = min(each.diagnosis.improved.parameters["c"].sd for each in found.outcomes)
+    best = min(each.improved.parameters["c"].sd for each in found.alone)
     assert found.to_dict()["improved"]["parameters"]["c"]["sd"] < best
 
 
@@ -84,10 +84,10 @@ def test_each_release_is_predicted_from_the_others_within_its_band() -> None:
 
 def test_amplitudes_exclude_a_drift_that_one_recording_cannot_tell_from_cubic_damping() -> None:
     found = together("cubic")
-    largest = found.outcomes[-1].diagnosis.missing[0]
+    largest = found.alone[-1].missing[0]
     alone = {largest.identifier, *(name for name, _ in largest.indistinguishable)}
     assert {"cubic-damping", "damping-drift"} <= alone
-    effect = found.diagnosis.missing[0]
+    effect = found.missing[0]
     assert effect.identifier == "cubic-damping"
     assert "damping-drift" not in {name for name, _ in effect.indistinguishable}
     size = effect.parameters["d"]
@@ -159,8 +159,8 @@ def test_cubic_damping_of_three_amplitudes_is_in_the_class_and_no_value_differs(
         noisy = angle + 1e-4 * rng.standard_normal(time.size)
         releases[f"{1e3 * amplitude:.0f} mrad"] = Recording(time, noisy, "angle_rad")
     found = pp.diagnose(releases, together=True)
-    assert isinstance(found, JointOutcome)
-    (effect,) = found.diagnosis.missing
+    assert isinstance(found, Diagnosis)
+    (effect,) = found.missing
     assert "cubic-damping" in {effect.identifier, *(mate for mate, _ in effect.indistinguishable)}
     values = found.to_dict()["improved"]["parameters"]
     for value, truth in (("b", b), ("c", c), ("frequency", omega / 2.0 / np.pi)):
@@ -169,7 +169,7 @@ def test_cubic_damping_of_three_amplitudes_is_in_the_class_and_no_value_differs(
 
 def test_recording_with_another_damping_is_named_with_its_value() -> None:
     found = together("odd")
-    effect = found.diagnosis.missing[0]
+    effect = found.missing[0]
     assert effect.identifier == "parameter-b"
     assert effect.location.summary == "in 150 mrad"
     odd, usual = effect.parameters["150 mrad"], effect.parameters["50 mrad"]
@@ -185,8 +185,8 @@ def test_knock_in_one_recording_is_its_own_and_the_shared_values_stand() -> None
         for number, (name, amplitude) in enumerate({"first": 0.2, "second": 0.3}.items())
     }
     found = pp.diagnose(releases, volts_per_radian=1.0, together=True)
-    assert isinstance(found, JointOutcome)
-    (effect,) = found.diagnosis.missing
+    assert isinstance(found, Diagnosis)
+    (effect,) = found.missing
     assert effect.location.summary == "in second alone"
     values = found.to_dict()["improved"]["parameters"]
     for name, truth in (("b", B), ("c", C), ("frequency", 0.9)):

@@ -137,7 +137,7 @@ def test_a_pure_number_has_no_unit() -> None:
 
 def test_lost_samples_are_reported_as_the_delay_of_later_readings() -> None:
     """Three readings are missing: what follows was read three intervals later."""
-    (effect,) = diagnosed("dropped-samples").diagnosis.effects
+    (effect,) = diagnosed("dropped-samples").effects
     late = effect.parameters["d"]
     assert late.value == pytest.approx(3.0 * INTERVAL_S)
     assert late.unit == "s"

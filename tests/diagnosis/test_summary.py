@@ -141,9 +141,8 @@ def test_parameters_have_words_and_units_and_differ_from_zero() -> None:
 
 def test_a_diagnosis_prints_as_its_answer() -> None:
     outcome = diagnosed("circular-error")
-    assert str(outcome) == repr(outcome) == str(outcome.diagnosis)
+    assert str(outcome) == repr(outcome)
     content = json.loads(json.dumps(outcome.to_dict()))
     assert str(outcome).endswith(content["statement"])
     assert content["summary"]["headline"] in outcome._repr_html_()
     assert content["details"].startswith("Eq. 8 does not describe this recording")
-    assert len(repr(outcome.diagnosis)) < 100

@@ -15,7 +15,8 @@ import pytest
 
 from pendpipe.analysis.fit import fit_recording
 from pendpipe.analysis.fit.result import FitResult
-from pendpipe.diagnosis.run import Outcome, diagnose_recording
+from pendpipe.diagnosis.result import Diagnosis
+from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.estimate import Estimate
 from pendpipe.recording import Quantity, Recording
 
@@ -90,7 +91,7 @@ def fit_of(name: str, view: View) -> FitResult:
 
 
 @functools.cache
-def diagnosis_of(name: str, view: View) -> Outcome:
+def diagnosis_of(name: str, view: View) -> Diagnosis:
     return diagnose_recording(view.of(seen(name)))
 
 
@@ -121,7 +122,7 @@ def fits_agree(name: str, one: View, other: View) -> None:
 
 
 def diagnoses_agree(name: str, one: View, other: View) -> None:
-    first, second = diagnosis_of(name, one).diagnosis, diagnosis_of(name, other).diagnosis
+    first, second = diagnosis_of(name, one), diagnosis_of(name, other)
     change = View(other.slower, other.larger / one.larger, other.later_s)
     size = abs(change.larger)
     assert second.verdict == first.verdict

@@ -12,9 +12,9 @@ from pendpipe.diagnosis.state import Fault
 
 from pendpipe.diagnosis.detect import Chance, Lead, Trials
 from pendpipe.diagnosis.refine import refine
-from pendpipe.diagnosis.result import Finding
+from pendpipe.diagnosis.result import Diagnosis, Finding
 from pendpipe.diagnosis.rivals import Rival, Scale, class_width, evidence, probabilities
-from pendpipe.diagnosis.run import Outcome, diagnose_recording
+from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.weighing import fault_named, law_of, weigh
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import by_identifier
@@ -38,7 +38,7 @@ JUMP_RAD = 1e-3
 
 
 @functools.cache
-def jumped() -> Outcome:
+def jumped() -> Diagnosis:
     """The equilibrium jumps; the estimate of the noise changes with the model."""
     model = Model(TIME_S, INTERVAL_S, (by_identifier("equilibrium-step"),))
     return diagnose_recording(recording(model.reading(np.append(TRUTH, [JUMP_RAD, INSTANT_S])), 3))
@@ -50,7 +50,7 @@ def rival(effect: Effect, worth: float) -> Rival:
 
 
 def test_a_jump_of_ten_times_the_noise_is_no_red_noise_and_has_no_rival() -> None:
-    (effect,) = jumped().diagnosis.effects
+    (effect,) = jumped().effects
     assert effect.identifier == "equilibrium-step"
     # Half the readings on either side of it: chi^2 of the jump itself, about n (10/2)^2.
     assert effect.delta_chi2 == pytest.approx(25.0 * len(TIME_S), rel=0.3)
@@ -64,7 +64,7 @@ def test_a_rival_is_compared_by_its_gain_with_the_final_noise(
 ) -> None:
     found = jumped().search
     (step,) = found.steps
-    weighed = weigh(found, jumped().beginning, step)
+    weighed = weigh(found, step)
     one = step.rivals[place]
     own = one.fit.value[len(TRUTH) :]
     start = np.append(weighed.without.value, own)
@@ -119,7 +119,7 @@ def test_a_pendulum_over_a_magnet_is_a_pendulum_beside_the_curve(
     found = diagnose_recording(recording(readings, 3))
     assert found.effects[0].identifier == "circular-error"
     assert found.effects[0].presumed
-    assert [each.identifier for each in found.diagnosis.missing] == ["unnamed-restoring"]
+    assert [each.identifier for each in found.missing] == ["unnamed-restoring"]
 
 
 def test_a_curve_that_fits_better_does_not_lower_a_name() -> None:
@@ -133,9 +133,9 @@ def test_a_curve_that_fits_better_does_not_lower_a_name() -> None:
 def test_a_curve_without_a_name_takes_nothing_from_the_law() -> None:
     """A pull that no entry of the catalogue describes: a, b, c and f are those of Eq. 8 alone."""
     outcome = diagnose_recording(recording(pulled(0.5, 0.03), 3), restoring="linear")
-    found, diagnosis = outcome.search, outcome.diagnosis
+    found, diagnosis = outcome.search, outcome
     assert [step.winner.drawn for step in found.steps] == [True]
-    weighed = [weigh(found, outcome.beginning, step) for step in found.steps]
+    weighed = [weigh(found, step) for step in found.steps]
     law = law_of(found, weighed)
     assert law.model.effects == ()
     assert law.chi2 > 2.0 * found.fit.chi2
@@ -149,14 +149,14 @@ def test_each_of_several_names_is_less_certain_than_one() -> None:
     """The same effect with the same gain, where one name, and where three, leave only noise."""
     found = jumped().search
     (step,) = found.steps
-    alone = weigh(found, jumped().beginning, step).weights
+    alone = weigh(found, step).weights
     others = [
         replace(step, rivals=(rival(by_identifier(name), 50.0),))
         for name in ("impulse", "second-mode")
     ]
     # The comparison of one step does not look at what the others explain.
     several = replace(found, steps=(step, *others))
-    doubted = weigh(several, jumped().beginning, step).weights
+    doubted = weigh(several, step).weights
     assert doubted[-1] / doubted[0] == pytest.approx(np.exp(2.2) * alone[-1] / alone[0], rel=1e-2)
 
 
@@ -189,9 +189,7 @@ def test_a_random_cause_is_no_more_probable_than_the_names_beside_it(
     """It takes what a wrong name leaves; what the codes show it does not touch."""
     found, probable = jumped().search, np.array([1.0 - none, none])
     fault = Fault(Finding(name, 1e-9, delta_chi2=100.0), 1e-7)
-    given = [
-        weigh(found, jumped().beginning, step)._replace(weights=probable) for step in found.steps
-    ]
+    given = [weigh(found, step)._replace(weights=probable) for step in found.steps]
     sure = [each._replace(weights=np.array([1.0, 0.0])) for each in given]
     ratio = (
         fault_named(found, fault, given).probability / fault_named(found, fault, sure).probability
@@ -204,10 +202,7 @@ def test_a_random_torque_that_explains_no_more_than_a_smooth_misfit_is_not_confi
     found = jumped().search
     margins = (math.inf, 10.0, 0.0, -10.0)
     findings = [Finding("broadband-drive", 1e-9, 100.0, margin=margin) for margin in margins]
-    sure = [
-        weigh(found, jumped().beginning, step)._replace(weights=np.array([1.0, 0.0]))
-        for step in found.steps
-    ]
+    sure = [weigh(found, step)._replace(weights=np.array([1.0, 0.0])) for step in found.steps]
     chances = [fault_named(found, Fault(each, 1e-7), sure).probability for each in findings]
     assert chances == sorted(chances, reverse=True)
     assert chances[1] > 0.98 * chances[0]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pendpipe.diagnosis.run import Outcome, diagnose_recording
+from pendpipe.diagnosis.result import Diagnosis
+from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.effects.baseline import A, B, C
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
@@ -21,8 +22,8 @@ from .records import (
 )
 
 
-def names(outcome: Outcome) -> set[str]:
-    return {effect.identifier for effect in outcome.diagnosis.effects}
+def names(outcome: Diagnosis) -> set[str]:
+    return {effect.identifier for effect in outcome.effects}
 
 
 @pytest.mark.parametrize("factor", [0.6, 1.15, 1.25, 2.0])
@@ -31,7 +32,7 @@ def test_a_wrong_loss_is_not_a_drift_of_it(factor: float) -> None:
     given = {"b": factor * float(TRUTH[B])}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
     assert names(outcome) == {"parameter-b"}
-    assert outcome.diagnosis.effects[0].probability > 0.9
+    assert outcome.effects[0].probability > 0.9
 
 
 @pytest.mark.parametrize(("fluid", "bearing"), [(4.0, 2.0), (0.5, 2.0)])
@@ -40,7 +41,7 @@ def test_two_wrong_losses_are_not_an_unnamed_third(fluid: float, bearing: float)
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
     assert names(outcome) == {"parameter-a", "parameter-c"}
     for name, index in (("a", A), ("c", C)):
-        found = outcome.diagnosis.improved.parameters[name]
+        found = outcome.improved.parameters[name]
         assert abs(found.value - TRUTH[index]) < 4.0 * found.sd
 
 
@@ -58,7 +59,7 @@ def test_a_wrong_frequency_and_circular_error_are_both_reported(excess: float) -
     given = {"frequency": (1.0 + excess) * FREQUENCY_HZ}
     outcome = diagnose_recording(recording(with_effects("circular-error"), 3), fixed=given)
     assert names(outcome) == {"parameter-frequency", "circular-error"}
-    found = outcome.diagnosis.improved.parameters["frequency"]
+    found = outcome.improved.parameters["frequency"]
     assert abs(found.value - FREQUENCY_HZ) < 4.0 * found.sd
 
 
@@ -68,7 +69,7 @@ def test_right_predictions_are_not_blamed_for_missing_physics() -> None:
     readings = Model(TIME_S, INTERVAL_S, (effect,)).reading(np.append(TRUTH, [0.05, 1.0]))
     given = {"a": float(TRUTH[A]), "b": float(TRUTH[B]), "c": float(TRUTH[C])}
     outcome = diagnose_recording(recording(readings, 3), fixed=given)
-    (found,) = outcome.diagnosis.effects
+    (found,) = outcome.effects
     assert not found.identifier.startswith("parameter")
     suspected = dict(found.indistinguishable)
     assert "cubic-damping" in {found.identifier, *suspected}

@@ -29,8 +29,8 @@ from pendpipe.arguments import (
     shared,
     tell,
 )
-from pendpipe.diagnosis.result import FILE_NAME, not_analysable
-from pendpipe.diagnosis.run import Outcome, diagnose_decay, diagnose_recording
+from pendpipe.diagnosis.result import FILE_NAME, Diagnosis, not_analysable
+from pendpipe.diagnosis.run import diagnose_decay, diagnose_recording
 from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
 from pendpipe.files import check_output, distinct_names, make_folder, write_json, write_whole
@@ -246,7 +246,7 @@ def _diagnose_several(arguments: Arguments) -> int:
     return FOUND if arguments.fail_on == joint.verdict else 0
 
 
-def _outcome(arguments: Arguments, recording: Recording, **more: Any) -> Outcome:
+def _outcome(arguments: Arguments, recording: Recording, **more: Any) -> Diagnosis:
     """Diagnose a recording, with the turning points of an earlier stage if given."""
     more |= {
         "baseline": arguments.baseline,
@@ -264,7 +264,7 @@ def _outcome(arguments: Arguments, recording: Recording, **more: Any) -> Outcome
     )
 
 
-def _write(arguments: Arguments, outcome: Outcome) -> dict[str, Any]:
+def _write(arguments: Arguments, outcome: Diagnosis) -> dict[str, Any]:
     """Draw the figures that are wanted, then write the result that names them."""
     wanted = arguments.figures == "all" or (
         arguments.figures == "found" and outcome.verdict == "missing-physics"

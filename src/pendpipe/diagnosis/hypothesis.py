@@ -109,6 +109,8 @@ class Hypothesis:
 
     Parameters
     ----------
+    beginning
+        The readings as they were chosen, and the baseline's start values.
     fit, data, noise
         The model, the readings (masked, with corrected times), and their noise.
     held
@@ -136,6 +138,7 @@ class Hypothesis:
         is `fit` itself.
     """
 
+    beginning: Beginning
     fit: Fit
     data: Data
     noise: Noise

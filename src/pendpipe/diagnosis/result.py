@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.torque import Restoring
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.diagnosis.summary import Summary, summarise
+from pendpipe.diagnosis.summary import Summary, html_of, summarise
 from pendpipe.estimate import Estimate
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from pendpipe.diagnosis.cycles import SmallSwings
     from pendpipe.diagnosis.held_out import HeldOut
+    from pendpipe.diagnosis.hypothesis import Hypothesis
     from pendpipe.diagnosis.remainder import Remainder
 
 FILE_NAME: Final = "diagnosis.json"
@@ -289,6 +293,10 @@ class Diagnosis:
         The fit that the diagnosis began with.
     scanned
         What was looked for, with its p-value on the baseline's residual.
+    search
+        The fits and readings behind it, for the figures.
+    alone, recordings
+        Of several recordings: each one's own diagnosis, and what is said of it.
     restoring, drag_form
         The baseline's torque, and the form of drag that the readings prefer.
     """
@@ -314,6 +322,9 @@ class Diagnosis:
     name: str = ""
     fit: FitResult | None = field(default=None, repr=False, compare=False)
     scanned: tuple[tuple[str, float], ...] = ()
+    search: Hypothesis | None = field(default=None, repr=False, compare=False)
+    alone: tuple[Diagnosis, ...] = field(default=(), repr=False, compare=False)
+    recordings: tuple[dict[str, Any], ...] = ()
 
     @property
     def missing(self) -> tuple[FoundEffect, ...]:
@@ -333,9 +344,10 @@ class Diagnosis:
     def __str__(self) -> str:
         return "\n".join(self.summary.lines(self.name))
 
-    def __repr__(self) -> str:
-        names = ", ".join(effect.identifier for effect in self.missing)
-        return f"Diagnosis({self.verdict}{': ' if names else ''}{names}, p = {self.p_value:.2g})"
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return html_of(self.summary, self.name)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``diagnosis.json``."""
@@ -374,7 +386,56 @@ class Diagnosis:
             "figures": list(self.figures),
             "warnings": list(self.warnings),
             "provenance": dict(self.provenance),
+            **({"recordings": list(self.recordings)} if self.recordings else {}),
         }
+
+    def save(
+        self, folder: str | Path, *, figures: bool = True, force: bool = False
+    ) -> dict[str, Any]:
+        """Write ``diagnosis.json`` and the figures.
+
+        Parameters
+        ----------
+        folder
+            Made if it is not there.
+        figures
+            Whether to draw them; those of several recordings together are not.
+        force
+            Replace files of these names that pendpipe did not make.
+
+        Returns
+        -------
+        dict
+            What ``diagnosis.json`` holds.
+
+        Raises
+        ------
+        InputError
+            If the folder can't be written, or holds a file that pendpipe did not make.
+        """
+        from pendpipe.files import write_json, writing
+
+        target, whole = Path(folder), self
+        with writing(force=force):
+            if figures and not self.alone:
+                from pendpipe.figures.diagnosis import draw_diagnosis
+
+                drawn = draw_diagnosis(self, target)
+                whole = replace(self, figures=tuple(path.name for path in drawn))
+            content = whole.to_dict()
+            write_json(target / FILE_NAME, content)
+        return content
+
+    def plot(self) -> Figure:
+        """Draw the decay with both models, and what each of them leaves.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        from pendpipe.figures.diagnosis import draw_decay, shown
+
+        return draw_decay(shown(self))
 
 
 def not_analysable(

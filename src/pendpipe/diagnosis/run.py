@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import Progress, silent
-from pendpipe.diagnosis.begin import Beginning, begin
+from pendpipe.diagnosis.begin import begin
 from pendpipe.diagnosis.cycles import SmallSwings, small_swings
 from pendpipe.diagnosis.data import with_scatter
 from pendpipe.diagnosis.detect import whitened
@@ -31,7 +31,6 @@ from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import (
-    FILE_NAME,
     Diagnosis,
     FittedModel,
     FoundEffect,
@@ -40,7 +39,7 @@ from pendpipe.diagnosis.result import (
 )
 from pendpipe.diagnosis.search import search
 from pendpipe.diagnosis.statement import statement
-from pendpipe.diagnosis.summary import COLOURED_NOISE, Summary, html_of
+from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.diagnosis.values import parameters_of
 from pendpipe.diagnosis.weighing import (
     Weighed,
@@ -57,123 +56,8 @@ from pendpipe.errors import NotAnalysableError
 from pendpipe.quantities import stretch
 from pendpipe.recording import Recording
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 LEVEL: Final = 0.01
 """The false-alarm probability: how often a recording that lacks nothing is reported."""
-
-
-@dataclass(frozen=True, repr=False)
-class Answer:
-    """A diagnosis as it is shown: it prints as a dozen lines."""
-
-    diagnosis: Diagnosis
-
-    @property
-    def verdict(self) -> str:
-        """``"consistent"`` or ``"missing-physics"``."""
-        return self.diagnosis.verdict
-
-    @property
-    def effects(self) -> tuple[FoundEffect, ...]:
-        """What is presumed, then what is missing, in the order in which it was found."""
-        return self.diagnosis.effects
-
-    def __str__(self) -> str:
-        return str(self.diagnosis)
-
-    def __repr__(self) -> str:
-        return str(self.diagnosis)
-
-    @property
-    def summary(self) -> Summary:
-        """The answer: what is printed, as fields."""
-        return self.diagnosis.summary
-
-    def _repr_html_(self) -> str:
-        return html_of(self.diagnosis.summary, self.diagnosis.name)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the content of ``diagnosis.json``."""
-        return self.diagnosis.to_dict()
-
-
-@dataclass(frozen=True, repr=False)
-class Outcome(Answer):
-    """A diagnosis with the fits and readings behind it. It prints as a dozen lines.
-
-    Parameters
-    ----------
-    diagnosis
-        The answer.
-    search, beginning
-        The fits, and the readings with the start values: what the figures are drawn from.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from pendpipe.recording import Recording
-    >>> time_s = np.arange(900) / 15.0
-    >>> noise = 1e-4 * np.random.default_rng(1).standard_normal(900)
-    >>> angle_rad = 0.2 * np.exp(-0.02 * time_s) * np.cos(5.6 * time_s) + noise
-    >>> found = diagnose_recording(Recording(time_s, angle_rad, "angle_rad"))
-    >>> found.verdict
-    'consistent'
-    >>> print(str(found)[:18])
-    nothing is missing
-    """
-
-    search: Hypothesis
-    beginning: Beginning
-
-    def save(
-        self, folder: str | Path, *, figures: bool = True, force: bool = False
-    ) -> dict[str, Any]:
-        """Write ``diagnosis.json`` and the figures.
-
-        Parameters
-        ----------
-        folder
-            Made if it is not there.
-        figures
-            Whether to draw them.
-        force
-            Replace files of these names that pendpipe did not make.
-
-        Returns
-        -------
-        dict
-            What ``diagnosis.json`` holds.
-
-        Raises
-        ------
-        InputError
-            If the folder can't be written, or holds a file that pendpipe did not make.
-        """
-        from pendpipe.files import write_json, writing
-
-        target, diagnosis = Path(folder), self.diagnosis
-        with writing(force=force):
-            if figures:
-                from pendpipe.figures.diagnosis import draw_diagnosis
-
-                drawn = draw_diagnosis(self, target)
-                diagnosis = replace(diagnosis, figures=tuple(path.name for path in drawn))
-            content = diagnosis.to_dict()
-            write_json(target / FILE_NAME, content)
-        return content
-
-    def plot(self) -> Figure:
-        """Draw the decay with both models, and what each of them leaves.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
-        from pendpipe.figures.diagnosis import draw_decay, shown
-
-        return draw_decay(shown(self))
 
 
 def diagnose_recording(
@@ -187,7 +71,7 @@ def diagnose_recording(
     place: str | Path = "recording",
     provenance: Mapping[str, Any] | None = None,
     progress: Progress = silent,
-) -> Outcome:
+) -> Diagnosis:
     """Find where Eq. 8 and a recording differ, and what effect is missing.
 
     Parameters
@@ -216,6 +100,19 @@ def diagnose_recording(
     ------
     InputError
         If a parameter can't be held, or the recording can't be analysed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from pendpipe.recording import Recording
+    >>> time_s = np.arange(900) / 15.0
+    >>> noise = 1e-4 * np.random.default_rng(1).standard_normal(900)
+    >>> angle_rad = 0.2 * np.exp(-0.02 * time_s) * np.cos(5.6 * time_s) + noise
+    >>> found = diagnose_recording(Recording(time_s, angle_rad, "angle_rad"))
+    >>> found.verdict
+    'consistent'
+    >>> print(str(found)[:18])
+    nothing is missing
     """
     from pendpipe.analysis.free_decay import measure_recording
 
@@ -254,7 +151,7 @@ def diagnose_decay(
     provenance: Mapping[str, Any] | None = None,
     progress: Progress = silent,
     whole: Recording | None = None,
-) -> Outcome:
+) -> Diagnosis:
     """Diagnose a free decay whose turning points are known.
 
     Parameters
@@ -292,7 +189,7 @@ def diagnose_decay(
             released=[ReleasedParameter(name) for name in fixed],
             progress=progress,
         )
-        found, weighed = swap_in_likelier(found, beginning, progress)
+        found, weighed = swap_in_likelier(found, progress)
         found = _with_scatter(found, samples)
     except NoMotionError as error:
         remedy = "cut it with --start and --stop, or change what is held with --fix"
@@ -322,7 +219,7 @@ def diagnose_decay(
     models = found.baseline, found.fit, found.data, found.noise
     held = held_out(*models, beginning.held, found.held) if missing else None
     swings = _small_swings(law, found)
-    diagnosis = Diagnosis(
+    return Diagnosis(
         baseline,
         before,
         after,
@@ -360,8 +257,8 @@ def diagnose_decay(
         scanned=tuple((lead.effect.identifier, lead.p_value) for lead in found.first.leads)
         if found.first
         else (),
+        search=found,
     )
-    return Outcome(diagnosis, found, beginning)
 
 
 def _in_order(

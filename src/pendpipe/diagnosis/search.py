@@ -44,18 +44,17 @@ from pendpipe.effects.curves import FOLLOW_UP_CURVES, Curve
 from pendpipe.quantities import compact
 
 
-def second_mode_first(beginning: Beginning, state: Hypothesis, task: Task) -> Hypothesis:
+def second_mode_first(state: Hypothesis, task: Task) -> Hypothesis:
     """Fit it from its own start, and take it as the first effect if it leaves less.
 
     Parameters
     ----------
-    beginning
-        Its `second_mode` is the start.
     state
         After the baseline's fit.
     task
         What the search is to do.
     """
+    beginning = state.beginning
     if beginning.second_mode is None:
         return state
     task.progress(f"the turning points beat: fitting {BEATING_MODE.name} first")
@@ -123,19 +122,19 @@ def search(
     fit = fitted_from(beginning.model, data, white, beginning.value, held=held)
     if fit is None:
         raise NoMotionError("it stops")
-    state = Hypothesis(fit, data, white, beginning.held, fit, samples).settle(fit)
+    state = Hypothesis(beginning, fit, data, white, beginning.held, fit, samples).settle(fit)
     task = Task(catalogue, released, baseline, level, seed, progress, samples)
-    return grown(second_mode_first(beginning, state, task), task, beginning)
+    return grown(second_mode_first(state, task), task)
 
 
-def grown(state: Hypothesis, task: Task, beginning: Beginning) -> Hypothesis:
+def grown(state: Hypothesis, task: Task) -> Hypothesis:
     """Add effects to a hypothesis, until chance explains the rest."""
     state, named = _described(_grow(state, task), task)
     state = examine(state, task)
     return replace(
         state,
         fit=with_errors(state.fit, state.data, state.noise),
-        baseline=_baseline_alone(state, beginning),
+        baseline=_baseline_alone(state),
         without_curve=named,
     )
 
@@ -194,9 +193,9 @@ def _described(state: Hypothesis, task: Task) -> tuple[Hypothesis, Fit | None]:
     return state, with_errors(without, state.data, state.noise) if without else None
 
 
-def _baseline_alone(state: Hypothesis, beginning: Beginning) -> Fit:
+def _baseline_alone(state: Hypothesis) -> Fit:
     """Refit the baseline with the final noise, at the recorded times."""
-    model, data = state.fit.model.bare(), state.data
+    model, data, beginning = state.fit.model.bare(), state.data, state.beginning
     # Readings at the end may have been left out meanwhile.
     read = beginning.data.first(len(data))
     same_values = np.array_equal(data.values, read.values)

@@ -12,7 +12,6 @@ import math
 from collections import ChainMap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -29,7 +28,6 @@ from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
 from pendpipe.diagnosis.result import (
-    FILE_NAME,
     Diagnosis,
     FittedModel,
     FoundEffect,
@@ -37,7 +35,7 @@ from pendpipe.diagnosis.result import (
     swinging,
 )
 from pendpipe.diagnosis.rivals import Scale
-from pendpipe.diagnosis.run import LEVEL, Answer, Outcome, diagnose_recording
+from pendpipe.diagnosis.run import LEVEL, diagnose_recording
 from pendpipe.diagnosis.search import LESS_FRICTION, grown
 from pendpipe.diagnosis.statement import DOUBTFUL, statement
 from pendpipe.diagnosis.summary import COLOURED_NOISE
@@ -57,7 +55,6 @@ from pendpipe.effects.model import Model, jacobian
 from pendpipe.effects.stack import MAY_DIFFER, Differs, Stack
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.estimate import Z95, Estimate
-from pendpipe.files import write_json, writing
 from pendpipe.quantities import compact, listed
 from pendpipe.recording import Recording
 
@@ -66,38 +63,6 @@ _HEAD: Final = 0.25
 _NOT_ZERO_SD: Final = 2.0
 """Standard deviations, with all that widens them, from which a size is not zero."""
 _MOST_EFFECTS: Final = 4
-
-
-@dataclass(frozen=True, repr=False)
-class JointOutcome(Answer):
-    """The diagnosis of several recordings of one pendulum. It prints as a dozen lines.
-
-    Parameters
-    ----------
-    diagnosis
-        The answer: what is missing, and what the recordings do not share.
-    recordings
-        What is said of each recording (``recordings`` of ``diagnosis.json``).
-    outcomes
-        Each recording's own diagnosis.
-    """
-
-    recordings: list[dict[str, Any]]
-    outcomes: tuple[Outcome, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the content of ``diagnosis.json``."""
-        return {**super().to_dict(), "recordings": self.recordings}
-
-    def save(self, folder: str | Path, *, force: bool = False) -> dict[str, Any]:
-        """Write ``diagnosis.json`` into a folder, which is made if it is not there.
-
-        One that pendpipe did not make is replaced only with `force`.
-        """
-        content = self.to_dict()
-        with writing(force=force):
-            write_json(Path(folder) / FILE_NAME, content)
-        return content
 
 
 @np.errstate(over="ignore", divide="ignore", invalid="ignore")
@@ -112,7 +77,7 @@ def diagnose_several(
     own: Sequence[str] = (),
     provenance: Mapping[str, Any] | None = None,
     progress: Progress = silent,
-) -> JointOutcome:
+) -> Diagnosis:
     """Diagnose several recordings of one pendulum as one measurement.
 
     Parameters
@@ -146,7 +111,7 @@ def diagnose_several(
                 recording, baseline=baseline, level=level, seed=seed, place=name, progress=progress
             )
         )
-    if len({outcome.search.data.unit for outcome in outcomes}) > 1:
+    if len({_search(outcome).data.unit for outcome in outcomes}) > 1:
         raise InputError("diagnose", "angles and displacements are mixed", "give one kind")
     progress("all together")
     try:
@@ -163,7 +128,7 @@ def diagnose_several(
         remedy = "diagnose them one by one"
         raise NotAnalysableError("diagnose", f"no model follows all ({error})", remedy) from error
     law = with_other_descriptions(law_of(found, weighed), found, weighed)
-    after = _Answer(found, found.fit, law, outcomes, names, own)
+    after = _Together(found, found.fit, law, outcomes, names, own)
     before = replace(after, improved=found.baseline, law=found.baseline)
     named, differing = [], []
     for step, each in zip(found.steps, weighed, strict=True):
@@ -180,20 +145,20 @@ def diagnose_several(
     events = [
         replace(each, location=replace(each.location, summary=f"in {name} alone"))
         for name, outcome, part in zip(names, outcomes, law.at.parts, strict=True)
-        for each in outcome.diagnosis.missing
+        for each in outcome.missing
         if each.kind not in ("unnamed", "parameter")
         and (
             each.identifier in {one.identifier for one in part.model.effects if happened(one)}
             or not by_identifier(each.identifier).has_signature
         )
     ]
-    p_value = min([found.p_value, *(outcome.diagnosis.p_value for outcome in outcomes)])
+    p_value = min([found.p_value, *(outcome.p_value for outcome in outcomes)])
     p_value = min(1.0, (len(outcomes) + 1) * p_value)
     own_forms = [each for each in outcomes[0].effects if each.presumed]
     effects = (*own_forms, *named, *differing, *events)
     told = [after.recording(number) for number in range(len(names))]
     missing = any(not (each.presumed or each.identifier == COLOURED_NOISE) for each in effects)
-    noise_rms = _rms([outcome.diagnosis.noise_rms_rad for outcome in outcomes])
+    noise_rms = _rms([outcome.noise_rms_rad for outcome in outcomes])
     held = (
         held_out(found.baseline, found.fit, found.data, found.noise, found.held, found.held)
         if named
@@ -201,7 +166,7 @@ def diagnose_several(
     )
     models = (before.model() if named else after.model(), after.model())
     text = statement(
-        swinging(baseline, outcomes[0].diagnosis.restoring, outcomes[0].diagnosis.drag_form),
+        swinging(baseline, outcomes[0].restoring, outcomes[0].drag_form),
         *models,
         named,
         held,
@@ -215,7 +180,7 @@ def diagnose_several(
     # It is about one recording.
     text = text.replace("his recording alone cannot", "hey cannot even together")
     text = text.replace("this recording", "them").replace("of the record (", "of the records (")
-    diagnosis = Diagnosis(
+    return Diagnosis(
         baseline,
         before.model(),
         after.model(),
@@ -230,15 +195,17 @@ def diagnose_several(
         warnings=tuple(
             f"{name}: {line}"
             for name, outcome in zip(names, outcomes, strict=True)
-            for line in outcome.diagnosis.warnings
+            for line in outcome.warnings
         ),
         remainder=found.remainder,
-        restoring=outcomes[0].diagnosis.restoring,
-        drag_form=outcomes[0].diagnosis.drag_form,
+        restoring=outcomes[0].restoring,
+        drag_form=outcomes[0].drag_form,
         provenance=dict(provenance or {}),
         name=f"{listed(names)} together",
+        search=found,
+        alone=tuple(outcomes),
+        recordings=tuple(told),
     )
-    return JointOutcome(diagnosis, told, tuple(outcomes))
 
 
 @dataclass(frozen=True)
@@ -351,7 +318,7 @@ def split(columns: FloatArray, alone: Sequence[Data] | Sequence[Noise]) -> list[
 
 
 def search_together(
-    outcomes: Sequence[Outcome],
+    outcomes: Sequence[Diagnosis],
     *,
     baseline: str,
     level: float,
@@ -378,7 +345,7 @@ def search_together(
     NoMotionError
         If the recordings have no motion in common.
     """
-    searches = [outcome.search for outcome in outcomes]
+    searches = [_search(outcome) for outcome in outcomes]
     data = StackedData.of([found.data for found in searches])
     misfits = [_misfit(found) for found in searches]
     # A recording counts less by as much as it follows its own law worse than the best does.
@@ -394,7 +361,7 @@ def search_together(
     fit = _fitted(model, data, noise, searches, held)
     if fit is None:
         raise NoMotionError("the recordings have no motion in common")
-    begun = [outcome.beginning for outcome in outcomes]
+    begun = [found.beginning for found in searches]
     rms = float(np.sqrt(np.mean([each.noise_rms**2 for each in begun])))
     beginning = Beginning(data, model, fit.value, tuple(held), rms, begun[0].points)
     differing = [
@@ -404,28 +371,32 @@ def search_together(
         for number in range(len(searches) == 2, len(searches))
     ]
     task = Task(CATALOGUE, differing, baseline, level, seed, progress)
-    state = Hypothesis(fit, data, noise, tuple(held), fit).settle(fit)
+    state = Hypothesis(beginning, fit, data, noise, tuple(held), fit).settle(fit)
     state = _known_first(state, task, searches)
-    return swap_in_likelier(grown(state, task, beginning), beginning, progress)
+    return swap_in_likelier(grown(state, task), progress)
 
 
-def _member(outcome: Outcome) -> Model:
+def _member(outcome: Diagnosis) -> Model:
     """Return a recording's baseline, with what happened in it alone.
 
     What may as well be a law of the pendulum did not.
     """
-    found = outcome.search
+    found = _search(outcome)
     laws = {each.identifier for each in CATALOGUE if not happened(each)}
     doubted = {
-        e.identifier
-        for e in outcome.diagnosis.missing
-        if laws.intersection(dict(e.indistinguishable))
+        e.identifier for e in outcome.missing if laws.intersection(dict(e.indistinguishable))
     }
     model = found.baseline.model.bare().at_times(found.data.time_s)
     for effect in found.fit.model.effects:
         if happened(effect) and effect.identifier not in doubted:
             model = model.adding(effect)
     return model
+
+
+def _search(diagnosis: Diagnosis) -> Hypothesis:
+    """Return what a diagnosis of one recording has fitted."""
+    assert diagnosis.search is not None
+    return diagnosis.search
 
 
 def happened(effect: Effect) -> bool:
@@ -528,13 +499,13 @@ def _known_first(state: Hypothesis, task: Task, searches: Sequence[Hypothesis]) 
 
 
 @dataclass(frozen=True)
-class _Answer:
+class _Together:
     """What a fit of all recordings says of each."""
 
     found: Hypothesis
     improved: Fit
     law: Fit
-    outcomes: Sequence[Outcome]
+    outcomes: Sequence[Diagnosis]
     names: Sequence[str]
     own: Sequence[str]
 
@@ -547,7 +518,7 @@ class _Answer:
     def model(self) -> FittedModel:
         """Return the shared values, and what the model leaves."""
         data, fit = self.found.data, self.improved
-        alone = [outcome.search.data for outcome in self.outcomes]
+        alone = [_search(outcome).data for outcome in self.outcomes]
         size = np.array([float(each.used * each.fold) for each in alone])
         left = np.array([self._residual_rms(number) for number in range(len(alone))])
         within = sum(each.used * (each.fold - 1) for each in alone)
@@ -560,14 +531,14 @@ class _Answer:
             shared,
             float(np.sqrt(size @ left**2 / size.sum())),
             (fit.chi2 + within) / max(float(size.sum()) - len(fit.free), 1.0),
-            _rms([outcome.diagnosis.noise_rms_rad for outcome in self.outcomes]),
+            _rms([outcome.noise_rms_rad for outcome in self.outcomes]),
         )
 
     def _residual_rms(self, number: int) -> float:
         """Return what the model leaves of one recording's readings."""
         used = self._of(number) & (self.found.data.weight > 0.0)
         left = _rms(self.found.data.residual(self.improved.at.reading)[used])
-        return self.outcomes[number].search.data.rms_of_reading(left)
+        return _search(self.outcomes[number]).data.rms_of_reading(left)
 
     def of_recording(self, name: str, number: int) -> Estimate:
         """Return one recording's value of a parameter."""
@@ -594,7 +565,7 @@ class _Answer:
 
     def recording(self, number: int) -> dict[str, Any]:
         """Return what is to be said of one recording."""
-        diagnosis, part = self.outcomes[number].diagnosis, self.law.at.parts[number]
+        diagnosis, part = self.outcomes[number], self.law.at.parts[number]
         white = self.improved.residual[:-1][self._of(number)]
         return {
             "name": self.names[number],
@@ -613,7 +584,7 @@ class _Answer:
                 if name in {*self.own, *self.differing}
             },
             "residual_rms_rad": self._residual_rms(number),
-            "chi2_per_dof": self.outcomes[number].search.data.chi2_per_dof(
+            "chi2_per_dof": _search(self.outcomes[number]).data.chi2_per_dof(
                 float(white @ white), len(part.value)
             ),
             "prediction": self._prediction(number),
@@ -621,7 +592,7 @@ class _Answer:
 
     def _of(self, number: int) -> BoolArray:
         """Return which readings are a recording's."""
-        counts = [len(outcome.search.data) for outcome in self.outcomes]
+        counts = [len(_search(outcome).data) for outcome in self.outcomes]
         return np.asarray(np.repeat(np.arange(len(counts)), counts) == number)
 
     def _prediction(self, number: int) -> dict[str, float] | None:
@@ -642,7 +613,7 @@ class _Answer:
         if there is None:
             return None
         there = with_errors(there, known, noise)
-        noise_sd = np.concatenate([outcome.search.noise.sd for outcome in self.outcomes])
+        noise_sd = np.concatenate([_search(outcome).noise.sd for outcome in self.outcomes])
         off = data.residual(there.at.reading) / noise_sd
         others = ~self._of(number) & (data.weight > 0.0)
         sd = max(_rms(off[others]), 1.0) * noise_sd[tail]

@@ -10,7 +10,6 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import Progress, silent
-from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.hypothesis import RANDOM, Fault, Hypothesis, Step, is_further, is_gross
 from pendpipe.diagnosis.instants import with_instants
 from pendpipe.diagnosis.location import locate
@@ -77,11 +76,11 @@ class Weighed(NamedTuple):
     rivals: tuple[Rival, ...]
 
 
-def weigh(found: Hypothesis, beginning: Beginning, step: Step) -> Weighed:
+def weigh(found: Hypothesis, step: Step) -> Weighed:
     """Compare one effect with its rivals, beside all other effects."""
     effect = step.winner.lead.effect
     found = beside(found, effect)
-    without, rivals = _rivalry(found, beginning, step)
+    without, rivals = _rivalry(found, step)
     gain = without.chi2 - found.fit.chi2
     own = next((rival for rival in rivals if rival.lead.effect.key == effect.key), step.winner)
     others = [rival for rival in rivals if rival.identifier != effect.identifier]
@@ -247,14 +246,14 @@ def _charge_for_several(found: Hypothesis) -> float:
     return _OF_A_FURTHER_NAME * max(names - alone, 0)
 
 
-def _rivalry(found: Hypothesis, beginning: Beginning, step: Step) -> tuple[Fit, Sequence[Rival]]:
+def _rivalry(found: Hypothesis, step: Step) -> tuple[Fit, Sequence[Rival]]:
     """Return the fit without one effect, and the rivals that could replace it."""
     effect = step.winner.lead.effect
     held = list(found.held)
     model, value = found.fit.model.dropping(effect, found.fit.value)
     if isinstance(effect, ReleasedParameter) and effect.index is not None:
         held.append(effect.index)
-        value[effect.index] = beginning.value[effect.index]
+        value[effect.index] = found.beginning.value[effect.index]
     bare = np.concatenate([found.baseline.value, value[found.baseline.model.size :]])
     starts = [value, bare, step.before.value]
     without = best_fit(model, found.data, found.noise, starts, held=held) or step.before
@@ -314,7 +313,7 @@ def _is_of(fit: Fit, without: Fit, effect: Effect, found: Hypothesis) -> bool:
 
 
 def swap_in_likelier(
-    found: Hypothesis, beginning: Beginning, progress: Progress = silent
+    found: Hypothesis, progress: Progress = silent
 ) -> tuple[Hypothesis, tuple[Weighed, ...]]:
     """Replace each added effect by a likelier rival, if there is one, and weigh all steps.
 
@@ -339,7 +338,7 @@ def swap_in_likelier(
         tried.append({effect.key for effect in found.fit.model.effects})
         weighed: list[Weighed] = []
         for number in reversed(range(len(found.steps))):
-            weighed.append(weigh(found, beginning, found.steps[number]))
+            weighed.append(weigh(found, found.steps[number]))
             likelier = may_change and _with_a_likelier(found, number, weighed[-1], tried)
             if likelier:
                 name, found = found.steps[number].winner.name, likelier

@@ -22,7 +22,6 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Diagnosis
-from pendpipe.diagnosis.run import Outcome
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.model import Evaluated
 from pendpipe.figures.data import NothingToDrawError
@@ -124,11 +123,12 @@ class Shown:
         return between(Cycles(found.time_s, np.exp(logs), phase, sd), ends)
 
 
-def shown(outcome: Outcome) -> Shown:
+def shown(outcome: Diagnosis) -> Shown:
     """Take from an outcome what is drawn."""
     found = outcome.search
-    extended = found.fit if outcome.diagnosis.missing else None
-    return Shown(outcome.diagnosis, found.data, found.noise, found.baseline, extended)
+    assert found is not None
+    extended = found.fit if outcome.missing else None
+    return Shown(outcome, found.data, found.noise, found.baseline, extended)
 
 
 COLOURS: Final = (VERMILION, BLUE)
@@ -513,7 +513,7 @@ DRAWINGS: Final[dict[str, Callable[[Shown], Figure]]] = {
 """By name, in the order in which they are read."""
 
 
-def draw_each(outcome: Outcome) -> Iterator[tuple[str, Figure]]:
+def draw_each(outcome: Diagnosis) -> Iterator[tuple[str, Figure]]:
     """Draw what there is to show, each by its name."""
     content = shown(outcome)
     for name, draw in DRAWINGS.items():
@@ -521,7 +521,7 @@ def draw_each(outcome: Outcome) -> Iterator[tuple[str, Figure]]:
             yield name, draw(content)
 
 
-def draw_diagnosis(outcome: Outcome, folder: Path) -> list[Path]:
+def draw_diagnosis(outcome: Diagnosis, folder: Path) -> list[Path]:
     """Draw what there is to show into a folder.
 
     Returns

@@ -46,7 +46,7 @@ from pendpipe.templates import render as fill_template
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from pendpipe.diagnosis.run import Outcome
+    from pendpipe.diagnosis.result import Diagnosis
     from pendpipe.report.charts import Chart
 
 TEMPLATES: Final = Path(__file__).parent / "templates"
@@ -443,7 +443,7 @@ def render_recording(
     name: str,
     recording: Recording,
     result: FitResult,
-    outcome: Outcome | None = None,
+    outcome: Diagnosis | None = None,
 ) -> str:
     """Make the page of one recording: a sheet to print, and the rest below a fold.
 
@@ -501,8 +501,8 @@ def render_recording(
             if math.isfinite(each.period_s)
         ],
         sheet=_inlined(draw_sheet(decay, recording), "sheet", _SHEET),
-        diagnosis=None if outcome is None else outcome.diagnosis.summary,
-        details="" if outcome is None else outcome.diagnosis.details,
+        diagnosis=None if outcome is None else outcome.summary,
+        details="" if outcome is None else outcome.details,
         numbers=[(title, str(each)) for title, each in result.numbers().items()],
         figures=figures,
         cuts=result.cuts,
