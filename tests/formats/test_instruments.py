@@ -525,22 +525,6 @@ def test_runs_beside_one_another_may_share_their_time(read_as: Callable[..., Rec
     assert "'run1' (not run2)" in recording.weak_guesses[0]
 
 
-def test_the_newest_row_may_lie_beyond_midnight(read_as: Callable[..., Recording]) -> None:
-    clock = [(86370 + t) % 86400 for t in TIME.tolist()]
-    stamps = [f"{int(s // 3600):02d}:{int(s // 60) % 60:02d}:{s % 60:06.3f}" for s in clock]
-    lines = [f"{stamp},{x:.5f}" for stamp, x in zip(stamps, ANGLE, strict=True)]
-    same(read_as("time,angle (rad)\n" + "\n".join(lines[::-1]) + "\n"))
-
-
-@pytest.mark.parametrize("bits", [16, 32])
-def test_a_clock_of_few_bits_begins_again_at_zero(
-    read_as: Callable[..., Recording], bits: int
-) -> None:
-    ticks = (1e3 * TIME + 2**bits - 20_000) % 2**bits
-    head = "millis,angle (rad)\n"
-    same(read_as(head + "".join(f"{t:.0f},{x:.5f}\n" for t, x in zip(ticks, ANGLE, strict=True))))
-
-
 def test_the_rate_of_the_header_tells_what_a_clock_ticks(
     read_as: Callable[..., Recording],
 ) -> None:
@@ -562,23 +546,6 @@ def test_of_a_phone_the_axis_is_read_that_swings_once_a_cycle(
     np.testing.assert_allclose(recording.values, across, atol=1e-5)
 
 
-@pytest.mark.parametrize("down", [-1.0, 1.0])
-@pytest.mark.parametrize("origin", [(0.0, 1.1), (-3.2, 0.4), (0.1, -0.55)])
-def test_positions_from_any_origin_are_angles_about_the_pivot(
-    read_as: Callable[..., Recording], origin: tuple[float, float], down: float
-) -> None:
-    """A tracker's origin may lie anywhere, and a picture's y axis points down."""
-    random = np.random.default_rng(3)
-    x, y = 1e-3 * random.standard_normal((2, len(TIME)))
-    x += origin[0] + LENGTH_M * np.sin(ANGLE)
-    y += origin[1] + down * LENGTH_M * np.cos(ANGLE)
-    recording = read_as("t (s),x (m),y (m)\n" + rows(TIME, x, y))
-    assert recording.unit == "rad"
-    slope, offset = np.polyfit(ANGLE, recording.values, 1)
-    assert abs(slope - 1.0) < 0.02
-    assert abs(offset) < 0.01
-
-
 def test_a_position_whose_period_grows_as_an_angles_is_one(
     read_as: Callable[..., Recording],
 ) -> None:
@@ -593,11 +560,6 @@ def test_an_attribute_of_an_array_may_give_its_rate(tmp_path: Path) -> None:
         angle = file.create_dataset("run/angle", data=ANGLE)
         angle.attrs["sample_rate"], angle.attrs["units"] = RATE_HZ, "rad"
     same(read(tmp_path / "a.h5"))
-
-
-def test_a_list_of_periods_is_refused_as_such(read_as: Callable[..., Recording]) -> None:
-    with pytest.raises(InputError, match="periods alone tell no loss"):
-        read_as("Time (s),GateState,Period (s)\n" + "".join(f"{2 * n},1,1.6\n" for n in range(60)))
 
 
 @pytest.mark.parametrize("mark", [-1, 0, 9999])

@@ -50,23 +50,6 @@ def same(recording: Recording, values: Floats = ANGLE, time: Floats = TIME) -> N
 # --- the times -----------------------------------------------------------------------------
 
 
-def test_times_of_three_digits_are_counted_from_the_rows(tmp_path: Path) -> None:
-    rows = "".join(f"{t:.2E}\t{x:.5f}\n" for t, x in zip(TIME, ANGLE, strict=True))
-    recording = read_text(tmp_path, "t\ttheta\n" + rows)
-    assert len(recording) == len(TIME)
-    np.testing.assert_allclose(recording.time_s, TIME, atol=0.01)
-    assert any("rows are counted at 30" in note for note in recording.notes)
-
-
-def test_a_logger_that_slows_down_at_rest_is_counted_until_then(tmp_path: Path) -> None:
-    time = np.append(np.arange(1000) / 50, 20.0 + np.arange(100) / 10)
-    values = np.where(time < 20.0, 0.3 * np.exp(-time / 6) * np.cos(6 * time), 0.0)
-    stamps = np.floor(10 * time + 1e-9) / 10
-    recording = read_text(tmp_path, text(stamps, values, digits=5, head="t (s),theta (rad)\n"))
-    np.testing.assert_allclose(recording.time_s - recording.time_s[0], time, atol=0.12)
-    np.testing.assert_allclose(np.diff(recording.time_s[:1000]), 0.02, rtol=2e-3)
-
-
 def test_frames_that_are_missing_among_such_times_are_found(tmp_path: Path) -> None:
     kept = np.delete(np.arange(len(TIME)), [100, 101, 640])
     rows = "".join(f"{TIME[row]:.2E}\t{ANGLE[row]:.5f}\n" for row in kept)
@@ -75,29 +58,6 @@ def test_frames_that_are_missing_among_such_times_are_found(tmp_path: Path) -> N
     np.testing.assert_allclose(recording.time_s, TIME[kept], atol=0.08)
     assert recording.time_s[-1] == pytest.approx(TIME[-1], abs=0.04)
     assert any("with 3 missing" in note for note in recording.notes)
-
-
-def test_the_newest_row_may_stand_first(tmp_path: Path) -> None:
-    recording = read_text(tmp_path, text(TIME[::-1], ANGLE[::-1], head="t,theta\n"))
-    same(recording)
-    assert any("newest row" in note for note in recording.notes)
-
-
-@pytest.mark.parametrize(("factor", "name"), [(1.0, "seconds"), (1e3, "milliseconds")])
-def test_a_clock_may_count_since_1970(tmp_path: Path, factor: float, name: str) -> None:
-    stamps = np.rint(factor * 1e3 * (1.7e9 + TIME)) / 1e3
-    recording = read_text(tmp_path, text(stamps, ANGLE, head="TM,theta\n"))
-    same(recording)
-    assert any(f"{name} since 1970" in note for note in recording.notes)
-
-
-@pytest.mark.parametrize("form", ["0:{m}:{s:.3f}", "'0:{m}:{s:.3f}", "{m:02d}:{s:06.3f}"])
-def test_a_time_of_day_may_be_written_in_any_length(tmp_path: Path, form: str) -> None:
-    rows = [
-        form.format(m=int(t // 60), s=t % 60) + f"\t{x:.6f}"
-        for t, x in zip(TIME, ANGLE, strict=True)
-    ]
-    same(read_text(tmp_path, "time\ttheta (rad)\n" + "\n".join(rows) + "\n"))
 
 
 def test_rows_with_the_time_of_an_older_row_are_left_out(tmp_path: Path) -> None:
@@ -198,16 +158,6 @@ def test_a_spreadsheets_minutes_and_seconds_are_no_hours(cells: list[str]) -> No
     np.testing.assert_allclose(seconds, [2285.6, 2340.7])
 
 
-@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-def test_without_names_the_derivative_is_not_the_pendulum(
-    tmp_path: Path, order: tuple[int, int]
-) -> None:
-    columns = (ANGLE, RATE)
-    recording = read_text(tmp_path, text(TIME, columns[order[0]], columns[order[1]]))
-    same(recording)
-    assert any("whose derivative" in note for note in recording.notes)
-
-
 def test_neither_row_counter_nor_error_is_the_reading(tmp_path: Path) -> None:
     count = np.arange(len(TIME), dtype=float)
     error = 1e-3 * (1 + np.abs(RATE))
@@ -250,32 +200,6 @@ def test_digits_that_were_printed_in_the_other_unit_give_the_unit(tmp_path: Path
     recording = read_text(tmp_path, text(TIME, printed, digits=12, head="x,y\n"))
     assert any("its values are multiples of 1e-05" in note for note in recording.notes)
     assert recording.quantity == "angle_rad"
-
-
-@pytest.mark.parametrize("factor", [1.0, 180 / np.pi])
-def test_the_period_gives_the_unit_of_a_large_swing(tmp_path: Path, factor: float) -> None:
-    recording = read_text(tmp_path, text(TIME, factor * ANGLE, sign=" "))
-    same(recording)
-    assert not recording.weak_guesses
-
-
-def test_an_angle_beside_it_or_its_rate_gives_the_unit(tmp_path: Path) -> None:
-    small = np.degrees(0.03 * ANGLE)
-    rate = np.radians(np.gradient(small, TIME))
-    recording = read_text(tmp_path, text(TIME, small, rate, head="t,theta,omega (rad/s)\n"))
-    np.testing.assert_allclose(recording.values, 0.03 * ANGLE, atol=1e-6)
-    assert not recording.weak_guesses
-
-
-def test_what_nothing_gives_away_is_the_first_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "a.csv"
-    path.write_text(text(TIME, 0.1 * ANGLE, head="t,theta\n"))
-    assert main(["inspect", str(path)]) == 0
-    first = capsys.readouterr().out.splitlines()[0]
-    assert first == "a guess: 'theta' has no unit: analysed in its own (--unit)"
-    assert not read(path, ReadOptions(unit="rad")).weak_guesses
 
 
 def test_a_header_that_contradicts_the_period_is_doubted_first(tmp_path: Path) -> None:
@@ -968,16 +892,6 @@ def test_clipped_readings_are_said(tmp_path: Path) -> None:
     assert not any("range" in n for n in read_text(tmp_path, text(TIME, ANGLE)).notes)
 
 
-@pytest.mark.parametrize("wrong", [-0.89, 0.89])
-def test_a_lone_wrong_time_stamp_is_interpolated(tmp_path: Path, wrong: float) -> None:
-    """Some clocks count the full second a row too late, or too early."""
-    stamps = TIME.copy()
-    stamps[29::100] += wrong
-    recording = read_text(tmp_path, text(stamps, ANGLE, head="t,theta\n"))
-    same(recording)
-    assert any("15 time stamp(s)" in note for note in recording.notes)
-
-
 def test_of_a_clock_that_steps_back_either_part_can_be_read(tmp_path: Path) -> None:
     stamps = np.where(np.arange(len(TIME)) < 600, TIME, TIME - 0.11)
     ticks, path = 1e-3 * np.cumsum(33.0 + np.arange(len(TIME)) % 2), tmp_path / "a.csv"
@@ -1000,23 +914,6 @@ def test_a_clock_that_steps_back_by_little_more_than_a_row_has_no_wrong_stamp(
     stamps = np.where(np.arange(len(TIME)) < 600, TIME, TIME - 1.1 * (TIME[1] - TIME[0]))
     with pytest.raises(InputError, match="the time falls"):
         read_text(tmp_path, text(stamps, ANGLE, head="t (s),theta (rad)\n"))
-
-
-def test_rows_stamped_on_arrival_are_counted_where_the_periods_agree(tmp_path: Path) -> None:
-    random = np.random.default_rng(5)
-    time, angle = TIME[::3], ANGLE[::3]
-    late = np.maximum.accumulate(time + random.exponential(0.1, len(time)))
-    late += 1e-4 * np.arange(len(time))
-    recording = read_text(tmp_path, text(late, angle, head="t (s),theta (rad)\n"))
-    np.testing.assert_allclose(recording.time_s - recording.time_s[0], time, atol=0.1)
-    assert np.ptp(np.diff(recording.time_s)) < 1e-9
-    assert any("--sample-rate" in guess for guess in recording.weak_guesses)
-
-
-def test_true_stamps_of_uneven_samples_stay(tmp_path: Path) -> None:
-    kept = np.sort(np.random.default_rng(5).choice(len(TIME), 700, replace=False))
-    recording = read_text(tmp_path, text(TIME[kept], ANGLE[kept], head="t (s),theta (rad)\n"))
-    same(recording, ANGLE[kept], TIME[kept])
 
 
 def test_trackers_masses_are_named_and_chosen(tmp_path: Path) -> None:

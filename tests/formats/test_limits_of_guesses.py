@@ -18,6 +18,7 @@ from pendpipe.formats.table import (
     Table,
     clipped_samples,
     derivative_slope,
+    evenness,
     find_gaps,
     follows_sine,
     is_uniform,
@@ -205,8 +206,8 @@ def test_one_way_is_the_share_of_steps_that_go_along(
 @pytest.mark.parametrize(("jitter", "even"), [(0.09, 1.0), (0.11, 0.75)])
 def test_steps_within_a_tenth_of_the_usual_are_even(jitter: float, even: float) -> None:
     steps = np.tile([1.0, 1.0, 1.0, 1.0 + jitter], 25)
-    assert guess._evenness(np.cumsum(np.append(0.0, steps))) == pytest.approx(even)
-    assert guess._evenness(-np.cumsum(np.append(0.0, steps))) == pytest.approx(even)
+    assert evenness(np.cumsum(np.append(0.0, steps))) == pytest.approx(even)
+    assert evenness(-np.cumsum(np.append(0.0, steps))) == pytest.approx(even)
 
 
 @given(bits=st.sampled_from([16, 32]), start=st.floats(0.01, 0.99), step=st.floats(1e-4, 0.01))

@@ -86,32 +86,44 @@ def _better_circle(x: FloatArray, y: FloatArray) -> FloatArray | None:
     The two further parameters lower the sum of squares by F > 30; the centre is known to 3 % of the
     radius, and further than a tenth of it from (0, 0).
     """
-    from scipy.optimize import least_squares
-
-    points = np.column_stack([x, y])[np.isfinite(x) & np.isfinite(y)]
-    if len(points) < 50 or not on_a_circle(x, y, named=True):
+    fit = _circle_of(x, y)
+    if fit is None or len(fit[1]) < 50 or not on_a_circle(x, y, named=True):
         return None
-
-    def excess(centre: FloatArray) -> FloatArray:
-        radius = np.hypot(*(points - centre).T)
-        return np.asarray(radius - radius.mean())
-
-    fitted = least_squares(excess, np.zeros(2))
-    spread, arm = float(fitted.fun @ fitted.fun), float(np.hypot(*(points - fitted.x).T).mean())
-    test = 0.5 * (float(np.sum(excess(np.zeros(2)) ** 2)) / spread - 1.0) * (len(points) - 3)
-    slopes = np.asarray(fitted.jac)
-    inverse = np.linalg.pinv(slopes.T @ slopes)
-    known = float(np.sqrt(spread / len(points) * np.trace(inverse))) < 0.03 * arm
-    return fitted.x if known and test > 30.0 and math.hypot(*fitted.x) > 0.1 * arm else None
+    centre, arm, known = fit
+    about, origin = (np.hypot(*points.T) for points in (arm, arm + centre))
+    test = 0.5 * (float(np.var(origin) / np.var(about)) - 1.0) * (len(arm) - 3)
+    far = math.hypot(*centre) > 0.1 * float(about.mean())
+    return centre if known < 0.03 and test > 30.0 and far else None
 
 
 def pivot_of(x: FloatArray, y: FloatArray) -> FloatArray | None:
-    """Find the centre of the circle from which positions have the least rms distance.
+    """Find the pivot of positions on a circle that is clearly not about (0, 0).
+
+    None where they lie on none, its centre is uncertain by 3 % of its radius, or within a tenth
+    of it of (0, 0), and where the swing is below a tenth of a radian.
+    """
+    if (fit := _circle_of(x, y)) is None:
+        return None
+    centre, arm, known = fit
+    radius, (wide, high) = np.hypot(*arm.T), np.abs(arm.T)
+    mean = float(radius.mean())
+    hangs = high.min() > 0.05 * mean and wide.max() > 0.1 * mean
+    away = math.hypot(*centre) / mean
+    # The farther from (0, 0), the less the circle need show.
+    clear = np.std(radius) < min(max(0.3, 1.5 * away), 0.5) * np.std(arm[:, 1])
+    return centre if known < 0.03 and hangs and clear and away > 0.1 else None
+
+
+def _circle_of(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, float] | None:
+    """Fit a circle: the centre from which positions have the least rms distance.
 
     It starts from x^2 + y^2 = 2 (a x + b y) + c, which alone is biased by noise, and leaves out
-    positions far from it (a hand, a lost marker). None where they lie on none, its centre is
-    uncertain by 3 % of its radius, or within a tenth of it of (0, 0), and where the swing is
-    below a tenth of a radian.
+    positions far from it (a hand, a lost marker).
+
+    Returns
+    -------
+    centre, arm, known
+        The centre; the other positions from there, shape (n, 2); its sd over the radius.
     """
     good = np.isfinite(x) & np.isfinite(y)
     points = np.column_stack([x[good], y[good]])
@@ -129,10 +141,5 @@ def pivot_of(x: FloatArray, y: FloatArray) -> FloatArray | None:
         near = (off <= far) & (radius > 0.0)
         inverse = np.linalg.pinv(np.hstack([arm / radius[:, None], one])[near])
         centre = centre + (inverse @ radius[near])[:2]
-    mean, (wide, high) = float(radius[near].mean()), np.abs(arm[near]).T
-    known = float(np.std(radius[near])) * float(np.linalg.norm(inverse[:2])) < 0.03 * mean
-    hangs = high.min() > 0.05 * mean and wide.max() > 0.1 * mean
-    away = math.hypot(*centre) / mean
-    # The farther from (0, 0), the less the circle need show.
-    clear = np.std(radius[near]) < min(max(0.3, 1.5 * away), 0.5) * np.std(points[near, 1])
-    return centre if known and hangs and clear and away > 0.1 else None
+    sd = float(np.std(radius[near])) * float(np.linalg.norm(inverse[:2]))
+    return centre, arm[near], sd / float(radius[near].mean())

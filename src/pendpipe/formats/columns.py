@@ -15,7 +15,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
 from pendpipe.formats.circle import on_a_circle, pivot_of
 from pendpipe.formats.lists import Listed, counts_samples, list_in, one_way
-from pendpipe.formats.table import Column, ReadOptions, Table, derivative_slope
+from pendpipe.formats.table import Column, ReadOptions, Table, derivative_slope, evenness
 from pendpipe.formats.words import Role, Unit, plain, role_of, unit_of
 from pendpipe.recording import sizes_of
 
@@ -265,7 +265,7 @@ def _time(table: Table, options: ReadOptions) -> tuple[Column | None, bool]:
         ):
             continue
         # A drifting reading rises too, but hardly in even steps.
-        even = _evenness(column.values[np.isfinite(column.values)])
+        even = evenness(column.values[np.isfinite(column.values)])
         first = place <= 0 and role in ("unknown", "index", "length") and share > 0.99
         if not named and even < 0.5 and not first:
             continue
@@ -311,13 +311,6 @@ def _of_one_run(
     ]
     clock = next((c for c in clocks if c.number == starts[one]), time)
     return clock, runs[one], listing(others, 6)
-
-
-def _evenness(finite: FloatArray) -> float:
-    """Share of the steps within a tenth of the median step."""
-    steps = np.abs(np.diff(finite))
-    middle = float(np.median(steps)) if len(steps) else 0.0
-    return float(np.mean(np.abs(steps - middle) <= 0.1 * middle)) if middle > 0 else 0.0
 
 
 def _readings(

@@ -18,7 +18,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
 from pendpipe.formats.clock import is_clock
-from pendpipe.formats.table import ReadOptions
+from pendpipe.formats.table import ReadOptions, evenness
 from pendpipe.formats.words import unit_of
 
 COMMENT: Final = ("#", "%", "//", "!")
@@ -377,11 +377,11 @@ def _evenness(numbers: Sequence[FloatArray]) -> int:
 
     1 where it rises at all.
     """
+    if len(numbers) < 2 or not np.ptp(numbers[0]):
+        return 0
     steps = np.diff(numbers[0])
-    middle = float(np.median(steps)) if len(steps) and len(numbers) > 1 else 0.0
-    even = middle > 0.0 and float(np.mean(np.abs(steps / middle - 1.0) < 0.1)) > 0.9
-    rises = len(numbers) > 1 and float(np.mean(steps >= 0.0)) > 0.98 and steps.any()
-    return 2 if even else int(rises)
+    even = np.median(steps) > 0.0 and evenness(numbers[0]) > 0.9
+    return 2 if even else int(np.mean(steps >= 0.0) > 0.98)
 
 
 def _roughness(numbers: Sequence[FloatArray]) -> float:

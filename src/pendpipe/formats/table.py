@@ -226,6 +226,13 @@ def derivative_slope(time: FloatArray, values: FloatArray, other: FloatArray) ->
     return product / size if alike else None
 
 
+def evenness(values: FloatArray) -> float:
+    """Share of the steps within a tenth of the median step; 0 where that is 0."""
+    steps = np.diff(values)
+    middle = float(np.median(steps)) if len(steps) else 0.0
+    return float(np.mean(np.abs(steps / middle - 1.0) <= 0.1)) if middle else 0.0
+
+
 @dataclass(frozen=True)
 class Gap:
     """Time that is missing after a sample."""

@@ -135,7 +135,7 @@ def _unit(
         return _Guess(named, f"is in {headed}, by the header")
     if np.all(finite == np.rint(finite)) and re.search(r"(?i)enc|count|tick|raw|adc", column.name):
         return _Guess(Unit("own", 1.0, "counts"), "holds whole numbers: analysed as counts", True)
-    if role == "volts":
+    if role == "volts" and (options.volts_per_radian or _VOLTS.search(column.name)):
         return _Guess(Unit("volts", 1.0, "V"), "has no unit: taken to be volts", True)
     # A phone's sensor: of a position it knows nothing.
     names = {other.name.lower() for other in choice.channels if not other.unit}
@@ -146,6 +146,9 @@ def _unit(
         _UNKNOWN, f"{what.strip()} has no unit: analysed in its own".strip(), True
     )
 
+
+_VOLTS: Final = re.compile(r"(?i)volt|spannung|tensi|напряж|电压|電圧|^(u|ch(annel)? ?\d|ampl)$")
+"""Names of voltages, and of the channels of an oscilloscope."""
 
 _OF_SENSORS: Final = ("velocity", "acceleration", "signal")
 _UNITS_OF = re.compile(r"(?i)\b(?:vertical|length) units?\W+([a-zµ]+)")
@@ -188,7 +191,10 @@ def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray
     stated = re.search(
         r"\b(deg|degs|degrees?|grad|grado|gradi|grados)\b(?! c)|_deg|°(?!\s*[cf])", words
     )
-    if stated and column.role != "length" and "rad" not in words.replace("grad", ""):
+    # What a header says of another column, or of a rate, it does not say of this one.
+    named = {unit.name for c in choice.channels if (unit := unit_of(c.unit)) is not None}
+    elsewhere = named & {"rad", "rad/s"} or "rad" in words.replace("grad", "")
+    if stated and column.role != "length" and not elsewhere:
         return _Guess(_DEGREE, "is taken to be in degrees (the header names them)")
     return (
         _by_rate(choice, column, time_s)
