@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pendpipe.diagnosis.state import first_noise
 from scipy.integrate import solve_ivp
 
 from pendpipe.analysis.fit import fit_recording
 from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.hypothesis import first_noise
 from pendpipe.diagnosis.refine import misfit, refine
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.dynamics import Eq8, Release, sample

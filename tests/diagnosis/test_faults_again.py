@@ -12,12 +12,11 @@ from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.detect import Detection
 from pendpipe.diagnosis.faults import correct, examine_again
-from pendpipe.diagnosis.forensics import TESTS
 from pendpipe.diagnosis.hypothesis import Fault, Hypothesis, Task, is_gross
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
-from pendpipe.diagnosis.result import Finding, nothing
+from pendpipe.diagnosis.result import Finding
 from pendpipe.diagnosis.rivals import NO_SCAN
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.effects.baseline import OMEGA
@@ -80,19 +79,6 @@ def test_a_reading_that_nothing_explains_stays_out_and_is_measured_anew(error: f
     assert state.p_value == fault.p_value
     largest = fault.finding.parameters["largest"].value
     assert largest == pytest.approx(error * NOISE_RAD, abs=2.0 * NOISE_RAD)
-
-
-@pytest.mark.parametrize(
-    ("error", "odd", "stays"), [(60.0, 1, True), (3.0, 1, False), (60.0, ODD, False)]
-)
-def test_a_far_reading_stays_out_where_its_test_cannot_judge(
-    error: float, odd: int, stays: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """At the ends of coloured noise no test can tell; the model's own error can."""
-    task, state = blamed(error, odd)
-    monkeypatch.setitem(TESTS, "glitches", lambda *_: nothing("glitches"))
-    state = examine_again(state, task)
-    assert (state.data.weight[odd] == 0.0) is np.bool_(stays)
 
 
 def test_a_test_that_reports_nothing_counts_by_its_chance() -> None:

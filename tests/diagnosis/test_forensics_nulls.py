@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pendpipe.diagnosis.state import settled
 
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
@@ -15,6 +14,7 @@ from pendpipe.diagnosis.forensics import TESTS
 from pendpipe.diagnosis.forensics.colour import level_note
 from pendpipe.diagnosis.forensics.corrections import find_lost_samples
 from pendpipe.diagnosis.forensics.tails import Tail, fit_tail, tail_of_squares
+from pendpipe.diagnosis.hypothesis import settled
 
 from .decays import Fitted, Pendulum, fitted, rounded
 from .faults import AIR, NOISES, STEP_16, Noisy, null, smoothed

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pendpipe.diagnosis.state import first_noise
 
 from pendpipe.analysis.fit import fit_recording
 from pendpipe.analysis.free_decay import measure_recording
@@ -21,6 +20,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.begin import Beginning, begin
 from pendpipe.diagnosis.cycles import small_swings
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
+from pendpipe.diagnosis.hypothesis import first_noise
 from pendpipe.diagnosis.location import beat_of
 from pendpipe.diagnosis.refine import Fit, fit_in_growing_window
 from pendpipe.diagnosis.run import diagnose_recording

@@ -20,7 +20,7 @@ from pendpipe.diagnosis.rivals import (
     side_by_side,
     useful_chi2,
 )
-from pendpipe.effects.baseline import OMEGA, A, C
+from pendpipe.effects.baseline import A, C
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
 
@@ -95,28 +95,6 @@ def test_an_effect_whose_score_a_bound_halves_is_refitted(
     )
     asked = {rival.identifier for rival in rivals}
     assert ("power-law-damping" in asked) == at_a_bound
-
-
-@pytest.mark.parametrize("part", [0.0, 0.25])
-def test_what_happens_at_one_instant_is_compared_there(part: float) -> None:
-    """A knock at a zero crossing changes the amplitude, at a turning point the phase alone."""
-    impulse, period_s = by_identifier("impulse"), 2.0 * np.pi / TRUTH[OMEGA]
-    truth = np.concatenate([TRUTH, [2e-3, 40.0]])
-    model = Model(TIME_S, INTERVAL_S, (impulse,))
-    turns = model.evaluate(truth).sampled.phase / np.pi
-    knocked = TIME_S[
-        np.flatnonzero((TIME_S > 30.0) & (np.diff(np.floor(turns), append=0.0) > 0))[0]
-    ]
-    truth[-1] = knocked + part * period_s
-    data, noise = prepared(model.reading(truth) + white(3))
-    base = refine(model.bare(), data, noise, TRUTH)
-    scan = _detection(
-        {"amplitude-step": (30.0, (float(truth[-1]),)), "impulse": (5.0, (truth[-1] - 0.7,))}
-    )
-    rivals = refit_leads(base, data, noise, scan, held=(), phase_lost=False)
-    (found,) = [rival for rival in rivals if rival.identifier == "impulse"]
-    assert found.fit.value[-1] == pytest.approx(truth[-1], abs=0.1 * period_s)
-    assert found is rivals[0] or of_one_class(rivals[0], found)
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pendpipe.diagnosis.state import Fault
 
 from pendpipe.diagnosis.detect import Chance, Lead, Trials
+from pendpipe.diagnosis.hypothesis import Fault
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Diagnosis, Finding
 from pendpipe.diagnosis.rivals import Rival, Scale, class_width, evidence, probabilities

@@ -27,7 +27,7 @@ from pendpipe.diagnosis.hypothesis import (
     price_of_another,
 )
 from pendpipe.diagnosis.instants import with_better_instants
-from pendpipe.diagnosis.noise import TAPS, white_noise
+from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import SETTLED, refine
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import Finding, Location
@@ -45,8 +45,6 @@ _TESTED_AFTER: Final = (
 )
 _SHARE_OF_EACH: Final = TESTS_SHARE / (len(_TESTED_BEFORE) + len(_TESTED_AFTER))
 _ROUNDS: Final = 3
-_FAR: Final = 8.0
-"""Usual errors from which a reading at an end is wrong, where the tests can't tell."""
 _CLEAN_CHI2: Final = 1.3
 """Largest chi^2 per degree of freedom at which the fine tests are made."""
 _IN_PHASE: Final = 0.3
@@ -154,8 +152,6 @@ def _tested_again(fault: Fault, state: Hypothesis, task: Task) -> Hypothesis:
     finding = TESTS[name](whole, fit, noise, state.samples)
     p_value = _global(finding)
     if p_value > task.level or finding.mask is None:
-        if _wrong_at_an_end(fault.mask[: len(masked)], state):
-            return state
         task.progress(f"{name}: no longer needed with the final model")
         state = replace(
             state, faults=_exchanged(state, fault), quiet={**state.quiet, name: p_value}
@@ -317,15 +313,6 @@ def _pays(finding: Finding, state: Hypothesis) -> bool:
 def _global(finding: Finding) -> float:
     """Return a global p-value, by the test's share of the level."""
     return min(finding.p_value / _SHARE_OF_EACH, 1.0)
-
-
-def _wrong_at_an_end(mask: BoolArray, state: Hypothesis) -> bool:
-    """Whether masked readings lie near an end, and far from the model that was fitted without."""
-    rows, count = np.flatnonzero(mask), len(mask)
-    error = np.abs(state.data.residual(state.fit.at.reading))
-    usual = float(np.sqrt(np.mean(error[state.data.weight > 0.0] ** 2)))
-    near = np.minimum(rows, count - 1 - rows) < TAPS
-    return bool(np.all(near & (error[rows] > _FAR * usual)))
 
 
 def _refit(state: Hypothesis, out: BoolArray) -> Hypothesis:

@@ -191,9 +191,6 @@ def _charge(state: Hypothesis, rivals: Sequence[Rival]) -> float:
     return 2.0 * math.log(tried) + effect.sizes * math.log(gain)
 
 
-_LOST_AT_KNOTS: Final = 0.012
-"""Part of a curve's gain lost between its knots, where it is straight: h^2 F''/12 at the knots of
-`effects.curves`; it is credited, as far as the names leave as much, where only noise is left."""
 _MOST_MOVES: Final = 6
 _MOST_RARE: Final = 2
 """Rare names that may take the place of one curve."""
@@ -205,7 +202,6 @@ class Proposed(NamedTuple):
     fit: Fit
     steps: tuple[Step, ...]
     words: str = ""
-    credit: float = 0.0
 
 
 def improve(state: Hypothesis, progress: Progress, rare: Sequence[Effect] = ()) -> Hypothesis:
@@ -229,23 +225,22 @@ def _best(here: Proposed, there: Sequence[Proposed], state: Hypothesis) -> Propo
     found = [here, *there]
     best = min(found, key=lambda each: each.fit.chi2)
     scale = Scale.of(best.fit, state.data, state.noise)
-    return min(found, key=lambda each: scale.lost_by(each.fit, each.credit) + price(each.steps))
+    return min(found, key=lambda each: scale.lost_by(each.fit) + price(each.steps))
 
 
 def _drops(state: Hypothesis) -> Iterator[Proposed]:
     """Drop one effect.
 
     The last one, which was significant, is not dropped where it leaves only noise, unless a fault
-    of the measurement was found after it. A curve can follow sin x too, and does not replace it.
+    of the measurement was found after it.
     """
     clean = Scale.of(state.fit, state.data, state.noise).clean
     joined = any(fault.after == len(state.steps) for fault in state.faults)
     if clean and len(state.steps) < 2 and not joined:
         return
-    drawn = any(step.winner.drawn for step in state.steps)
     for step in state.steps:
         effect = step.winner.lead.effect
-        if isinstance(effect, ReleasedParameter) or (effect.parameter_free and drawn):
+        if isinstance(effect, ReleasedParameter):
             continue
         without = refit_without(state, [step])
         if without is not None:
@@ -281,14 +276,8 @@ def _curves_for_names(state: Hypothesis) -> Iterator[Proposed]:
         rivals = ranked([_rival(bare, fit, scale) for fit in fits])
         step = Step(tuple(rivals), replaced[0].p_value, bare)
         kept = [other for other in state.steps if other not in replaced]
-        left = max(state.fit.chi2 - state.data.used, 0.0) if scale.clean else 0.0
-        best = rivals[0]
-        yield Proposed(
-            best.fit,
-            (*kept, step),
-            f"{best.name} alone does as well as {len(replaced)} effects",
-            min(_LOST_AT_KNOTS * best.gain, left),
-        )
+        words = f"{rivals[0].name} alone does as well as {len(replaced)} effects"
+        yield Proposed(rivals[0].fit, (*kept, step), words)
 
 
 def _rare_for_a_curve(state: Hypothesis, rare: Sequence[Effect]) -> Iterator[Proposed]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -18,7 +18,6 @@ from pendpipe.diagnosis.detect import (
     Lead,
     Trials,
     finer_shape,
-    scores_and_lengths,
 )
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import ROUNDS, SETTLED, Fit, Refining, pulled
@@ -30,7 +29,6 @@ from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.curves import Curve
-from pendpipe.effects.effect import Sudden
 from pendpipe.estimate import Estimate
 
 CLASS: Final = 6.0
@@ -103,10 +101,10 @@ class Scale:
             return behind
         return self.numbers * math.log1p(behind / self.numbers)
 
-    def lost_by(self, fit: Fit, credit: float = 0.0) -> float:
+    def lost_by(self, fit: Fit) -> float:
         """Return what a set of effects is worse than the best."""
         apart = sum(min(taken, self.lines.get(key, taken)) for key, taken in lines(fit).items())
-        return self.lost(fit.chi2 - credit + apart) - apart
+        return self.lost(fit.chi2 + apart) - apart
 
     def within(self, lost: float) -> float:
         """Return the chi^2 of a model that is worse than the best by `lost`."""
@@ -428,8 +426,7 @@ def refit_leads(
     most: int = _MOST_REFITTED,
 ) -> list[Rival]:
     """Refit the leading effects nonlinearly, and return them ranked, the best first."""
-    scanned = _about_one_instant(base, noise, detection.leads)
-    leads = _worth_refitting(scanned, phase_lost, most, wide=bool(pulled(base)))
+    leads = _worth_refitting(detection.leads, phase_lost, most, wide=bool(pulled(base)))
     fits: list[tuple[Lead, Fit]] = []
     for lead, fit in side_by_side(base, data, noise, leads, held, phase_lost=phase_lost):
         if fit is not None and believable(base, fit, lead.effect):
@@ -458,24 +455,6 @@ def _names_first(rivals: list[Rival]) -> list[Rival]:
         return rival.drawn or rival.gain < half, -prior, rival.lead.effect.local, -rival.evidence
 
     return sorted(rivals, key=order)
-
-
-def _about_one_instant(base: Fit, noise: Noise, leads: Sequence[Lead]) -> Sequence[Lead]:
-    """Score all that is sudden again about the instant of the best lead, if that is sudden.
-
-    A knock's score depends on its phase in the cycle, and the scan's instants lie farther apart.
-    """
-    best = max(leads, key=_rank, default=None)
-    if best is None or not isinstance(best.effect, Sudden):
-        return leads
-    found = []
-    for lead in leads:
-        if isinstance(lead.effect, Sudden):
-            shape = finer_shape(base, noise, lead.effect, best.shape)
-            score = float(scores_and_lengths(base, noise, lead.effect, [shape])[0][0] ** 2)
-            lead = replace(lead, shape=shape, score=score) if score > lead.score else lead
-        found.append(lead)
-    return found
 
 
 def _worth_refitting(found: Sequence[Lead], phase_lost: bool, most: int, wide: bool) -> list[Lead]:

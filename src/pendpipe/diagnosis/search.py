@@ -29,7 +29,6 @@ from pendpipe.diagnosis.moves import (
     prefer_parameters,
     prefer_rare,
     reconsider_red_noise,
-    refit_without,
 )
 from pendpipe.diagnosis.refine import Fit, best_fit, fitted_from
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
@@ -40,7 +39,7 @@ from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C
 from pendpipe.effects.catalogue.in_time import BEATING_MODE
-from pendpipe.effects.curves import FOLLOW_UP_CURVES, Curve
+from pendpipe.effects.curves import FOLLOW_UP_CURVES
 from pendpipe.quantities import compact
 
 
@@ -78,8 +77,6 @@ def _square(fit: Fit, state: Hypothesis) -> float:
 _MOST_EFFECTS: Final = 4
 _GOOD_PART: Final = 1.0 / 3.0
 """Of a misfit, that one of a few laws takes which share it."""
-_TRIED: Final = 3
-"""Rivals tried in their order where the best predicts worse."""
 LESS_FRICTION: Final = (1.0, 0.9, 0.7, 0.4)
 """Fractions of the Coulomb friction to try if the baseline stops before the last reading."""
 
@@ -185,12 +182,7 @@ def _described(state: Hypothesis, task: Task) -> tuple[Hypothesis, Fit | None]:
         task.progress(f"describing what is left by {state.steps[-1].winner.name}")
         if _ends_with_curve(state):
             return state, named
-    # A curve that can follow anything would imitate the names.
-    last = state.steps[-1].winner.lead.effect if state.steps else None
-    if len(state.steps) < 2 or not isinstance(last, Curve) or not last.of_anything:
-        return state, None
-    without = refit_without(state, state.steps[-1:])
-    return state, with_errors(without, state.data, state.noise) if without else None
+    return state, None
 
 
 def _baseline_alone(state: Hypothesis) -> Fit:
@@ -250,10 +242,9 @@ def _add_one(state: Hypothesis, task: Task, *, names_first: bool) -> Hypothesis:
         return state
     if not gross and (kicked := random_torque(state, rivals[0], task)):
         return kicked
-    step = _first_that_predicts(state, rivals, p_value, progress) or _on_trial(
-        Step(tuple(rivals), p_value, state.fit), state
-    )
-    if step is None:
+    step = Step(tuple(rivals), p_value, state.fit)
+    pays = _pays(step, state.steps)
+    if not (_predicts(step, state, progress) if pays else _on_trial(step, state)):
         return state
     winner = step.winner
     released = winner.lead.effect
@@ -266,35 +257,27 @@ def _add_one(state: Hypothesis, task: Task, *, names_first: bool) -> Hypothesis:
     return replace(state, held=held, steps=(*state.steps, step)).settle(winner.fit)
 
 
-def _first_that_predicts(
-    state: Hypothesis, rivals: Sequence[Rival], p_value: float, progress: Progress
-) -> Step | None:
-    """Return the best effect that pays its price and predicts cycles left out no worse.
+def _predicts(step: Step, state: Hypothesis, progress: Progress) -> bool:
+    """Whether an effect predicts cycles left out no worse.
 
     In a gross misfit it is what is still missing that decides how well cycles are predicted.
     """
-    gross = is_gross(state.fit, state.data)
-    asked = [each for each in rivals if each is rivals[0] or not each.lead.effect.rare]
-    for rival in asked[:_TRIED]:
-        step = Step((rival, *(other for other in rivals if other is not rival)), p_value, state.fit)
-        if not _pays(step, state.steps):
-            continue
-        effect, held = rival.lead.effect, state.held
-        if isinstance(effect, ReleasedParameter):
-            held = effect.without(held)
-        fits = (state.fit, rival.fit, state.data, state.noise, state.held, held)
-        if gross or not predicts_worse(*fits, drawn=rival.drawn):
-            return step
-        progress(f"{rival.name} predicts cycles that are left out worse: it is not added")
-    return None
+    best, held = step.winner, state.held
+    effect = best.lead.effect
+    if isinstance(effect, ReleasedParameter):
+        held = effect.without(held)
+    fits = (state.fit, best.fit, state.data, state.noise, state.held, held)
+    if is_gross(state.fit, state.data) or not predicts_worse(*fits, drawn=best.drawn):
+        return True
+    progress(f"{best.name} predicts cycles that are left out worse: it is not added")
+    return False
 
 
-def _on_trial(step: Step, state: Hypothesis) -> Step | None:
-    """Return a name that does not pay its price alone, but takes a good part of a misfit."""
+def _on_trial(step: Step, state: Hypothesis) -> bool:
+    """Whether a name that does not pay its price alone takes a good part of a misfit."""
     best = step.winner
     before, left = (remainder_of(fit, state.data, state.noise) for fit in (state.fit, best.fit))
-    part = best.gain > _GOOD_PART * before.excess and left.systematic
-    return step if part and not (best.drawn or _pays(step, state.steps)) else None
+    return best.gain > _GOOD_PART * before.excess and left.systematic and not best.drawn
 
 
 def _pays(step: Step, before: Sequence[Step]) -> bool:

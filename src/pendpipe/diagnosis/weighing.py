@@ -363,8 +363,6 @@ def _likelier(found: Hypothesis, step: Step, weighed: Weighed) -> Rival | None:
     """Return the likelier rival that may replace a step's winner."""
     present = {effect.key for effect in found.fit.model.effects}
     own = step.winner
-    if own.lead.effect.parameter_free and _has_curve(found.steps, step):
-        return None  # the curve follows what differs from it
     likelier = [
         (float(weight), rival)
         for rival, weight in zip(weighed.mates, weighed.weights[1:], strict=False)
