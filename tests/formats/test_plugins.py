@@ -40,6 +40,8 @@ class Entry:
     name: str
 
     def load(self) -> object:
+        if self.name == "UNIMPORTABLE":
+            raise ImportError("no module named 'nothing'")
         return {"COLONS": COLONS, "BROKEN": BROKEN}[self.name]
 
 
@@ -68,7 +70,7 @@ def test_without_it_the_file_is_refused(tmp_path: Path, plugins: list[Entry]) ->
         read(path)
 
 
-@pytest.mark.parametrize("name", ["BROKEN", "ABSENT"])
+@pytest.mark.parametrize("name", ["BROKEN", "ABSENT", "UNIMPORTABLE"])
 def test_a_plugin_that_fails_is_named_and_passed_over(
     tmp_path: Path, plugins: list[Entry], name: str
 ) -> None:
@@ -78,4 +80,9 @@ def test_a_plugin_that_fails_is_named_and_passed_over(
     recording = read(path)
     np.testing.assert_allclose(recording.values, ANGLE_RAD, atol=1e-6)
     (note,) = (note for note in recording.notes if "passed over" in note)
-    assert {"BROKEN": "broken reader", "ABSENT": "ABSENT"}[name] in note
+    said = name.replace("BROKEN", "broken reader")
+    assert said in note
+    assert "\n" not in note
+    path.write_bytes(b"\0\1\2" * 900)
+    with pytest.raises(InputError, match=f"no reader knows this file.*'{said}' is passed over"):
+        read(path)

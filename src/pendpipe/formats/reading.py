@@ -213,7 +213,9 @@ def table_of(place: Path, data: bytes, options: ReadOptions) -> Table:
         )
         raise InputError(
             place,
-            f"no reader knows this file: {fault if reason is None else reason}",
+            "; ".join(
+                [f"no reader knows this file: {fault if reason is None else reason}", *notes]
+            ),
             "export it as CSV with a time and an angle column",
         ) from None
     return replace(table, notes=(*table.notes, *notes)) if notes else table

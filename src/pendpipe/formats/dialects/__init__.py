@@ -6,8 +6,8 @@ name theirs under the entry point ``pendpipe.formats``.
 
 import importlib
 import pkgutil
-from collections.abc import Iterator
-from functools import cache
+from collections.abc import Callable, Iterator
+from functools import cache, partial
 from importlib.metadata import entry_points
 
 from pendpipe.formats.plugin import Dialect
@@ -18,16 +18,17 @@ ENTRY_POINT = "pendpipe.formats"
 @cache
 def dialects() -> tuple[tuple[Dialect, ...], tuple[str, ...]]:
     """Find all dialects, ours first, and say in a line which can't be used."""
-    found: list[Dialect] = []
-    for module in pkgutil.iter_modules(__path__):
-        values = vars(importlib.import_module(f"{__name__}.{module.name}")).values()
-        found += [value for value in values if isinstance(value, Dialect)]
-    notes: list[str] = []
-    for entry in sorted(entry_points(group=ENTRY_POINT)):
+    loads: list[tuple[str, Callable[[], object]]] = [
+        (module.name, partial(importlib.import_module, f"{__name__}.{module.name}"))
+        for module in pkgutil.iter_modules(__path__)
+    ]
+    loads += [(entry.name, entry.load) for entry in sorted(entry_points(group=ENTRY_POINT))]
+    found, notes = list[Dialect](), list[str]()
+    for name, load in loads:
         try:
-            found += _declared(entry.load())
+            found += _declared(load())
         except Exception as fault:
-            notes.append(_passed_over(entry.name, fault))
+            notes.append(_passed_over(name, fault))
     return tuple(found), tuple(notes)
 
 
