@@ -29,7 +29,7 @@ import tracemalloc
 import warnings
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import cache
@@ -690,7 +690,9 @@ def _drain(queue: list[tuple[str, int]], done: Blocks, until: float, whole: bool
                     name, number = queue.pop(0)
                     length = _length(name, whole)
                     running[name, number] = pool.submit(block, name, number, length)
-                (name, number), future = next(iter(running.items()))
+                # A block of large files takes as long as twenty others.
+                ready, _ = wait(running.values(), return_when=FIRST_COMPLETED)
+                (name, number), future = next(i for i in running.items() if i[1] in ready)
                 done.setdefault(name, {})[str(number)] = future.result()
                 del running[name, number]
                 if whole and time.monotonic() - kept_at > 5.0:
