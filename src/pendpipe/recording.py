@@ -345,7 +345,9 @@ def only_falls(values: FloatArray) -> bool:
     if len(sizes) < 4 or not sizes[-1] < 0.8 * sizes[0]:
         return False
     above = sizes - np.minimum.accumulate(sizes)
-    if not float(np.mean(above)) < _LEVEL * float(np.ptp(sizes)):
+    # A wild reading makes no range.
+    low, high = np.percentile(sizes, (2, 98))
+    if not float(np.mean(above)) < _LEVEL * float(high - low):
         return False
     steps = np.diff(sizes)
     falls, rises = float(np.mean(steps < 0.0)), float(np.mean(steps > 0.0))

@@ -165,6 +165,12 @@ def test_a_table_of_turning_points_has_its_period(tmp_path: Path) -> None:
         (np.exp(-np.arange(500) / 100) * np.cos(0.3 * np.arange(500)), False),
         (np.linspace(5.0, 1.0, 500) + 0.2 * np.cos(0.3 * np.arange(500)), False),
         (np.linspace(5.0, 1.0, 500) + 0.02 * np.cos(0.3 * np.arange(500)), False),
+        (
+            np.exp(-np.arange(2400) / 1000) * np.cos(0.2 * np.arange(2400))
+            + 0.03 * np.sin(7e3 * np.arange(2400) ** 2)
+            + 20.0 * (np.arange(2400) == 900),
+            False,
+        ),
         (FALL[:3], False),
         (np.ones(20), False),
     ],

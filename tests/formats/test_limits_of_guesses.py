@@ -178,21 +178,6 @@ def test_names_are_listed_up_to_a_number_and_a_length(names: list[str], most: in
     assert len(names) <= most or text.endswith(f"and {len(names) - most} more")
 
 
-@pytest.mark.parametrize(("left", "falls"), [(0.75, True), (0.85, False)])
-def test_sizes_that_fall_by_a_fifth_only_fall(left: float, falls: bool) -> None:
-    assert lists.only_falls(np.linspace(1.0, left, 20)) == falls
-    assert not lists.only_falls(TIME[:200] * np.cos(2 * np.pi * TIME[:200]))
-
-
-@pytest.mark.parametrize(("rise", "falls"), [(4, True), (6, False)])
-def test_of_sizes_that_fall_one_in_four_may_rise(rise: int, falls: bool) -> None:
-    steps = np.full(20, -0.04)
-    steps[: 4 * rise : 4][:rise] = 0.001
-    if rise > 5:
-        steps[1] = 0.001
-    assert lists.only_falls(1.0 + np.cumsum(steps)) == falls
-
-
 @given(st.floats(-1e3, 1e3), st.floats(0.02, 0.98), st.booleans())
 def test_one_way_is_the_share_of_steps_that_go_along(
     start: float, share: float, down: bool

@@ -260,10 +260,11 @@ def _count_rows(_choice: Choice, base: TimeBase) -> None:
 def _count_late_rows(choice: Choice, base: TimeBase) -> None:
     """Count rows that were stamped as they arrived: by rows the periods agree far better."""
     values = _values(choice, base)
-    steps = np.diff(base.time_s)
+    if len(values) < 9:
+        return
     # Rows that arrive in bursts are even within these, which take up little of the time.
-    even_steps = is_uniform(base.time_s) and 2.0 * np.median(steps) > np.mean(steps)
-    if not len(values) or even_steps:
+    steps = np.diff(base.time_s)
+    if is_uniform(base.time_s) and 2.0 * np.median(steps) > np.mean(steps):
         return
     index = np.arange(len(values))
     even: FloatArray = np.polynomial.Polynomial.fit(index, base.time_s, 1)(index)
