@@ -8,6 +8,8 @@ set -euo pipefail
 what=$1 dir=$2
 
 down() {
+  # What still runs would outlive the daemons.
+  [ ! -s "$dir/slurmctld.pid" ] || timeout 10 scancel --user="$(id -un)" || true
   for name in slurmd slurmctld munged; do
     file=$dir/$name.pid
     if [ -s "$file" ] && kill -0 "$(cat "$file")" 2>/dev/null; then

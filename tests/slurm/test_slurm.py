@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -55,12 +56,12 @@ def cluster(tmp_path: Path) -> Iterator[None]:
         subprocess.run([script, "down", str(tmp_path / "slurm")], check=True)
 
 
-def write_campaign(folder: Path) -> None:
+def write_campaign(folder: Path, records: int = RECORDS) -> None:
     """Decays of 2,048 readings, one of which is none."""
     random = np.random.default_rng(1)
     time_s = np.arange(2048) / 30.0
     lines = ["record\tsource"]
-    for number in range(RECORDS):
+    for number in range(records):
         loss, frequency = random.uniform(0.005, 0.02), random.uniform(0.8, 0.9)
         swing = 0.15 * np.exp(-loss * time_s) * np.cos(2.0 * np.pi * frequency * time_s)
         angle = (number != 7) * swing + 3e-4 * random.standard_normal(len(time_s))
@@ -80,12 +81,14 @@ def write_campaign(folder: Path) -> None:
     )
 
 
-def run(folder: Path, results: str, *words: str, options: tuple[str, ...] = ()) -> None:
+def run(
+    folder: Path, results: str, *words: str, options: tuple[str, ...] = (), faults: str = ""
+) -> None:
     rest = ("--", *options, "--config", f"results={results}")
     done = subprocess.run(
         [sys.executable, "-m", "pendpipe", "campaign", *words, *rest],
         cwd=folder,
-        env=os.environ | {"PYTHONPATH": str(ROOT / "src")},
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, (faults, str(ROOT / "src"))))},
         capture_output=True,
         text=True,
         check=False,
@@ -109,3 +112,48 @@ def test_slurm_ends_with_the_results_of_this_machine(cluster: None, tmp_path: Pa
     assert "decay-007/refused.json" in here
     assert here.keys() == there.keys()
     assert [name for name in here if here[name] != there[name]] == []
+
+
+FAULTS = """
+import os, sys, time
+
+def first(name):
+    try:
+        os.close(os.open(os.path.join(os.path.dirname(__file__), name), os.O_CREAT | os.O_EXCL))
+    except FileExistsError:
+        return False
+    return True
+
+if "SLURM_JOB_ID" in os.environ and "stage" in sys.orig_argv:
+    if "acquire" in sys.orig_argv:
+        ended = first("acquire")
+        hoard = b"x" * (1500 << 20)  # the rule asks for 1000 MB, then for twice as much
+        if ended:
+            time.sleep(3600)
+    if "fit" in sys.orig_argv and first("fit"):
+        time.sleep(3600)
+"""
+
+
+def test_a_job_that_slurm_ends_is_tried_once_more_with_twice_as_much(
+    cluster: None, tmp_path: Path
+) -> None:
+    """One needs more memory than its rule asks for, another hangs until its time is over."""
+    write_campaign(tmp_path, 1)
+    faults = tmp_path / "faults"
+    faults.mkdir()
+    (faults / "sitecustomize.py").write_text(FAULTS, encoding="utf-8")
+    short = ("--set-resources", "fit:runtime=attempt")
+    run(tmp_path, "there", "--profile", "slurm", options=(*QUICK, *short), faults=str(faults))
+    shown = subprocess.run(
+        ["scontrol", "--oneliner", "show", "job"], capture_output=True, text=True, check=True
+    ).stdout
+    jobs = [dict(re.findall(r"(\w+)=(\S+)", line)) for line in shown.splitlines()]
+    stages = {
+        rule: [job for job in jobs if f"rule_{rule}_" in job["Comment"]]
+        for rule in ("acquire", "fit")
+    }
+    assert [job["MinMemoryNode"] for job in stages["acquire"]] == ["1000M", "2000M"]
+    assert [job["TimeLimit"] for job in stages["fit"]] == ["00:01:00", "00:02:00"]
+    assert [job["JobState"] for job in stages["fit"]] == ["TIMEOUT", "COMPLETED"]
+    assert (tmp_path / "there/decay-000/fit.json").is_file()

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from pendpipe.cli import main
+from pendpipe.configuration.load import read_records
 from pendpipe.project import SNAKEFILE
 
 ROOT = Path(__file__).parents[2]
@@ -115,6 +116,22 @@ def test_init_replaces_nothing(
     assert "records.tsv" not in line
     del before[begun / "config/records.tsv"]
     assert {path: path.read_bytes() for path in begun.rglob("*") if path.is_file()} == before
+
+
+def test_init_lists_recordings_of_ones_own(tmp_path: Path) -> None:
+    """Two files of one name, and names that are none for a folder, have records of their own."""
+    files = [tmp_path / "data/group 1.csv", tmp_path / "data/Größe.csv", tmp_path / "group-1.csv"]
+    (tmp_path / "data").mkdir()
+    for path in files:
+        path.write_text("", encoding="utf-8")
+    folder = tmp_path / "mine"
+    assert main(["init", str(folder), *map(str, files)]) == 0
+    records = read_records(folder / "config/records.tsv")
+    assert [record.record for record in records] == ["group-1", "Gr-e", "group-1-2"]
+    found = [(folder / record.source).resolve() for record in records]
+    assert found == [path.resolve() for path in files]
+    assert main(["init", str(tmp_path / "other"), str(tmp_path / "none.csv")]) == 2
+    assert not (tmp_path / "other").exists()
 
 
 @pytest.mark.parametrize(

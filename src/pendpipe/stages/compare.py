@@ -94,7 +94,7 @@ def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: P
         "provenance": {
             "version": __version__,
             "code": code_version("pendpipe.stages.compare"),
-            "configuration": digest(settings.model_dump(exclude={"results", "records"})),
+            "configuration": digest(settings.model_dump(exclude={"results", "records", "batch"})),
             "seed": settings.seed,
             "packages": {name: version(name) for name in PACKAGES},
         },
