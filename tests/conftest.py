@@ -4,8 +4,34 @@ CI draws the same examples each time, so that its answer depends on the code alo
 draws new ones.
 """
 
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
 from hypothesis import settings
 
 settings.register_profile("untimed", deadline=None)
 settings.register_profile("same", settings.get_profile("untimed"), derandomize=True)
 settings.load_profile("untimed")
+
+
+@pytest.fixture(scope="session")
+def make_example() -> Callable[..., Any]:
+    """What makes the example campaign of tests/figures, under whatever folder the tests run."""
+    name = "pendpipe_example_campaign"
+    if name not in sys.modules:
+        place = Path(__file__).parent / "figures" / "example"
+        spec = importlib.util.spec_from_file_location(
+            name, place / "__init__.py", submodule_search_locations=[str(place)]
+        )
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module
+        spec.loader.exec_module(module)
+    return sys.modules[name].make_example  # type: ignore[no-any-return]

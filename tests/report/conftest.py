@@ -2,39 +2,20 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
-from types import ModuleType
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 
-def load_example() -> ModuleType:
-    """Load the figures' example, under whatever folder the tests run."""
-    name = "pendpipe_example_campaign"
-    if name not in sys.modules:
-        place = Path(__file__).parents[1] / "figures" / "example"
-        spec = importlib.util.spec_from_file_location(
-            name, place / "__init__.py", submodule_search_locations=[str(place)]
-        )
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[name] = module
-        spec.loader.exec_module(module)
-    return sys.modules[name]
-
-
 @pytest.fixture(scope="session")
-def example(tmp_path_factory: pytest.TempPathFactory) -> Any:
+def example(tmp_path_factory: pytest.TempPathFactory, make_example: Callable[..., Any]) -> Any:
     """A finished campaign of 27 records with a figure drawn, and one record's decay."""
     from pendpipe.figures.campaign import draw_fig09
     from pendpipe.figures.decays import draw_decay, read_decay
     from pendpipe.figures.style import save
 
-    made = load_example().make_example(tmp_path_factory.mktemp("campaign"))
+    made = make_example(tmp_path_factory.mktemp("campaign"))
     save(draw_fig09(made.content), made.folder / "figures" / "fig09")
     for entry in made.content["records"][:2]:
         found = read_decay(made.folder, entry)

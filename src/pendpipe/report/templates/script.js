@@ -36,7 +36,7 @@
       const lost = words.map((w) => (/^(.+?)[<>]/.exec(w) || [])[1]).filter((n) => n && !names.includes(n));
       const never = words.filter((w) => !/[<>]/.test(w) && !rows.some((r) => test(r, w)));
       $("shown").textContent = `${rows.filter((r) => !r.hidden).length} of ${rows.length} records`
-        + (lost.length ? `. No column is called ${lost.join(", ")}; there are ${heads.filter((h) => h.classList.contains("n")).map(key).join(", ")}` : "")
+        + (lost.length ? `. No column is called ${lost.join(", ")}; there are ${names.filter((_, i) => heads[i].classList.contains("n")).join(", ")}` : "")
         + (never.length ? `. No row holds ${never.join(", ")}` : "");
     };
     $("filter").oninput = filter; $("filter-box").hidden = false; filter();
