@@ -15,9 +15,17 @@ from pendpipe.effects.catalogue import CATALOGUE
 from pendpipe.estimate import Estimate
 
 from .records import diagnosed
-from .test_statement import named, parameters
+from .test_statement import named
 
 REST = Remainder(1e4, 6.0, 40.0, {"phase": 0.8, "offset": 0.2})
+
+
+def parameters(frequency_hz: float) -> dict[str, Estimate]:
+    return {
+        "b": Estimate(0.0123, 0.0002, "1/s"),
+        "frequency": Estimate(frequency_hz, 2.3e-5, "Hz"),
+        "phase": Estimate(0.1, 0.001, "rad"),
+    }
 
 
 def diagnosis(*effects: FoundEffect, **more: Any) -> Diagnosis:

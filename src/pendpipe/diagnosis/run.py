@@ -233,9 +233,7 @@ def diagnose_decay(
         statement(
             swinging(baseline, swung, drag_form),
             before,
-            after,
             effects,
-            held,
             noise_rms,
             found.p_value,
             found.unexplained,

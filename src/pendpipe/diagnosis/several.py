@@ -164,12 +164,10 @@ def diagnose_several(
         if named
         else None
     )
-    models = (before.model() if named else after.model(), after.model())
     text = statement(
         swinging(baseline, outcomes[0].restoring, outcomes[0].drag_form),
-        *models,
+        before.model() if named else after.model(),
         named,
-        held,
         noise_rms,
         p_value,
         found.unexplained,
@@ -178,8 +176,7 @@ def diagnose_several(
         remainder=found.remainder,
     )
     # It is about one recording.
-    text = text.replace("his recording alone cannot", "hey cannot even together")
-    text = text.replace("this recording", "them").replace("of the record (", "of the records (")
+    text = text.replace("this recording", "them")
     return Diagnosis(
         baseline,
         before.model(),

@@ -314,8 +314,8 @@ def _presumed(diagnosis: Diagnosis) -> str:
     return " and ".join(names)
 
 
-def _class(effect: FoundEffect) -> list[tuple[float, str]]:
-    """The members of an effect's class with their names, the most probable first."""
+def class_of(effect: FoundEffect) -> list[tuple[float, str]]:
+    """Return the members of an effect's class with their names, the most probable first."""
     rivals = [(p, name_of(identifier)) for identifier, p in effect.indistinguishable]
     own = effect.name if effect.kind != "unnamed" else name_of(effect.identifier)
     return sorted([(effect.probability, own), *rivals], reverse=True)
@@ -323,7 +323,7 @@ def _class(effect: FoundEffect) -> list[tuple[float, str]]:
 
 def _named(effect: FoundEffect) -> str:
     """Name a cause, or its class, that is more likely than not; nothing otherwise."""
-    members = _class(effect)
+    members = class_of(effect)
     if effect.kind == "unnamed" and effect.probability >= NAMED:
         return ""
     if members[0][0] >= NAMED:
@@ -333,14 +333,14 @@ def _named(effect: FoundEffect) -> str:
     if total < NAMED:
         return ""
     likely = [name for p, name in members if p >= 0.05]
-    return f"{' or '.join(likely)} ({_percent(min(total, 1.0))} together)"
+    return f"{' or '.join(likely)} ({percent(min(total, 1.0))} together)"
 
 
 def _candidate(effect: FoundEffect) -> str:
-    members = _class(effect)
+    members = class_of(effect)
     if effect.kind == "unnamed" and effect.probability >= NAMED:
         return f"described by {effect.name}"
-    likely = [f"{name} ({_percent(p)})" for p, name in members if p >= CANDIDATE]
+    likely = [f"{name} ({percent(p)})" for p, name in members if p >= CANDIDATE]
     return " or ".join(likely)
 
 
@@ -436,15 +436,15 @@ def _where(diagnosis: Diagnosis, found: Sequence[FoundEffect]) -> str:
     remainder = diagnosis.remainder
     if remainder is not None and remainder.systematic and remainder.shares:
         name, share = max(remainder.shares.items(), key=lambda item: item[1])
-        text += f"; what is left lies in {_WHERE[name]} ({_percent(share)})"
+        text += f"; what is left lies in {_WHERE[name]} ({percent(share)})"
     return text
 
 
 def _certainty(diagnosis: Diagnosis, named: Sequence[str], *, rest: bool) -> str:
     sure = [
-        f"{_class(each)[0][1]} {_percent(_class(each)[0][0])}"
+        f"{class_of(each)[0][1]} {percent(class_of(each)[0][0])}"
         for each in diagnosis.missing
-        if _class(each)[0][0] >= NAMED and each.kind != "unnamed"
+        if class_of(each)[0][0] >= NAMED and each.kind != "unnamed"
     ]
     text = ", ".join(sure) if sure else "nothing above 50 %" if not named else ""
     held = diagnosis.held_out
@@ -456,7 +456,7 @@ def _certainty(diagnosis: Diagnosis, named: Sequence[str], *, rest: bool) -> str
         )
         text = f"{text}; {predicted}" if text else predicted
     if rest and diagnosis.remainder is not None:
-        text += f"; what is left is {_factor(diagnosis.remainder.over_noise)} times the noise"
+        text += f"; what is left is {factor(diagnosis.remainder.over_noise)} times the noise"
     return text or "see candidates"
 
 
@@ -526,13 +526,15 @@ def _p(p_value: float) -> str:
     return "p < 1e-12" if p_value < 1e-12 else f"p = {p_value:.2g}"
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
+    """Print a probability in per cent."""
     if share > 0.995:
         return "> 99 %"
     return f"{100.0 * share:.0f} %" if share >= 0.01 else "< 1 %"
 
 
-def _factor(ratio: float) -> str:
+def factor(ratio: float) -> str:
+    """Print a ratio to two digits, without a power of ten."""
     return f"{float(f'{ratio:.2g}'):,.0f}" if ratio > 9.95 else f"{ratio:.2g}"
 
 
