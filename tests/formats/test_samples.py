@@ -12,7 +12,7 @@ from pendpipe.formats.dialects import dialects
 from pendpipe.formats.plugin import HEAD
 
 HERE = Path(__file__).parent
-EXPECTED = sorted(HERE.glob("*/*.json"))
+EXPECTED = [path for path in sorted(HERE.glob("*/*.json")) if path.with_suffix("").exists()]
 
 
 @pytest.mark.parametrize("expected", EXPECTED, ids=lambda path: f"{path.parent.name}/{path.stem}")
@@ -28,7 +28,7 @@ def test_a_sample_file_reads_as_expected(expected: Path) -> None:
     assert recording.unit_is_stated is says.get("unit_is_stated", True)
 
 
-@pytest.mark.parametrize("sample", sorted(HERE.glob("*/*.json")), ids=lambda path: path.stem)
+@pytest.mark.parametrize("sample", EXPECTED, ids=lambda path: path.stem)
 def test_no_file_is_claimed_by_two_dialects(sample: Path) -> None:
     """A plain table by none."""
     head = sample.with_suffix("").read_bytes()[:HEAD]
