@@ -254,13 +254,6 @@ def test_counts_of_an_encoder_are_no_degrees_and_go_on_beyond_its_zero(
     assert any("jump by a turn of 4096" in note for note in recording.notes)
 
 
-def test_decimal_commas_between_commas(read_as: Callable[..., Recording]) -> None:
-    text = "".join(
-        f"{t:.2f},{x:.3f}\n".replace(".", "_") for t, x in zip(TIME, DEGREES, strict=True)
-    )
-    same(read_as("Zeit (s),Winkel (Grad)\n" + text.replace("_", ",")))
-
-
 def test_a_degree_sign_that_was_decoded_twice(read_as: Callable[..., Recording]) -> None:
     same(read_as("Time (s),Angle [Â°]\n" + rows(TIME, DEGREES, form=".3f")))
 

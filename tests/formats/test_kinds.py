@@ -13,7 +13,6 @@ import sys
 import zipfile
 from pathlib import Path
 
-import nptdms
 import numpy as np
 import openpyxl
 import pytest
@@ -135,11 +134,6 @@ def test_a_letter_with_an_index_keeps_its_meaning(tmp_path: Path) -> None:
     recording = read_text(tmp_path, text(0.01 * ANGLE, TIME, head="x_10s,t_10s\n"))
     np.testing.assert_allclose(recording.values, 0.01 * ANGLE, atol=1e-6)
     assert recording.time_s[-1] == pytest.approx(TIME[-1])
-
-
-def test_clock_times_may_have_points(tmp_path: Path) -> None:
-    stamps = [f"10/01/2025 15.{9 + t // 60:02.0f}.{t % 60:06.3f}" for t in TIME]
-    same(read_text(tmp_path, "".join(f"{a};{x:.6f}\n" for a, x in zip(stamps, ANGLE, strict=True))))
 
 
 def test_an_oscilloscopes_input_is_no_drive(tmp_path: Path) -> None:
@@ -329,33 +323,6 @@ def test_simulinks_structure_with_time_and_nested_structures(tmp_path: Path) -> 
     recording = read(tmp_path / "b.mat")
     assert (recording.quantity, recording.unit) == ("reading", "1")
     np.testing.assert_allclose(recording.values, ANGLE)
-
-
-def test_cassy_as_text_and_as_labx(tmp_path: Path) -> None:
-    head = (
-        "\ufeffMIN=0\t-1\t-3,2\r\r\nMAX=50\t1\t3,2\r\r\nSCALE=50\t0,5\t1\r\r\nDEC=1\t3\t2\r\r\n"
-        'DEF="Zeit" t / s\t"Spannung" U / V\t"Winkel" &j / rad\r\r\n'
-    )
-    rows = text(TIME, 0 * TIME, ANGLE, sign="\t").replace(".", ",").replace("\n", "\r\r\n")
-    same(read_text(tmp_path, head + rows))
-
-    def channel(name: str, symbol: str, unit: str, values: Floats) -> str:
-        cells = "".join(f"<value>{x:.6f}</value>" for x in values)
-        return (
-            f"<channels count='1'><channel><quantity>{name}</quantity><symbol>{symbol}</symbol>"
-            f"<unit>{unit}</unit><values>{cells}</values></channel></channels>"
-        )
-
-    count = np.arange(1.0, len(TIME) + 1)
-    xml = (
-        "<?xml version='1.0' encoding='utf-8'?><cassylab xml:lang='de-DE'><allchannels count='3'>"
-        + channel("Index", "n", "", count)
-        + channel("Zeit", "t", "s", TIME)
-        + channel("Winkel", "&amp;b", "rad", ANGLE)
-        + "</allchannels></cassylab>"
-    )
-    same(read_text(tmp_path, xml, "a.labx"))
-    assert inspect(tmp_path / "a.labx").format == "cassy-labx"
 
 
 def test_logger_pro(tmp_path: Path) -> None:
@@ -709,16 +676,6 @@ def test_lists_of_unlike_lengths_in_json_are_signals_of_their_own(tmp_path: Path
     lists = [[1.0, 2.0, 3.0], TIME[some].tolist(), ANGLE[some].tolist()]
     recording = read_text(tmp_path, json.dumps({"data": lists}), "a.json")
     same(recording, ANGLE[some], TIME[some])
-
-
-def test_labviews_tdms_gives_its_interval_and_its_units(tmp_path: Path) -> None:
-    told = {"wf_increment": 1.0 / 30.0, "wf_start_offset": 0.0, "unit_string": "deg"}
-    path = tmp_path / "a.tdms"
-    with nptdms.TdmsWriter(path) as writer:
-        writer.write_segment([nptdms.ChannelObject("log", "arm", np.degrees(ANGLE), told)])
-    recording = read(path)
-    same(recording)
-    assert recording.weak_guesses == ()
 
 
 def test_igor_origin_excel_and_seismographs_write_tables_of_their_own(tmp_path: Path) -> None:

@@ -77,6 +77,9 @@ FORMS = {
         ],
         "time",
     ),
+    "points in the time of day": Form(
+        lambda t: clock(54_540 + t, "10/01/2025 {h:02d}.{m:02d}.{s:06.3f}"), "time"
+    ),
     "of arrival": Form(
         lambda t: [f"{x:.6f}" for x in arrival(t)], within_s=0.25, said="as of arrival"
     ),
