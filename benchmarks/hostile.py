@@ -1,7 +1,7 @@
 """Hostile input: what the command line answers, in what time and in how much memory.
 
-    python -m benchmarks.hostile             every row of the table
-    python -m benchmarks.hostile pipe YAML   the rows with one of these words
+    python -m benchmarks.hostile             the table; rows that this code has done are kept
+    python -m benchmarks.hostile pipe YAML   the rows with one of these words, anew
 
 A row is right when its process ends within 10 s (of the processor, since others may be at work;
 a diagnosis within 20)
@@ -42,6 +42,9 @@ ROOT = Path(__file__).resolve().parents[1]
 MOST_SECONDS = 10.0
 MOST_DIAGNOSIS_SECONDS = 20.0
 MOST_MB = 1000.0
+WRONG = "**wrong** "
+SOURCES = ("src/pendpipe/**/*.py", "benchmarks/hostile*.py")
+"""What a row's answer is of."""
 RIGHT = ((2,), (0, 2))
 """Statuses of an input that must be refused, and of one that may also be read."""
 
@@ -143,47 +146,49 @@ def rows() -> Iterator[Row]:
 def main() -> None:
     """Run the rows that are asked for and print the table; status 1 where one is wrong."""
     asked = sys.argv[1:]
-    wrong = 0
+    done: dict[str, list[str]] = journal.read("hostile", {}, SOURCES)
+    chosen = [row for row in rows() if not asked or any(word in row.name for word in asked)]
     # Under nohup the recorder would inherit that SIGHUP is ignored.
     signal.signal(signal.SIGHUP, lambda *_: None)
     # The first fit on a machine compiles the engine: that is no row's time.
     subprocess.run([sys.executable, "-m", "pendpipe.warm_up"], check=True)
-    lines = ["| input | s | s of the processor | MB | exit | answer |", "|---|---|---|---|---|---|"]
-    print("\n".join(lines), flush=True)
-    for row in rows():
-        if asked and not any(word in row.name for word in asked):
-            continue
-        with tempfile.TemporaryDirectory() as folder:
-            used = _measured(row.command(Path(folder)), Path(folder), row.end)
-            said = re.sub(
-                r"(\S{20})\S{80,}",
-                r"\1...",
-                used.said.replace(folder + os.sep, "").replace(folder, "FOLDER"),
-            )
-            left = row.left(Path(folder)) if used.status in row.statuses else ""
-        right = (
-            used.cpu_s < row.most_cpu_s
-            and used.megabytes < MOST_MB
-            and used.status in row.statuses
-            and "Traceback" not in said
-            and (used.status != 2 or len(re.findall("^pendpipe: ", said, re.MULTILINE)) == 1)
-            and not left
-        )
-        wrong += not right
-        line = left or (said.splitlines()[-1] if said else "")
-        mark = "" if right else "**wrong** "
-        cells = (
-            row.name,
-            f"{used.seconds:.1f}",
-            f"{used.cpu_s:.1f}",
-            f"{used.megabytes:.0f}",
-            str(used.status),
-            mark + line[:150].replace("|", "\\|"),
-        )
-        lines.append(f"| {' | '.join(cells)} |")
-        print(lines[-1], flush=True)
+    print("| input | s | s of the processor | MB | exit | answer |\n|---|---|---|---|---|---|")
+    for row in chosen:
+        if asked or row.name not in done:
+            done[row.name] = _cells(row)
+            journal.keep("hostile", done, SOURCES)
+        print(f"| {' | '.join([row.name, *done[row.name]])} |", flush=True)
+    wrong = sum(done[row.name][-1].startswith(WRONG) for row in chosen)
     print(f"\n{wrong} wrong. Made by commit {journal.commit()}.")
     sys.exit(wrong > 0)
+
+
+def _cells(row: Row) -> list[str]:
+    """Run a row, and return what stands in the table behind its name."""
+    with tempfile.TemporaryDirectory() as folder:
+        used = _measured(row.command(Path(folder)), Path(folder), row.end)
+        said = re.sub(
+            r"(\S{20})\S{80,}",
+            r"\1...",
+            used.said.replace(folder + os.sep, "").replace(folder, "FOLDER"),
+        )
+        left = row.left(Path(folder)) if used.status in row.statuses else ""
+    right = (
+        used.cpu_s < row.most_cpu_s
+        and used.megabytes < MOST_MB
+        and used.status in row.statuses
+        and "Traceback" not in said
+        and (used.status != 2 or len(re.findall("^pendpipe: ", said, re.MULTILINE)) == 1)
+        and not left
+    )
+    line = left or (said.splitlines()[-1] if said else "")
+    return [
+        f"{used.seconds:.1f}",
+        f"{used.cpu_s:.1f}",
+        f"{used.megabytes:.0f}",
+        str(used.status),
+        ("" if right else WRONG) + line[:150].replace("|", "\\|"),
+    ]
 
 
 @dataclass(frozen=True)
