@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, ParamSpec, TypeAlias, TypeVar
+from typing import Any, Final, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ BoolArray: TypeAlias = npt.NDArray[np.bool_]
 AnyArray: TypeAlias = npt.NDArray[Any]
 Numbers: TypeAlias = Any
 """A number or an array of numbers; several arguments broadcast against each other."""
+_ROWS_AT_ONCE: Final = 1 << 15
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
 
@@ -43,3 +44,26 @@ def _plain(values: Any) -> Any:
     if isinstance(values, tuple):
         return getattr(values, "_make", tuple)(map(_plain, values))
     return np.asarray(values)[()]
+
+
+def scaled_qr(matrix: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Factor a tall matrix with columns of unit length, some rows at a time.
+
+    Returns
+    -------
+    basis, triangle, scale
+        The QR factors of ``matrix / scale``, and the lengths of its columns, 1 in the place of 0.
+    """
+    scale = np.linalg.norm(matrix, axis=0)
+    scale[scale == 0.0] = 1.0
+    count, width = matrix.shape
+    parts = np.linspace(0, count, max(count // _ROWS_AT_ONCE, 1) + 1).astype(np.int64)
+    if len(parts) == 2:
+        return *np.linalg.qr(matrix / scale), scale
+    basis, small = np.empty_like(matrix), np.empty((len(parts) - 1, width, width))
+    for own, start, stop in zip(small, parts[:-1], parts[1:], strict=True):
+        basis[start:stop], own[:] = np.linalg.qr(matrix[start:stop] / scale)
+    turned, triangle = np.linalg.qr(small.reshape(-1, width))
+    for own, start, stop in zip(turned.reshape(small.shape), parts[:-1], parts[1:], strict=True):
+        basis[start:stop] = basis[start:stop] @ own
+    return basis, triangle, scale

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betainc, chdtrc
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, scaled_qr
 from pendpipe.diagnosis.blocks import Blocks, blocks_of
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
@@ -122,9 +122,7 @@ def tangent_basis(fit: Fit) -> FloatArray:
 
 def _span(part: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the space that columns span."""
-    scale = np.linalg.norm(part, axis=0)
-    scale[scale == 0.0] = 1.0
-    left, small = np.linalg.qr(part / scale)
+    left, small, _ = scaled_qr(part)
     mixing, sizes, _ = np.linalg.svd(small)
     return np.asarray(left @ mixing[:, sizes > 1e-9 * sizes[0]])
 

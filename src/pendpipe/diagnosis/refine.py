@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from pendpipe.analysis.fit.least_squares import bounded_least_squares
-from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.arrays import FloatArray, IntArray, scaled_qr
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise, white_noise
 from pendpipe.diagnosis.unwrapped import unwrapped
@@ -79,9 +79,7 @@ class Evaluation:
         """
         if not np.all(np.isfinite(self.columns)):
             raise NoMotionError("its derivatives are not finite")
-        scale = np.linalg.norm(self.columns, axis=0)
-        scale[scale == 0.0] = 1.0
-        return *np.linalg.qr(self.columns / scale), scale
+        return scaled_qr(self.columns)
 
 
 class GaussNewton:
@@ -302,10 +300,8 @@ class Fit:
     def covariance(self) -> FloatArray:
         """Of all values; zero for those held, shape (size, size)."""
         matrix = np.zeros((len(self.value), len(self.value)))
-        part = self.jacobian[:, self.free]
-        scale = np.linalg.norm(part, axis=0)
-        scale[scale == 0.0] = 1.0
-        inverse = np.linalg.pinv(np.linalg.qr(part / scale, mode="r"), rcond=1e-12)
+        _, triangle, scale = scaled_qr(self.jacobian[:, self.free])
+        inverse = np.linalg.pinv(triangle, rcond=1e-12)
         own = inverse @ inverse.T / np.outer(scale, scale)
         if self.scatter is not None:
             own = own @ self.scatter[np.ix_(self.free, self.free)] @ own

@@ -418,6 +418,8 @@ class Tangent:
 
 _POINTS: Final = 6
 """Neighbouring nodes that a value is interpolated from."""
+_READ_AT_ONCE: Final = 1 << 14
+"""Readings that are interpolated together."""
 _FINER: Final = 3
 """Nodes that are interpolated from, over those of the motion."""
 
@@ -513,8 +515,8 @@ class Sampled:
         )
 
     def at_nodes(self, values: FloatArray) -> FloatArray:
-        """Interpolate what is known at the motion's nodes, shape (..., count, order + 1)."""
-        return interpolated(_at_finer(values), self._first, self._weights)
+        """Interpolate what is known at the motion's nodes, shape (..., rows, order + 1)."""
+        return interpolated(values, self._first, self._weights)
 
     def change(self, by_log: FloatArray, by_time: FloatArray) -> FloatArray:
         """Change of the angle, rad, from changes of ln r and of t at fixed phase."""
@@ -529,18 +531,17 @@ def sample_motion(motion: Motion, time_s: FloatArray) -> Sampled:
     psi - omega t and ln r are slow; each is interpolated by the polynomial through six
     neighbouring nodes of its half cycle, close enough for 3e-7 of the motion.
     """
-    order = _FINER * motion.clock.order
+    length = _FINER * motion.clock.order + 1
     nodes = _at_finer(motion.time_s)
     behind = np.searchsorted(nodes.reshape(-1), time_s)
-    half = np.clip((behind - 1) // (order + 1), 0, len(nodes) - 1)
-    left = np.clip(behind - half * (order + 1) - _POINTS // 2, 0, order + 1 - _POINTS)
-    first = (half * (order + 1) + left).astype(np.intp)
+    half = np.clip((behind - 1) // length, 0, len(nodes) - 1)
+    left = np.clip(behind - half * length - _POINTS // 2, 0, length - _POINTS)
+    first = (half * length + left).astype(np.intp)
     weights = lagrange(nodes.reshape(-1), first, time_s)
-    omega = motion.angular_frequency
-    slow = replace(motion.clock, order=order).psi - omega * (nodes - nodes[0, 0])
-    finer = np.stack([slow, _at_finer(motion.log_amplitude)])
-    late, log_amplitude = interpolated(finer, first, weights)
-    phase = omega * (time_s - nodes[0, 0]) + late
+    omega, start_s = motion.angular_frequency, motion.time_s[0, 0]
+    slow = motion.clock.psi - omega * (motion.time_s - start_s)
+    late, log_amplitude = interpolated(np.stack([slow, motion.log_amplitude]), first, weights)
+    phase = omega * (time_s - start_s) + late
     return Sampled(
         motion, time_s, phase, np.exp(log_amplitude), np.cos(phase), np.sin(phase), first, weights
     )
@@ -577,13 +578,17 @@ def sample_pieces(pieces: Sequence[tuple[float, Motion]], time_s: FloatArray) ->
 
 
 def interpolated(values: FloatArray, first: IntArray, weights: FloatArray) -> FloatArray:
-    """Interpolate what is known at the nodes, shape (..., count, order + 1), by six of them."""
-    index = first + np.arange(_POINTS)[:, None]
-    flat = values.reshape(-1, values.shape[-2] * values.shape[-1])
+    """Interpolate what is known at the nodes, shape (..., rows, order + 1), by six finer ones."""
+    flat = values.reshape(-1, *values.shape[-2:])
     found = np.empty((len(flat), len(first)))
-    # A row at a time stays in the processor's cache.
+    points = np.arange(_POINTS)[:, None]
     for row, out in zip(flat, found, strict=True):
-        np.einsum("pn,pn->n", row.take(index, mode="clip"), weights, out=out)
+        nodes = _at_finer(row).reshape(-1)
+        # Some at a time stay in the processor's cache.
+        for start in range(0, len(first), _READ_AT_ONCE):
+            part = slice(start, start + _READ_AT_ONCE)
+            near = nodes.take(first[part] + points, mode="clip")
+            np.einsum("pn,pn->n", near, weights[:, part], out=out[part])
     return found.reshape(*values.shape[:-2], -1)
 
 

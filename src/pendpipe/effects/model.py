@@ -410,6 +410,8 @@ class Model:
 
 
 _AT_ONCE: Final = 4
+_NUMBERS_AT_ONCE: Final = 1 << 16
+"""Accelerations whose responses are computed together."""
 
 
 def responses(
@@ -435,8 +437,9 @@ def responses(
     ]
     forces = [force for force in found if force is not None]
     # A few at a time stay in the processor's cache.
-    for first in range(0, len(forces), _AT_ONCE):
-        part = slice(first, first + _AT_ONCE)
+    at_once = max(min(_AT_ONCE, _NUMBERS_AT_ONCE // tangent.motion.time_s.size), 1)
+    for first in range(0, len(forces), at_once):
+        part = slice(first, first + at_once)
         total[part] += sampled.change(*tangent.of_force(np.stack(forces[part])))
     if effect.kick(changes[0][1]) is not None:
         before = at.after_kicks([effect.kick(low) for low, _ in changes])
@@ -473,10 +476,8 @@ def jacobian(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
     sampled, tangent = at.sampled, at.tangent
     pendulum = model.pendulum(value)
     columns = np.empty((len(at.reading), model.size))
-    losses = [A, B, C, SHARE]
-    columns[:, losses] = sampled.change(
-        *tangent.of_force(np.stack([_by_loss(model, value, at, index) for index in losses]))
-    ).T
+    for index in (A, B, C, SHARE):
+        columns[:, index] = sampled.change(*tangent.of_force(_by_loss(model, value, at, index)))
     columns[:, OMEGA] = _by_omega(model, value, at)
     _, _, by_log, by_time = at.start
     columns[:, START] = (sampled.angle * by_log - sampled.velocity * by_time) / value[START]

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.special import stdtr
 
 from pendpipe.analysis.turning_points.measure import Samples
-from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.arrays import FloatArray, IntArray, scaled_qr
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.tails import upper_tail
 from pendpipe.diagnosis.refine import Fit
@@ -51,6 +51,8 @@ _ELSEWHERE: Final = 20
 _AGREE_SD: Final = 3.0
 _SLOW_CYCLES: Final = 10.0
 _HARMONICS: Final = 3
+_NUMBERS: Final = 1 << 22
+"""Numbers in the basis of what varies slowly, at most."""
 _MOST: Final = 150
 """Slips at most."""
 _CHOICE: Final = 6.0
@@ -339,10 +341,14 @@ def spread(left: FloatArray) -> float:
 
 
 def _slow(data: Data, fit: Fit) -> FloatArray:
-    """Return an orthonormal basis of what varies slowly, and of the model's own values."""
+    """Return an orthonormal basis of what varies slowly, and of the model's own values.
+
+    Over many cycles the fastest of it is slower, or the basis would grow with their square.
+    """
     sampled = fit.at.sampled
     turned = sampled.phase - sampled.phase[0]
-    number = max(int(turned[-1] / (math.pi * _SLOW_CYCLES)), 2)
+    most = _NUMBERS // (len(turned) * (2 * _HARMONICS + 1))
+    number = max(min(int(turned[-1] / (math.pi * _SLOW_CYCLES)), most), 2)
     waves = np.cos(math.pi / turned[-1] * turned[:, None] * np.arange(number))
     parts = [waves, waves * sampled.angle[:, None], waves * sampled.velocity[:, None]]
     for harmonic in range(2, _HARMONICS + 1):
@@ -350,9 +356,9 @@ def _slow(data: Data, fit: Fit) -> FloatArray:
         parts += [waves * np.cos(turns), waves * np.sin(turns)]
     parts.append(jacobian(fit.model, fit.value, fit.at)[:, list(fit.free)])
     columns = np.concatenate(parts, axis=1) * data.weight[:, None]
-    columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    basis, lengths, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(basis[:, lengths > 1e-6 * lengths[0]])
+    basis, triangle, _ = scaled_qr(columns)
+    mixing, lengths, _ = np.linalg.svd(triangle)
+    return np.asarray(basis @ mixing[:, lengths > 1e-6 * lengths[0]])
 
 
 def _step(row: int, unit: FloatArray, data: Data) -> FloatArray:
