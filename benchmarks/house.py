@@ -82,6 +82,26 @@ def importers(trees: dict[Path, ast.Module]) -> dict[str, set[str]]:
     return found
 
 
+def floors(trees: dict[Path, ast.Module], package: str = "pendpipe.diagnosis") -> int:
+    """Longest chain of imports at the top of a package's files; 0 where there is a circle."""
+    tops = {
+        path: ast.Module([n for n in tree.body if isinstance(n, ast.Import | ast.ImportFrom)], [])
+        for path, tree in trees.items()
+    }
+    by = importers(tops)
+    names = [module_name(path) for path in trees]
+    left = {name for name in names if name.startswith(f"{package}.")}
+    needs = {name: {n for n in left if name in by[n]} for name in left}
+    number = 0
+    while left:
+        # What stands on nothing that is left is the next floor.
+        floor = {name for name in left if not needs[name] & left - {name}}
+        if not floor:
+            return 0
+        left, number = left - floor, number + 1
+    return number
+
+
 def definitions(module: ast.Module) -> Iterator[tuple[str, int]]:
     """Functions, classes, methods and constants that no decorator enters anywhere."""
     classes = [node for node in module.body if isinstance(node, ast.ClassDef)]
@@ -174,6 +194,7 @@ def measure(tree: Path) -> tuple[dict[str, dict[str, Any]], list[str]]:
             "files with exactly one importer": len(alone),
             "definitions nobody uses": sum(tree / n.partition(":")[0] in paths for n in dead),
             "lines that stand twice": duplicates(paths),
+            "floors of the diagnosis": floors({p: trees[p] for p in paths}),
             "`# fmt: skip`": sum(text.count("# fmt: " + "skip") for text in texts),
         }
     return table, dead

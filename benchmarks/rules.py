@@ -1,14 +1,14 @@
 """Each rule beside the score removed in turn, on the recordings where a log says that it acts.
 
-    python -m benchmarks.rules [--challenge SEALED] [--apparatus 60] [--journal FILE]
+    python -m benchmarks.rules [--challenge SET SEALED] [--apparatus 66] [--journal FILE] [--print]
 
 The rules stood at the commit `AT`; ``rules.patch`` makes each of them a question there that is
 noted, and answered with no where the rule is taken away. The set is opened and frozen: items of
-`benchmarks.apparatus`, the recordings of `benchmarks.known_physics`, and a challenge set, of which
-`--challenge` is the folder of the opened truth (``recordings/`` lies in its sibling of the set's
-name). An answer is worth 1 for each cause (or known fact) in a named class, less 1 for each false
-name (1/2 if its probability is below 50 %) and for each curve where no cause lies outside. A rule
-goes unless the sign test speaks for it.
+`benchmarks.apparatus`, the short recordings of `benchmarks.known_physics`, and a challenge set (its
+folder and that of its truth, as ``pendpipe challenge make`` was given them). An answer is worth 1
+for each cause (or known fact) in a named class, less 1 for each false name (1/2 if its probability
+is below 50 %) and for each curve where no cause lies outside. A rule goes unless the sign test
+speaks for it, which it cannot where fewer than five answers differ.
 """
 
 from __future__ import annotations
@@ -56,10 +56,10 @@ def worth(
     return value
 
 
-def items(apparatus: int, challenge: Path | None) -> Iterator[str]:
+def items(apparatus: int, challenge: list[Path]) -> Iterator[str]:
     """Names of the recordings of the set."""
     if challenge:
-        truths = sorted((challenge / "truth").glob("*.json"))
+        truths = sorted((challenge[1] / "truth").glob("*.json"))
         yield from (f"challenge {path.stem}" for path in truths)
     with (ROOT / "benchmarks/known_physics.tsv").open(encoding="utf-8", newline="") as stream:
         rows = csv.DictReader(stream, delimiter="\t", quoting=csv.QUOTE_NONE)
@@ -69,7 +69,7 @@ def items(apparatus: int, challenge: Path | None) -> Iterator[str]:
     yield from (f"apparatus {number}" for number in range(apparatus))
 
 
-def judged(name: str, challenge: Path | None) -> float:
+def judged(name: str, challenge: list[Path]) -> float:
     """Diagnose one recording; what the answer is worth."""
     import pendpipe as pp
 
@@ -90,9 +90,8 @@ def judged(name: str, challenge: Path | None) -> float:
             effects, true, causes, bool(item.outside) or bool(set(item.hidden) - catalogue())
         )
     if kind == "challenge":
-        assert challenge is not None
-        truth = json.loads((challenge / f"truth/{which}.json").read_text("utf-8"))
-        place = challenge.parent / "set/rules/recordings" / f"{which}.csv"
+        truth = json.loads((challenge[1] / f"truth/{which}.json").read_text("utf-8"))
+        place = challenge[0] / "recordings" / f"{which}.csv"
         found = pp.diagnose(pp.read(place), baseline=truth["baseline"]).to_dict()["effects"]
         causes = [{each["effect"], *each["also"]} for each in truth["effects"]]
         out = any(each["effect"].startswith("unnamed") for each in truth["effects"])
@@ -114,7 +113,7 @@ def judged(name: str, challenge: Path | None) -> float:
     return sum(known_physics.is_found(each, answers) for each in facts) - float(len(wrong))
 
 
-def work(challenge: Path | None) -> None:
+def work(challenge: list[Path]) -> None:
     """Answer what standard input asks for, ``rule<tab>recording`` a line, by the patched code."""
     import time
 
@@ -134,11 +133,11 @@ def work(challenge: Path | None) -> None:
         print(json.dumps(answer | {"acted": sorted(rule.acted)}), flush=True)
 
 
-def ask(tree: Path, wanted: list[tuple[str, str]], challenge: Path | None) -> Iterator[Answer]:
+def ask(tree: Path, wanted: list[tuple[str, str]], challenge: list[Path]) -> Iterator[Answer]:
     """Have some recordings answered by the patched code."""
     paths = os.pathsep.join(str(tree / each) for each in ("src", "challenge/src"))
     words = [sys.executable, "-m", "benchmarks.rules", "--work"]
-    words += ["--challenge", str(challenge)] if challenge else []
+    words += ["--challenge", *map(str, challenge)] if challenge else []
     environment = {**os.environ, "PYTHONPATH": paths}
     # Both write whole lines into one pipe.
     reading, writing = os.pipe()
@@ -178,7 +177,7 @@ def table(known: Mapping[tuple[str, str], Answer]) -> Iterator[str]:
             if found and better + worse
             else 1.0
         )
-        verdict = "stays" if p_value < SIGNIFICANT else "goes"
+        verdict = "stays" if p_value < SIGNIFICANT else "goes" if found else "not tried"
         cells = [rule, acted[rule], len(found), better, worse, len(found) - better - worse]
         yield f"| {' | '.join(map(str, cells))} | {p_value:.2g} | {verdict} |"
 
@@ -186,13 +185,13 @@ def table(known: Mapping[tuple[str, str], Answer]) -> Iterator[str]:
 def main() -> None:
     """Answer what has not been answered yet, and print the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--apparatus", type=int, default=60, help="items")
-    parser.add_argument("--challenge", type=Path, help="truths of an opened challenge set")
+    parser.add_argument("--apparatus", type=int, default=66, help="items")
+    parser.add_argument("--challenge", type=Path, nargs=2, default=[], metavar=("SET", "SEALED"))
     parser.add_argument("--journal", type=Path, default=ROOT / ".evidence/rules.jsonl")
     parser.add_argument("--print", action="store_true", help="only print what is answered")
     parser.add_argument("--work", action="store_true", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
-    challenge = arguments.challenge and arguments.challenge.resolve()
+    challenge = [each.resolve() for each in arguments.challenge]
     if arguments.work:
         work(challenge)
         return
@@ -210,9 +209,10 @@ def main() -> None:
                 stream.flush()
                 known[each["without"], each["item"]] = each
 
-        tree = copy_of(AT, Path(folder))
-        patch = Path(__file__).with_suffix(".patch")
-        subprocess.run(["git", "apply", str(patch)], cwd=tree, check=True)
+        tree = Path(folder) if arguments.print else copy_of(AT, Path(folder))
+        if not arguments.print:
+            patch = Path(__file__).with_suffix(".patch")
+            subprocess.run(["git", "apply", str(patch)], cwd=tree, check=True)
         names = list(items(arguments.apparatus, challenge))
         answer([("", name) for name in names])
         by_rule: dict[str, list[str]] = defaultdict(list)
