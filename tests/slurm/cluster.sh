@@ -27,6 +27,10 @@ start() { # start NAME COMMAND...
   setsid "$@" >"$dir/log/$name.log" 2>&1 &
   echo $! >"$dir/$name.pid"
 }
+if [ -e /etc/slurm/slurm.conf ] && ! grep -q ClusterName=pendtest /etc/slurm/slurm.conf; then
+  echo "/etc/slurm/slurm.conf is that of another cluster: it is left alone" >&2
+  exit 1
+fi
 host=$(hostname -s) memory=$(($(awk '/MemTotal/ {print $2}' /proc/meminfo) / 1024 * 9 / 10))
 mkdir -p "$dir"/{state,spool,log} /run/munge /etc/slurm
 # munge refuses to start unless its folder is its own and 0755.

@@ -34,6 +34,9 @@ def missing() -> list[str]:
         names.append("root")
     if importlib.util.find_spec("snakemake_executor_plugin_slurm") is None:
         names.append("snakemake-executor-plugin-slurm")
+    own = Path("/etc/slurm/slurm.conf")
+    if own.exists() and "ClusterName=pendtest" not in own.read_text(encoding="utf-8"):
+        names.append("the place of another cluster's slurm.conf")
     return names
 
 
