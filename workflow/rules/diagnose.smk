@@ -7,6 +7,8 @@ rule diagnose:
         chunk_of("diagnose"),
     log:
         f"{RESULTS}/logs/diagnose-{{chunk}}.log",
+    # It takes longest: begun last, it would leave the other cores idle.
+    priority: 1
     conda:
         "../envs/pendpipe.yaml"
     resources:
