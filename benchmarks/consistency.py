@@ -252,7 +252,11 @@ def judge(truth: Truth, seed: int, *, diagnose: bool) -> Found:
     found.p_value = getattr(result, "fit_p_value", None)
     _compare(found, result)
     if diagnose:
-        answer = pp.diagnose(recording).to_dict()
+        try:
+            answer = pp.diagnose(recording).to_dict()
+        except InputError as refusal:
+            found.refused = f"diagnose: {refusal.problem}"
+            return found
         effects = [each for each in answer.get("effects", ()) if not each.get("presumed")]
         found.verdict = answer["verdict"]
         found.names = tuple(each["id"] for each in effects)

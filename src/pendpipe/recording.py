@@ -323,6 +323,8 @@ def sizes_of(values: FloatArray) -> FloatArray:
 
 _LONGEST_LIST: Final = 100_000
 """Readings of which nobody makes a list of amplitudes."""
+_REST: Final = 0.1
+"""Of the largest size, below which a decay is nearly over."""
 _BENDS: Final = 8
 """How often a smooth fall bends to and fro about a cubic, at most."""
 
@@ -344,9 +346,11 @@ def only_falls(values: FloatArray) -> bool:
     sizes = sizes_of(values[np.isfinite(values)])
     if len(sizes) < 4 or not sizes[-1] < 0.8 * sizes[0]:
         return False
-    above = sizes - np.minimum.accumulate(sizes)
-    # A wild reading makes no range.
-    low, high = np.percentile(sizes, (2, 98))
+    # A long rest behind a decay tells nothing of it, and a wild reading makes no range.
+    largest = float(np.percentile(sizes, 98))
+    moving = sizes[: int(np.flatnonzero(sizes > _REST * largest)[-1]) + 1]
+    above = moving - np.minimum.accumulate(moving)
+    low, high = np.percentile(moving, (2, 98))
     if not float(np.mean(above)) < _LEVEL * float(high - low):
         return False
     steps = np.diff(sizes)

@@ -154,6 +154,9 @@ def test_a_table_of_turning_points_has_its_period(tmp_path: Path) -> None:
     assert abs(fit["Q"].value / whole["Q"].value - 1.0) < 0.01
 
 
+REST = 1e-3 * np.random.default_rng(1).standard_normal(90000)
+
+
 @pytest.mark.parametrize(
     ("values", "falls"),
     [
@@ -171,6 +174,7 @@ def test_a_table_of_turning_points_has_its_period(tmp_path: Path) -> None:
             + 20.0 * (np.arange(2400) == 900),
             False,
         ),
+        (np.exp(-np.arange(90000) / 300) * np.cos(0.06 * np.arange(90000)) + REST, False),
         (FALL[:3], False),
         (np.ones(20), False),
     ],

@@ -470,6 +470,8 @@ _DITHERED: Final = 0.4
 _TOLERANCE: Final = 1e-2
 """Of chi^2: a last step of a tenth of a standard deviation, which leaves far less."""
 _ROUNDS: Final = 2
+_SAME: Final = 1.01
+"""Of a noise: within, errors are the same."""
 _SETTLED: Final = 0.1
 """Standard deviations by which the mean share may change when the others have followed it."""
 _SHARES: Final = 33
@@ -507,12 +509,15 @@ class Fitted:
         Indices that were not fitted.
     start
         Where the search began.
+    shared
+        The average over b's share there, where it was taken.
     """
 
     problem: Waveform
     minimum: Minimum
     held: tuple[int, ...]
     start: Start
+    shared: _Shared | None = None
 
     @property
     def value(self) -> FloatArray:
@@ -658,30 +663,31 @@ def _settled(
             return found
         if found.noise_rms < _OTHER * problem.noise_rms:
             problem = replace(problem, noise_rms=found.noise_rms)
-        elif settled or (shared := _at_mean_share(found)) is None:
+        elif settled:
             break
         else:
-            found, settled = replace(found, minimum=shared), shared.converged
-            if settled:
+            found = _at_mean_share(found)
+            if settled := found.shared is not None:
                 continue
         found = Fitted(problem, _minimised(problem, found.value, held), held, start)
         settled = SHARE in held
     return _rounded(found, samples)
 
 
-def _at_mean_share(found: Fitted) -> Minimum | None:
-    """Where the share is what the readings expect of it; None where it is so already.
+def _at_mean_share(found: Fitted) -> Fitted:
+    """Move to where the share is what the readings expect of it.
 
-    Converged where chi^2 is as expected there; else it is to be minimised from there.
+    Without `shared` where chi^2 is not as expected there: it is to be minimised from there.
     """
     minimum, problem, shared = found.minimum, found.problem, _over_shares(found)
     step = shared.value - minimum.value
     if abs(step[SHARE]) <= _SETTLED * math.sqrt(shared.covariance[SHARE, SHARE]):
-        return None
+        return replace(found, shared=shared)
     at = problem.bounds.clip(problem.curved(minimum.value, step))
     expected = minimum.quadratic.chi2 + shared.chi2
     settled = minimum.converged and abs(problem.chi2(at) - expected) < AS_PROMISED
-    return Minimum(at, minimum.quadratic._replace(chi2=expected), settled)
+    there = Minimum(at, minimum.quadratic._replace(chi2=expected), minimum.converged)
+    return replace(found, minimum=there, shared=shared if settled else None)
 
 
 def _judged(fitted: Fitted, samples: Samples, points: TurningPoints) -> Goodness:
@@ -742,6 +748,14 @@ def _over_shares(fitted: Fitted, noise_rms: float | None = None, enlarged: float
     likely /= likely.sum()
     share = float(likely @ shares)
     return losses.averaged(share, losses.at(np.array([share])), shares, found, likely)
+
+
+def _shared_of(fitted: Fitted, goodness: Goodness) -> _Shared:
+    """The average for the noise that was found, and what enlarges it."""
+    same = goodness.enlarged == 1.0 and goodness.noise_rms < _SAME * fitted.noise_rms
+    if same and fitted.shared is not None:
+        return fitted.shared
+    return _over_shares(fitted, goodness.noise_rms, goodness.enlarged)
 
 
 class _AtShares(NamedTuple):
@@ -894,7 +908,7 @@ def _rounded(fitted: Fitted, samples: Samples) -> Fitted:
         minimum = _minimised(problem, found.value, found.held)
         if not math.isfinite(minimum.quadratic.chi2):
             return fitted
-        found = replace(found, problem=problem, minimum=minimum)
+        found = replace(found, problem=problem, minimum=minimum, shared=None)
     return found
 
 
@@ -923,7 +937,7 @@ def waveform_result(
     inside = (points.time_s >= times[0]) & (points.time_s <= times[-1])
     drift = None
     if DRIFT not in fitted.held:
-        shared = _over_shares(fitted, goodness.noise_rms, goodness.enlarged)
+        shared = _shared_of(fitted, goodness)
         sd = math.sqrt(shared.covariance[DRIFT, DRIFT])
         drift = Estimate(float(fitted.value[DRIFT]), sd, f"{samples.unit}/s")
     said = [*fitted.start.warnings]
@@ -976,7 +990,7 @@ def _numbers(
 ) -> tuple[FloatArray, FloatArray, list[tuple[float, float]]]:
     """The seven parameters, their covariance, and the intervals of a, b, c."""
     value, held = fitted.value, fitted.held
-    shared = _over_shares(fitted, goodness.noise_rms, goodness.enlarged)
+    shared = _shared_of(fitted, goodness)
     own, gradient = shared.covariance, shared.gradient
     normal = covariance(own, held)
     (amplitude, phase), jacobian = _first_turning_point(fitted, start_s)

@@ -12,7 +12,8 @@ import numpy as np
 
 from pendpipe.analysis.fit.goodness import normal_tail
 from pendpipe.analysis.turning_points import TurningPoints
-from pendpipe.dynamics import Eq8, Release, turning_points
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Eq8, Release, turning_points, turning_points_with_jacobian
 from pendpipe.quantities import compact, with_error
 
 Light = Literal["green", "amber", "red"]
@@ -177,31 +178,53 @@ def seen_loss(points: TurningPoints) -> tuple[float, float, float, float]:
 
 def loss_of(law: Eq8, amplitude: float) -> float:
     """Relative loss of a law, 1/s, averaged over the cycle in whose middle y is `amplitude`."""
+    cycle = _cycle(law, amplitude)
+    return sum(_slow_losses(law, amplitude)) if cycle is None else cycle[1]
+
+
+def losses_of(law: Eq8, amplitude: float) -> tuple[float, FloatArray]:
+    """The same, and the parts of it that a, b and c take, shape (3,).
+
+    A part is what the cycle would keep without it, to first order.
+    """
+    cycle, slow = _cycle(law, amplitude), np.array(_slow_losses(law, amplitude))
+    if cycle is None:
+        return float(slow.sum()), slow
+    start, loss = cycle
+    turning, _, by_angle = turning_points_with_jacobian(law, Release(0.0, start), 3)
+    parts = -np.array(law.rates()) * by_angle[2, :4] / float(turning.angle_rad[2])
+    parts = np.array([parts[0], parts[1] + parts[2], parts[3]])
+    total = float(parts.sum())
+    return loss, loss / total * parts if total > 0.0 else slow
+
+
+def _cycle(law: Eq8, amplitude: float) -> tuple[float, float] | None:
+    """Where a cycle with `amplitude` in its middle starts, and its loss; None where none is."""
     start = amplitude
     for _ in range(4):
         try:
             cycle = turning_points(law, Release(0.0, start), count=3)
         except ValueError:
             # Overdamped.
-            return _slow_loss(law, amplitude)
+            return None
         if len(cycle.time_s) < 3 or not abs(cycle.angle_rad[2]) > 0.0:
             # It stops within the cycle.
-            return _slow_loss(law, amplitude)
-        loss = math.log(start / abs(float(cycle.angle_rad[2]))) / float(cycle.time_s[2])
+            return None
+        found = start, math.log(start / abs(float(cycle.angle_rad[2]))) / float(cycle.time_s[2])
         # Friction that does not depend on the speed takes the same from any start: one step.
         missed = amplitude - abs(float(cycle.angle_rad[1]))
         if abs(missed) < _MISSED * amplitude:
             break
         start += missed
         if not start > 0.0:
-            return _slow_loss(law, amplitude)
-    return loss
+            return None
+    return found
 
 
-def _slow_loss(law: Eq8, amplitude: float) -> float:
-    """Eq. 13: a y + b + c/y."""
+def _slow_losses(law: Eq8, amplitude: float) -> tuple[float, float, float]:
+    """Eq. 13: a y, b, c/y."""
     b = law.hysteretic + law.viscous
-    return law.quadratic * amplitude + b + law.coulomb / amplitude
+    return law.quadratic * amplitude, b, law.coulomb / amplitude
 
 
 _OFF: Final = 2.4

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.decrement import loss_of
+from pendpipe.analysis.fit.decrement import losses_of
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.errors import InputError, refuse_if
@@ -162,14 +162,8 @@ def released_quality(result: FitResult) -> Estimate:
 
 def quality_by_law(result: FitResult, amplitude: float) -> Quality:
     """Evaluate the fitted law at one amplitude."""
-    law = result.law
-    parts = {
-        "a": replace(law, hysteretic=0.0, viscous=0.0, coulomb=0.0),
-        "b": replace(law, quadratic=0.0, coulomb=0.0),
-        "c": replace(law, quadratic=0.0, hysteretic=0.0, viscous=0.0),
-    }
-    losses = {name: loss_of(part, amplitude) for name, part in parts.items()}
-    loss, total = loss_of(law, amplitude), sum(losses.values())
+    loss, parts = losses_of(result.law, amplitude)
+    losses, total = dict(zip("abc", parts.tolist(), strict=True)), float(parts.sum())
     period = period_of(result, amplitude)
     covariance = _covariance_of_losses(result, amplitude)
     value = 1.0 / loss if loss > 0.0 else math.inf

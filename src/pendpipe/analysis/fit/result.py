@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -225,7 +226,7 @@ class FitResult:
         """
         return damping_of(self)
 
-    @property
+    @cached_property
     def quality_factors(self) -> tuple[Quality, ...]:
         """Q and the shares of the losses at a large, a middle and a small amplitude."""
         return qualities(self)

@@ -98,6 +98,9 @@ def _narrowed(
     noise: FloatArray,
 ) -> tuple[FloatArray, Measured, Places]:
     """Replace the half cycles that no shape fits by fits of their middle halves."""
+    poor = _even_misfit(samples, places, level, shape, measured, noise)
+    if not poor.any():
+        return shape, measured, places
     bare = shape.copy()
     bare[:, 4:] = 0.0
     known = measured.amplitude
@@ -108,9 +111,7 @@ def _narrowed(
     late = np.nan_to_num(np.clip(late, -0.5, 0.5))
     moved = places._replace(centre_s=places.centre_s + late / places.angular_frequency)
     middle = measure(samples, moved, level, bare, window=_NARROW, free=1, amplitude=known)
-    poor = _even_misfit(samples, places, level, shape, measured, noise) & (middle.readings > 8)
-    if not poor.any():
-        return shape, measured, places
+    poor &= middle.readings > 8
     # What even the middle half does not fit counts as error, not as precision.
     enlarged = np.maximum(_ratio(middle, noise), 1.0)
     information, score = _level_of_peaks(places, middle, enlarged)
