@@ -140,6 +140,23 @@ def test_the_unknown_share_widens_the_frequency() -> None:
         assert frequency.sd / frequency.value == pytest.approx(0.00117 / math.sqrt(2.0), rel=0.1)
 
 
+def test_the_unknown_share_widens_the_time_of_release() -> None:
+    """By where the line begins with either part of b, and b/(4 omega^2) of a half cycle's shape."""
+    b = OMEGA / 20.0
+    points = engine_table(Eq8(OMEGA, 0.0, 0.5 * b, 0.5 * b), 12, 1e-9)
+    known, viscous, hysteretic, either = (
+        fit_period(points, points.amplitude_rad, (0.0, b, 0.0), share=share)
+        for share in (0.5, 0.0, 1.0, None)
+    )
+    ends = [viscous.time_s - known.time_s, hysteretic.time_s - known.time_s]
+    shape = b / (4.0 * OMEGA**2)
+    # An arcsine law's variance is half of the square of its end.
+    added = 0.5 * (max(np.abs(ends)) ** 2 + shape**2)
+    assert shape > 0.2 * max(np.abs(ends))
+    found = either.covariance[1, 1] - known.covariance[1, 1]
+    assert found == pytest.approx(added, rel=0.03)
+
+
 def test_the_level_error_does_not_reach_the_rates() -> None:
     """A level 5 sd off shifts the halves apart; a, b, c stay, and the offset is mended."""
     time = np.arange(309) * (math.pi / OMEGA)

@@ -154,8 +154,8 @@ def tone_scan(data: Data, noise: Noise, basis: FloatArray, decay_s: float, band:
     g22 = power * (1.0 - lines.real)
     g12 = -power * lines.imag
     h11, h22, h12 = g11.copy(), g22.copy(), g12
-    for row in noise.adjoint(basis[:-1]).T:
-        known = np.fft.rfft(row * envelope, n=size)[keep]
+    for row in basis[:-1].T:
+        known = np.fft.rfft(noise.adjoint(row) * envelope, n=size)[keep]
         h11 -= known.real**2
         h22 -= known.imag**2
         h12 += known.real * known.imag
@@ -167,7 +167,9 @@ def tone_scan(data: Data, noise: Noise, basis: FloatArray, decay_s: float, band:
         & (frequency < 0.98 * frequency[-1])
     )
     safe = np.where(seen, determinant, 1.0)
-    inverse = np.stack([h22 / safe, -h12 / safe, h11 / safe], axis=1) * seen[:, None]
+    inverse = np.empty((len(frequency), 3))
+    for entry, own in enumerate((h22, -h12, h11)):
+        inverse[:, entry] = own / safe * seen
     order, fade = frequency / band.own_hz, envelope**2
     wider = float(count * (fade @ fade) / fade.sum() ** 2)
     beyond = _BESIDE * wider / (count * data.interval_s) > band.own_hz
