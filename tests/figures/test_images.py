@@ -21,7 +21,7 @@ from pendpipe.figures.campaign import (
 from pendpipe.figures.decays import draw_decay, draw_fig08, read_decay
 
 looked_at = pytest.mark.mpl_image_compare(
-    style="default", tolerance=2, savefig_kwargs={"dpi": 50}, baseline_dir="baseline"
+    style="default", tolerance=1, savefig_kwargs={"dpi": 50}, baseline_dir="baseline"
 )
 
 
