@@ -79,8 +79,8 @@ def share(hits: list[bool]) -> str:
     return f"{sum(hits)} of {len(hits)}: {wilson(sum(hits), len(hits))}"
 
 
-def table(kept: list[Kept]) -> str:
-    """The scores of a set, a line each."""
+def rows(kept: list[Kept]) -> dict[str, list[bool]]:
+    """What is asked of a set, with the answer for each item of which it is asked."""
     names = catalogue()
     judged = [(each, judge(each, names)) for each in kept]
 
@@ -92,8 +92,7 @@ def table(kept: list[Kept]) -> str:
         each for item, each in judged if item["truth"]["part"] != "null" and not each["outside"]
     ]
     outside = [each for _, each in judged if each["outside"]]
-    cpu_s = [item["cpu_s"] for item, _ in judged]
-    rows = {
+    return {
         "refused": [each["refused"] for _, each in judged],
         "circular error named or in a class, where there is sin x": asked("sine"),
         "detected, one or two hidden in the catalogue": asked("detected"),
@@ -114,8 +113,13 @@ def table(kept: list[Kept]) -> str:
             bool(each["curves"]) or not each["false"] for each in outside
         ],
     }
+
+
+def table(kept: list[Kept]) -> str:
+    """The scores of a set, a line each."""
     lines = ["| what | share, % (95 % interval) |", "|---|---|"]
-    lines += [f"| {what} | {share(hits)} |" for what, hits in rows.items()]
+    lines += [f"| {what} | {share(hits)} |" for what, hits in rows(kept).items()]
+    cpu_s = [item["cpu_s"] for item in kept]
     lines += [f"| CPU s, median and largest | {median(cpu_s):.1f}, {max(cpu_s):.1f} |"]
     return "\n".join(lines)
 
