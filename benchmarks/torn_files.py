@@ -110,7 +110,7 @@ def tried(names: Sequence[str], damage: str, seed: int, before: bytes) -> list[l
     began = time.perf_counter()
     output = snakemake()
     spent = time.perf_counter() - began
-    jobs = re.search(r"^total +(\d+)$", output, flags=re.MULTILINE)
+    jobs = re.search(r"^(\d+) jobs to run$", output, flags=re.MULTILINE)
     wrong = {finding.path for finding in examine(RESULTS) if finding.kind != "set-aside"}
     same = (RESULTS / "campaign.json").read_bytes() == before
     nothing = "Nothing to be done" in snakemake("-n")

@@ -397,6 +397,16 @@ def source_sha256(manifest: Manifest, source: Path) -> str | None:
         return None
 
 
+def changed_ns(path: Path) -> int:
+    """When a file was changed, which nobody can put back; 0 where there is none."""
+    try:
+        status = os.stat(path)  # noqa: PTH116 (a Path takes longer, and files are many)
+    except OSError:
+        return 0
+    # On Windows st_ctime is the time of creation, and st_mtime all there is.
+    return max(status.st_ctime_ns, status.st_mtime_ns)
+
+
 def _written_ns(path: Path) -> int | None:
     """When a manifest was written; None where its time is no measure, since it lies ahead of us.
 

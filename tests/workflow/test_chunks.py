@@ -203,6 +203,20 @@ def test_a_plan_notices_what_a_job_then_makes_again(
     }
 
 
+def test_a_plan_notices_a_torn_manifest_of_a_record(campaign: Campaign) -> None:
+    run(*ORDER)
+    fit, records = STAGES["fit"], chunks_of(campaign)["all"]
+    altered(Path("results/two/manifest/fit.json"))
+    found = plan(campaign, fit, "all", records)
+    (line,) = found.lines
+    assert "two/manifest/fit.json: this manifest is torn or altered" in line
+    (line,) = manifest.set_aside_damaged(Path("results/two"), missing=True)
+    assert "set aside" in line
+    run("fit")
+    after = plan(campaign, fit, "all", records)
+    assert (after.lines, after.repaired) == ((), found.repaired), "and runs it once"
+
+
 def test_what_a_chunk_says_when_it_is_torn_is_made_again(campaign: Campaign) -> None:
     run("acquire")
     acquire, records = STAGES["acquire"], chunks_of(campaign)["all"]

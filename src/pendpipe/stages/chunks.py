@@ -245,6 +245,7 @@ def plan(campaign: Campaign, stage: Stage, chunk: str, records: Iterable[Record]
         torn = manifest.Damage(path, "it is torn or altered", sha256(path)[:8])
         repaired.append(torn.mark)
         lines.append(f"{path}: {torn.problem}; a run makes it again")
+    written = 0 if made is None else manifest.changed_ns(path)
     nothing = manifest.Manifest(Path(), stage.name)
     for record in records:
         # (As text: a Path takes longer, and records are many.)
@@ -255,6 +256,8 @@ def plan(campaign: Campaign, stage: Stage, chunk: str, records: Iterable[Record]
             continue
         if content is not None:
             one = manifest.of_content(Path(home), stage.name, content)
+            if manifest.changed_ns(one.path) >= written:  # it was altered, or a later job is cut
+                one = manifest.read_manifest(one.home, stage.name)
         else:
             one = manifest.read_manifest(Path(home), stage.name)
         said.append(settings(campaign, stage, record, one))
