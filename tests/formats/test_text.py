@@ -325,3 +325,18 @@ def test_a_zero_before_every_number_is_whole_or_its_own_column(tmp_path: Path) -
         read(path)
     np.testing.assert_allclose(read(path, ReadOptions(decimal=",")).values, size, atol=1e-5)
     np.testing.assert_allclose(read(path, ReadOptions(decimal=".")).values, 1e5 * size, atol=1.0)
+
+
+def test_a_row_torn_among_decimal_commas_is_no_row(tmp_path: Path) -> None:
+    """``20,0`` of ``20,0,3812`` is neither 20 and 0 nor 20.0: left out and counted."""
+    size = 0.25 * np.cos(0.1 * np.arange(800))
+    pressure = 1013.0 + np.random.default_rng(1).random(800)
+    columns = zip(20 * np.arange(800), pressure, size, strict=True)
+    lines = [f"{t},{p:.3f},{x:.4f}".replace(".", ",") for t, p, x in columns]
+    lines[300], lines[500] = "6000,1013,25", "10000,1013"
+    path = tmp_path / "a.txt"
+    path.write_text("ms,pressure,angle\n" + "\n".join(lines) + "\n")
+    recording = read(path)
+    kept = np.delete(np.arange(800), [300, 500])
+    np.testing.assert_allclose(recording.values, size[kept], atol=1e-4)
+    assert any("2 damaged row(s)" in note for note in recording.notes)

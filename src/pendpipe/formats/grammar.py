@@ -100,9 +100,14 @@ class Layout:
             return [line.strip()]
 
     def with_decimals(self, pieces: list[str]) -> list[str]:
-        """Put together the numbers that their own decimal commas have parted."""
-        if not self.joined or len(pieces) != sum(self.joined):
+        """Put together the numbers that their own decimal commas have parted.
+
+        A row of numbers with fewer pieces, or more, is damaged: it becomes one cell that is none.
+        """
+        if not self.joined:
             return pieces
+        if len(pieces) != sum(self.joined):
+            return [",".join(pieces)] if _NUMBER.fullmatch(pieces[0]) else pieces
         rest = iter(pieces)
         return [".".join(next(rest) for _ in range(many)) for many in self.joined]
 
@@ -385,10 +390,14 @@ def _evenness(numbers: Sequence[FloatArray]) -> int:
 
 
 def _roughness(numbers: Sequence[FloatArray]) -> float:
-    """Sum the logarithms of how rough the columns are: what is torn from a number is noise."""
+    """Sum the logarithms of how rough the columns are: what is torn from a number is noise.
+
+    A column that never changes tells nothing.
+    """
     turns = [float(np.percentile(np.abs(np.diff(values, 2)), 90)) for values in numbers]
-    spans = [float(np.ptp(values)) or 1.0 for values in numbers]
-    return float(np.sum(np.log(np.array(turns) / np.array(spans) + 1e-6)))
+    spans = [float(np.ptp(values)) for values in numbers]
+    rough = [turn / span if span else 1.0 for turn, span in zip(turns, spans, strict=True)]
+    return float(np.sum(np.log(np.array(rough) + 1e-6)))
 
 
 def named(way: Sequence[int], row: str, layout: Layout) -> str:

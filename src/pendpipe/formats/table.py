@@ -70,6 +70,9 @@ def swing_of(values: FloatArray) -> Swing:
     # What goes one way only (a clock) turns nowhere, though its roundings do.
     if len(finite) < 8 or np.abs(finite).max() > _ABSURD or not steps.min() < 0.0 < steps.max():
         return Swing()
+    # A torn number that still is one may be a million times as large as the others.
+    low, high = np.percentile(finite, (1, 99))
+    finite = np.clip(finite, 2.0 * low - high, 2.0 * high - low)
     block = -(-len(finite) // _LOOKED_AT)
     some = finite[: len(finite) // block * block].reshape(-1, block).mean(axis=1)
     ramp, rest = np.linspace(-1.0, 1.0, len(some)), some - some.mean()

@@ -424,20 +424,28 @@ def column_of_numbers(cells: Sequence[str], layout: Layout, column: Column) -> C
     column
         ``None`` where half of the filled cells are no numbers.
     """
-    texts = [layout.number_text(cell) for cell in cells]
-    filled, unit = [row for row, cell in enumerate(texts) if not is_blank(cell)], ""
-    parts = [WITH_UNIT.fullmatch(texts[row]) for row in filled[:20]]
-    units = {part[2] if part else "" for part in parts}
-    if len(units) == 1 and "" not in units:
-        unit = units.pop()
-        texts = [cell.removesuffix(unit).rstrip() for cell in texts]
-    values, garbled = np.full(len(texts), np.nan), dict[int, str]()
-    for row in filled:
+    values, garbled, odd, unit = np.full(len(cells), np.nan), dict[int, str](), list[int](), ""
+    comma = layout.decimal == "," and not layout.joined
+    for row, cell in enumerate(cells):
         try:
-            values[row] = float(texts[row].lower().replace("d", "e"))
+            values[row] = float(cell.replace(",", ".") if comma and "." not in cell else cell)
         except ValueError:
-            garbled[row] = cells[row]
-    if 2 * len(garbled) >= len(filled) or not np.isfinite(values).any():
+            odd.append(row)
+        else:
+            odd += [row] if comma and "." in cell else []
+    texts = {row: layout.number_text(cells[row]) for row in odd}
+    texts = {row: text for row, text in texts.items() if not is_blank(text)}
+    parts = [WITH_UNIT.fullmatch(text) for text in list(texts.values())[:20]]
+    units = {part[2] if part else "" for part in parts}
+    if len(units) == 1 and len(odd) > 0.9 * len(cells):
+        unit = units.pop()
+    for row, text in texts.items():
+        try:
+            values[row] = float(text.removesuffix(unit).rstrip().lower().replace("d", "e"))
+        except ValueError:
+            values[row], garbled[row] = np.nan, cells[row]
+    filled = len(cells) - len(odd) + len(texts)
+    if 2 * len(garbled) >= filled or not np.isfinite(values).any():
         return None
     return replace(column, values=values, garbled=garbled, unit=column.unit or unit)
 
