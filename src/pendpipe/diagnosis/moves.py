@@ -36,6 +36,7 @@ from pendpipe.diagnosis.hypothesis import (
     Task,
     is_further,
     price,
+    price_of_another,
     settled,
     undrawn,
 )
@@ -46,10 +47,12 @@ from pendpipe.diagnosis.rivals import (
     SIZE_CHARGE,
     Rival,
     Scale,
+    off_harmonics,
     ranked,
     refit_leads,
 )
 from pendpipe.effects import Effect
+from pendpipe.effects.catalogue.in_time import PlaneCoupling
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
 
 
@@ -248,9 +251,11 @@ def _drops(state: Hypothesis) -> Iterator[Proposed]:
 def _curves_for_names(state: Hypothesis) -> Iterator[Proposed]:
     """Put one curve in the place of several names: all, or all but what is sudden or a line.
 
-    Where more than noise is left, the name that gains most stays: a curve competes for the rest.
+    Where more than noise is left, the name that gains most stays: a curve competes for the rest. A
+    line off the harmonics, which no curve makes, stays too.
     """
-    own = list(filter(is_further, state.steps))
+    further = [step for step in state.steps if is_further(step)]
+    own = [step for step in further if not off_harmonics(state.fit, step.winner.lead.effect)]
     if own and not Scale.of(state.fit, state.data, state.noise).clean:
         own.remove(max(own, key=lambda step: step.winner.gain))
     effects = [(step, step.winner.lead.effect) for step in own]
@@ -329,8 +334,35 @@ def describe(state: Hypothesis, p_value: float, task: Task) -> Hypothesis:
     needed = not found and p_value < task.level
     if rivals[0].evidence <= CHOICE and not needed:
         return state
+    rivals = prefer_rare(state, rivals, task)
     step = Step(tuple(rivals), p_value, state.fit)
     return replace(state, steps=(*state.steps, step)).settle(rivals[0].fit)
+
+
+def prefer_rare(state: Hypothesis, rivals: Sequence[Rival], task: Task) -> list[Rival]:
+    """Put a rare name before a leading curve, or a tone at a harmonic, if its score is smaller.
+
+    Rare names are not scanned for: they look much like others, which would then be in doubt more
+    often. They are asked where what leads only describes what they would explain.
+    """
+    leader, before = rivals[0], state.fit
+    tone = leader.lead.effect.spectral or isinstance(leader.lead.effect, PlaneCoupling)
+    tone = tone and not off_harmonics(leader.fit, leader.lead.effect)
+    if not (leader.drawn or tone):
+        return list(rivals)
+    fits = _with_each(before, task.rare(state), state)
+    if not fits:
+        return list(rivals)
+    lowest = min((leader.fit, *fits), key=lambda fit: fit.chi2)
+    scale = Scale.of(lowest, state.data, state.noise)
+    others = [
+        each.again(each.fit, before.chi2, scale) for each in rivals if not each.lead.effect.rare
+    ]
+    named = ranked([_rival(before, fit, scale) for fit in fits])
+    added = price_of_another(sum(map(is_further, state.steps))) if leader.drawn else 0.0
+    if named[0].evidence - added <= others[0].evidence:
+        return list(rivals)
+    return [named[0], *others, *named[1:]]
 
 
 def _rival(bare: Fit, fit: Fit, scale: Scale) -> Rival:

@@ -27,6 +27,7 @@ from pendpipe.diagnosis.moves import (
     describe,
     improve,
     prefer_parameters,
+    prefer_rare,
     reconsider_red_noise,
 )
 from pendpipe.diagnosis.refine import Fit, best_fit, fitted_from
@@ -229,12 +230,14 @@ def _add_one(state: Hypothesis, task: Task, *, names_first: bool) -> Hypothesis:
         held=state.held,
         phase_lost=loses_phase(state.fit),
     )
-    # A rare name is a rival of what it looks like, and never leads.
+    # A rare name is a rival of what it looks like, and leads where `prefer_rare` says so.
     rivals.sort(key=lambda rival: rival.lead.effect.rare)
     if rivals:
         rivals = prefer_parameters(state, rivals)
     if names_first:
         rivals.sort(key=lambda rival: rival.drawn)
+    if rivals:
+        rivals = prefer_rare(state, rivals, task)
     if not rivals:
         return state
     if not gross and (kicked := random_torque(state, rivals[0], task)):
