@@ -60,6 +60,8 @@ class TimeBase:
         self.notes.extend(notes)
 
 
+# Differences of infinite cells, which are refused in the end, are no numbers.
+@np.errstate(invalid="ignore", over="ignore")
 def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     """Find the time of every row.
 
