@@ -51,7 +51,7 @@ def _files(module: str) -> tuple[Path, ...]:
 
 
 _IMPORT: Final = re.compile(r"^ *(?:from (pendpipe[\w.]*) )?import (\([^)]*\)|.*)", re.MULTILINE)
-_BY_NAME: Final = re.compile(r'importlib\.import_module\(\s*(?:f?"([\w.]+)(\{?))?')
+_BY_NAME: Final = re.compile(r'importlib\.import_module[(,]\s*(?:f?"([\w.]+)(\{?))?')
 """With a name known only at run time: each module of that package counts."""
 
 

@@ -187,6 +187,7 @@ def test_fit_json_is_read_as_it_was_written() -> None:
         "period_check",
         "hysteretic_share",
         "clock_ppm",
+        "scale_percent",
         "widening",
         "damping",
         "quality_factor_limit",

@@ -54,10 +54,13 @@ INSTRUMENT = re.compile(r"--port|--anew")
 def test_the_commands_of_the_pages_run(page: Path, tmp_path: Path) -> None:
     """Those that need an instrument have options that there are; CI does what the set-up says."""
     blocks = re.findall(r"```sh\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
-    shutil.copytree(README.parent / "examples", tmp_path / "examples")
+    for folder in ("examples", "data"):
+        shutil.copytree(README.parent / "examples", tmp_path / folder)
     shutil.copy(tmp_path / "examples/string-pendulum.csv", tmp_path / "swing.csv")
     angles = "\n".join(f"{0.4 * step:g},{0.1 * step:g}" for step in range(-4, 5))
     (tmp_path / "caliper.csv").write_text(f"volts,angle_rad\n{angles}\n", encoding="utf-8")
+    heights = "\n".join(f"{1.42 * cycle:g},{20 - 0.8 * cycle:g}" for cycle in range(15))
+    (tmp_path / "ruler.csv").write_text(f"time (s),amplitude (cm)\n{heights}\n", encoding="utf-8")
     tools = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     for block in blocks:
         lines = [line for line in block.splitlines() if line.strip() and not SET_UP.search(line)]
