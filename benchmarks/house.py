@@ -194,7 +194,7 @@ def measure(tree: Path) -> tuple[dict[str, dict[str, Any]], list[str]]:
             "files with exactly one importer": len(alone),
             "definitions nobody uses": sum(tree / n.partition(":")[0] in paths for n in dead),
             "lines that stand twice": duplicates(paths),
-            "floors of the diagnosis": floors({p: trees[p] for p in paths}),
+            "floors of the diagnosis": floors({p: trees[p] for p in paths if p in packages}),
             "`# fmt: skip`": sum(text.count("# fmt: " + "skip") for text in texts),
         }
     return table, dead

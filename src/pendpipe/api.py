@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from pendpipe.acquisition.devices.simulated import Signal
     from pendpipe.analysis.fit.result import Baseline, FitResult, Method
     from pendpipe.analysis.free_decay import FreeDecay
-    from pendpipe.analysis.torque import Restoring
     from pendpipe.analysis.turning_points import TurningPoints
     from pendpipe.diagnosis.result import Diagnosis
+    from pendpipe.dynamics.eq8 import Restoring
     from pendpipe.estimate import Estimate
     from pendpipe.formats import Inspection
 

@@ -12,7 +12,6 @@ from unittest.mock import patch
 import numpy as np
 
 from pendpipe.analysis.fit.result import FitResult
-from pendpipe.analysis.torque import Restoring
 from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import silent
@@ -25,6 +24,7 @@ from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.run import _fit_of, diagnose_recording
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.any_law import Motion
+from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.effect import Parameter, Pendulum

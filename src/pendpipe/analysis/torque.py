@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple, get_args
 
 import numpy as np
 
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.eq8 import Restoring
 
-Restoring = Literal["linear", "sine"]
-TORQUES: Final[tuple[Restoring, ...]] = ("linear", "sine")
+TORQUES: Final[tuple[Restoring, ...]] = get_args(Restoring)
 TOP: Final = 3.13
 """Amplitude in rad beyond which a half swing says nothing of the frequency."""
 

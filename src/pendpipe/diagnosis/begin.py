@@ -10,7 +10,7 @@ import numpy as np
 from pendpipe.analysis.fit.by_points import as_angles, held_values
 from pendpipe.analysis.fit.by_waveform import start_values, usable_span
 from pendpipe.analysis.fit.result import Baseline, FitResult
-from pendpipe.analysis.torque import Restoring, restoring_of
+from pendpipe.analysis.torque import restoring_of
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.analysis.two_modes import two_modes
@@ -19,6 +19,7 @@ from pendpipe.diagnosis.data import Data, gather
 from pendpipe.diagnosis.unwrapped import anchored
 from pendpipe.dynamics import Eq8, Release
 from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects.baseline import (
     BASELINE,
     OFFSET,

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from pendpipe.analysis.fit.result import FitResult
-from pendpipe.analysis.torque import Restoring
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.summary import Summary, html_of, summarise
+from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.estimate import Estimate
 
 if TYPE_CHECKING:

@@ -12,7 +12,6 @@ import numpy as np
 
 from pendpipe.analysis.fit.by_points import check_fixed
 from pendpipe.analysis.fit.result import Baseline, FitResult
-from pendpipe.analysis.torque import Restoring
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.arrays import FloatArray
@@ -49,6 +48,7 @@ from pendpipe.diagnosis.weighing import (
     swap_in_likelier,
 )
 from pendpipe.dynamics.any_law import NoMotionError, sample_pieces
+from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.losses import drag_form as drag_form_effect
 from pendpipe.effects.catalogue.restoring import circular_error

@@ -17,10 +17,11 @@ from pendpipe.analysis.fit.by_waveform import (
 )
 from pendpipe.analysis.fit.goodness import LEVEL, Goodness
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, read_fit
-from pendpipe.analysis.torque import Restoring, may_be_sine, restoring_of, told_apart
+from pendpipe.analysis.torque import may_be_sine, restoring_of, told_apart
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.find import turning_points_of
 from pendpipe.analysis.turning_points.measure import Samples, prepare
+from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, pretty_unit, with_error

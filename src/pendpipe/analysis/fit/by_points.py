@@ -23,11 +23,12 @@ from pendpipe.analysis.fit.least_squares import (
 )
 from pendpipe.analysis.fit.period import Period, fit_period
 from pendpipe.analysis.fit.result import Baseline, FitResult, result_of
-from pendpipe.analysis.torque import TOP, Restoring, clear, elliptic, swing_phase
+from pendpipe.analysis.torque import TOP, clear, elliptic, swing_phase
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8
+from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.physics.decay import amplitude, amplitude_and_gradient
 

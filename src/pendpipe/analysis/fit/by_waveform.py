@@ -37,7 +37,7 @@ from pendpipe.analysis.fit.least_squares import (
 )
 from pendpipe.analysis.fit.period import Period
 from pendpipe.analysis.fit.result import Baseline, DragForm, FitResult, result_of
-from pendpipe.analysis.torque import TOP, Restoring, clear, period_excess, swing_phase
+from pendpipe.analysis.torque import TOP, clear, period_excess, swing_phase
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
@@ -48,7 +48,7 @@ from pendpipe.dynamics import (
     sample_with_jacobian,
     turning_points_with_jacobian,
 )
-from pendpipe.dynamics.eq8 import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
+from pendpipe.dynamics.eq8 import OFFSET, OMEGA, SHARE, START, TIME, A, B, C, Restoring
 from pendpipe.dynamics.kernel import kernel
 from pendpipe.estimate import Estimate
 from pendpipe.physics.decay import amplitude, time_at

@@ -8,9 +8,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.torque import Restoring, phases
+from pendpipe.analysis.torque import phases
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.eq8 import Restoring
 
 _LOUD: Final = 2.0
 

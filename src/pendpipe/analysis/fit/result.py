@@ -24,10 +24,10 @@ from pendpipe.analysis.fit.quality import (
     released_quality,
     small_period,
 )
-from pendpipe.analysis.torque import Restoring
 from pendpipe.analysis.turning_points import TurningPoints, write_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release
+from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Estimate, number, quality_of_rate
 from pendpipe.files import read_json, write_json, writing
