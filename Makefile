@@ -45,7 +45,7 @@ integrity: .venv/installed
 	$(RUN) python -m benchmarks.hostile
 	$(RUN) python -m benchmarks.fuzz --inputs 100000
 
-# Conceal, solve, open, score, and write results/challenge/SET/proof.md; goes on where it was interrupted.
+# Conceal, solve, open, score, and write results/challenge/SET/scores/proof.md; goes on where it was interrupted.
 # A set is made once: SET=another makes another, with a seed of its own.
 proof: .venv/installed
 	$(RUN) PENDPIPE_CHALLENGE_SET=$(SET) PENDPIPE_CHALLENGE_ITEMS=$(ITEMS) \

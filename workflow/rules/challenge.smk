@@ -13,7 +13,6 @@ CHALLENGE_PAGE = os.environ.get("PENDPIPE_CHALLENGE_PAGE", CHALLENGE["page"])
 # changed option makes Snakemake make or solve a set anew.
 OPEN = f"results/challenge/{CHALLENGE_SET}"
 SEALED = f"results/challenge-sealed/{CHALLENGE_SET}"
-PROOF = f"{OPEN}/scores"
 
 
 rule challenge:

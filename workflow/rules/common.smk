@@ -188,16 +188,6 @@ def option(name, value):
     return "" if value is None else f"--{name} {shlex.quote(str(value))}"
 
 
-# Where a challenge has left its scores; rules/challenge.smk says so.
-PROOF = None
-
-
-def proof_option(wildcards):
-    """For the report: a scored challenge, if there is one; it depends on none."""
-    scored = PROOF is not None and Path(PROOF, "scores.json").exists()
-    return option("proof", PROOF if scored else None)
-
-
 def wanted():
     """The targets of `all`. Of some records alone: their own results."""
     if not WHOLE:

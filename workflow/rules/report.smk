@@ -22,9 +22,8 @@ rule report:
     params:
         repaired=repaired("", "report"),
         code=code_version("pendpipe.commands.report"),
-        proof=proof_option,
     message:
         "the page about the campaign"
     shell:
         "pendpipe report --campaign {resources.configuration:q} --comparison {input.comparison:q}"
-        " --summary {input.campaign:q} {params.proof} --out {output:q} 2> {log:q}"
+        " --summary {input.campaign:q} --out {output:q} 2> {log:q}"

@@ -25,11 +25,6 @@ ARGUMENTS: Final = {
         "metavar": "FOLDER",
         "help": "where figures 3 to 10 are; the folder figures beside the page by default",
     },
-    "--proof": {
-        "type": Path,
-        "metavar": "FOLDER",
-        "help": "scores of a challenge, if there is one, from pendpipe challenge score",
-    },
     "--out": {
         "type": Path,
         "metavar": "PAGE.html",
@@ -65,7 +60,6 @@ def run(arguments: Arguments) -> None:
             read_content(summary, "run pendpipe compare first"),
             folder,
             figures,
-            arguments.proof,
             home=out,
             own_page=own_page,
         )

@@ -146,37 +146,6 @@ OF_A_RECORDING: Final = {
 }
 """Words for the figures of one recording's page."""
 
-PROOF_CAPTIONS: Final = {
-    "power": Caption(
-        "Power",
-        "Share of the hidden single effects that were detected at the 1 % level, against the"
-        " effect's size, beside the oracle's.",
-        "Bars are 95 % intervals. The closer the blue curve to the oracle's, the less is lost; to"
-        " its left nobody could detect more without more false alarms.",
-    ),
-    "confusion": Caption(
-        "What was hidden, and what was named",
-        "Of each hidden effect that was detected, the share of every first name.",
-        "The dark diagonal is right. Off it stand effects that one recording can hardly tell"
-        " apart, and mistakes.",
-    ),
-    "reliability": Caption(
-        "Reliability",
-        "How often the first name was right, against the probability that the answer stated.",
-        "On the grey line probabilities come true as stated; below it answers are overconfident.",
-    ),
-    "abstention": Caption(
-        "Keeping silent",
-        "How many first names are right if those below a probability are withheld, and how many"
-        " are then given at all.",
-        "Where the blue curve rises to the right, the probabilities are worth something: doubt"
-        " goes with mistakes. It should stay above the grey line; below it the answers are"
-        " overconfident.",
-    ),
-}
-"""Words for the figures of a scored challenge."""
-
-
 EQUATIONS: Final = (
     (
         "Eq. 8",

@@ -29,7 +29,6 @@ from pendpipe.report.captions import (
     EQUATIONS,
     GLOSSARY,
     OF_A_RECORDING,
-    PROOF_CAPTIONS,
     Caption,
 )
 from pendpipe.report.tables import (
@@ -143,7 +142,6 @@ def render(
     summary: Content,
     folder: Path,
     figures: Path,
-    challenge: Path | None = None,
     *,
     home: Path | None = None,
     own_page: Callable[[str, str], None] | None = None,
@@ -158,8 +156,6 @@ def render(
         The campaign's results, with a folder for each record.
     figures
         Where figures 3 to 10 are.
-    challenge
-        Scores of a challenge, if there is one.
     home
         The page's file: it links to the results that lie beside or below it.
     own_page
@@ -186,7 +182,6 @@ def render(
     title = comparison.get("title") or "A campaign of free decays"
     below = home is not None and folder.absolute().is_relative_to(home.absolute().parent)
     links = Links(folder, home.absolute().parent if home is not None and below else None)
-    proven = proof(challenge, room)
     shared = {
         "captions": CAPTIONS,
         "compact": compact,
@@ -216,7 +211,6 @@ def render(
         many=len(lines) > MANY,
         together=read_json(folder / TOGETHER) if (folder / TOGETHER).is_file() else None,
         asked=asked,
-        proof=proven,
         records=lines,
         files=links.present(_OF_THE_CAMPAIGN),
         counts=Counter(line["health"][:3] for line in lines),
@@ -383,55 +377,6 @@ def _diagnosis(place: Path) -> dict[str, Any] | None:
         "light": VERDICTS[content["verdict"]],
         "summary": read_summary(content["summary"], unit),
         "content": content,
-    }
-
-
-KEPT: Final = {
-    True: Health("kept", "✔", "good", "what was promised came out"),
-    False: Health("not kept", "▲", "look", "less came out than was promised"),
-    None: Health("not judged", "○", "none", "too few items to judge"),
-}
-"""How each promise is shown."""
-
-
-def proof(folder: Path | None, room: Room) -> dict[str, Any] | None:
-    """Read a set's scores and figures; None where there is no scored set.
-
-    Parameters
-    ----------
-    folder
-        Where ``pendpipe challenge score`` has put ``scores.json`` and ``figures/``.
-    room
-        What the page has left for figures.
-    """
-    if folder is None or not (folder / "scores.json").is_file():
-        return None
-    scores = read_json(folder / "scores.json")
-    promises = [(row["promise"], row["measured"], KEPT[row["kept"]]) for row in scores["promises"]]
-
-    def drawn(name: str, title: str, shows: str) -> Markup | None:
-        return room.drawing(folder / "figures" / f"{name}.svg", f"proof-{name}", title, shows)
-
-    figures = [
-        {"svg": svg, "caption": caption}
-        for name, caption in PROOF_CAPTIONS.items()
-        if (svg := drawn(name, caption.title, caption.shows)) is not None
-    ]
-    words = CAPTIONS["residual_map"]
-    return {
-        "scores": scores,
-        "promises": promises,
-        "figures": figures,
-        "cases": [
-            drawn(
-                str(row["figure"]).removesuffix(".svg"),
-                f"{words.title}: {row['item']}",
-                words.shows,
-            )
-            if row.get("figure") and row["same_answer"]
-            else None
-            for row in scores["six_cases"]
-        ],
     }
 
 
