@@ -68,7 +68,7 @@ def test_the_package_itself_can_be_run() -> None:
 def test_bash_completes_commands_and_their_options() -> None:
     complete = (
         f'source <("{sys.executable}" -m pendpipe completion bash);'
-        " COMP_WORDS=({{}}); COMP_CWORD={{}};"
+        " COMP_WORDS=({}); COMP_CWORD={};"
         ' _shtab_pendpipe; echo "${{COMPREPLY[@]}}"'
     )
     for words, position, expected in (
