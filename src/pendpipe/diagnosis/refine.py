@@ -27,8 +27,8 @@ _PRECISE: Final = 1e-11
 """Singular value over the largest from which a direction is seen."""
 _RADIUS_MET: Final = 0.01
 """Relative precision of the damping that gives a step its length."""
-_SHARE_SD: Final = 0.3
-"""Prior about 0.5: one recording hardly constrains the hysteretic share of b."""
+_SHARE_SD: Final = 8.0**-0.5
+"""Prior of the hysteretic share of b about 0.5: of the fit's, flat in the roots of both parts."""
 
 
 @dataclass(frozen=True)
