@@ -315,7 +315,7 @@ def sizes_of(values: FloatArray) -> FloatArray:
     """Give the amplitudes in a list of them, or of turning points about any level, shape (n,)."""
     steps = np.diff(values[np.isfinite(values)])
     level = 0.0
-    if len(steps) > 3 and np.mean(steps[1:] * steps[:-1] < 0.0) >= 0.9:
+    if len(steps) > 3 and np.mean(np.sign(steps[1:]) * np.sign(steps[:-1]) < 0.0) >= 0.9:
         # They lie on its two sides in turn.
         level = float(np.nanmedian(0.25 * (values[:-2] + 2.0 * values[1:-1] + values[2:])))
     return np.asarray(np.abs(values - level))
@@ -346,6 +346,7 @@ def only_falls(values: FloatArray) -> bool:
     sizes = sizes_of(values[np.isfinite(values)])
     if len(sizes) < 4 or not sizes[-1] < 0.8 * sizes[0]:
         return False
+    sizes = sizes / sizes.max()
     # A long rest behind a decay tells nothing of it, and a wild reading makes no range.
     largest = float(np.percentile(sizes, 98))
     moving = sizes[: int(np.flatnonzero(sizes > _REST * largest)[-1]) + 1]
