@@ -138,6 +138,10 @@ if "SLURM_JOB_ID" in os.environ and "stage" in sys.orig_argv:
 """
 
 
+@pytest.mark.skipif(
+    "PENDPIPE_SLURM_RECORDS" not in os.environ,
+    reason="Slurm ends a job after a minute at the soonest: with PENDPIPE_SLURM_RECORDS=100 alone",
+)
 def test_a_job_that_slurm_ends_is_tried_once_more_with_twice_as_much(
     cluster: None, tmp_path: Path
 ) -> None:
