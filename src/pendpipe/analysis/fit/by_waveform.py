@@ -837,7 +837,7 @@ class _Losses:
         y = abs(float(value[START]))
         loss = float(value[A]) * y + float(value[B]) + float(value[C]) / y
         # No loss is more than the whole.
-        whole = np.array([y, 1.0, 1.0 / y]) ** 2 / max(loss, 1e-300) ** 2
+        whole = np.array([y, 1.0, 1.0 / y]) ** 2 / max(loss**2, 1e-200)
         both = np.outer(self.free, self.free)
         spread = np.linalg.inv((normal + np.diag(whole)) * both + np.diag(1.0 - self.free)) * both
         left = gradient - np.einsum("kpq,kq->kp", normal, step)
