@@ -149,7 +149,7 @@ def test_refused_records_stand_with_their_line_and_without_folders(example: Any)
     text = rendered(example, content)
     assert "run.csv, line 7: &#39;x&#39; is no number; mend the row" in text
     assert "someone" not in text
-    assert re.search(r'class="light none"><span aria-hidden="true">○</span> not run', text)
+    assert re.search(r'class="light none"><span aria-hidden="true">○</span> refused', text)
     Outline(text)
 
 
@@ -284,6 +284,7 @@ def diagnosed(name: str) -> dict[str, Any]:
     summary = {
         **dict.fromkeys(("where", "certainty", "candidates", "decide_by", "quote", "sentence"), ""),
         "headline": f"missing: circular error in {name}",
+        "candidates": "cubic torque (25 %)",
         "missing": ["circular error"],
         "matters": "the fit misses the readings by 2.36 mrad",
         "consequence": [change],
@@ -312,7 +313,7 @@ def test_a_diagnosis_is_told_before_and_after_on_the_page(example: Any, tmp_path
     page = render({}, example.content, {}, tmp_path, tmp_path)
     Outline(page)
     section = page[page.index('id="diagnosis"') : page.index('id="records"')]
-    assert "circular-error 70 % (or cubic-stiffness 25 %)" in section
+    assert "<td>circular error; candidates: cubic torque (25 %)</td>" in section
     assert "2.36 mrad → 100 µrad" in section
     assert "missing physics" in section
     assert "not analysable" in section

@@ -32,7 +32,8 @@ def entry(**changes: Any) -> dict[str, Any]:
     return {
         "record": "r",
         "refused": None,
-        "chi2_per_dof": 1.0,
+        "light": "green",
+        "light_reason": "right",
         "turning_points": 9,
         **dict.fromkeys(names, value),
         **changes,
@@ -42,16 +43,14 @@ def entry(**changes: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({}, "ok"),
-        ({"chi2_per_dof": 113.0}, "look"),
-        ({"chi2_per_dof": 0.1}, "look"),
-        ({"chi2_per_dof": None}, "look"),
-        ({"quality_factor_limit": None}, "look"),
-        ({"b": {"value": None, "sd": None}}, "failed"),
-        ({"refused": "no decay"}, "not run"),
+        ({}, "green"),
+        ({"light": "amber", "light_reason": "don't quote Q"}, "amber"),
+        ({"light": "red", "light_reason": "the law contradicts the decay"}, "red"),
+        ({"b": {"value": None, "sd": None}}, "red"),
+        ({"refused": "no decay"}, "refused"),
     ],
 )
-def test_a_fit_that_was_not_run_is_never_called_ok(changes: dict[str, Any], word: str) -> None:
+def test_the_page_shows_the_light_of_the_fit(changes: dict[str, Any], word: str) -> None:
     found = health(entry(**changes))
     assert found.word == word
     assert (found.symbol, found.colour) == STATES[word]

@@ -242,8 +242,9 @@ def _excel(fits: Sequence[Fitted]) -> bytes:
     return out.getvalue()
 
 
-def _cells(fits: Sequence[Fitted]) -> list[tuple[str, ...]]:
-    return [_row(each, wide=True) for each in fits]
+def cells_of(fits: Sequence[Fitted], *, wide: bool = True) -> list[tuple[str, ...]]:
+    """The cells of each row under `HEAD` (with `WIDE` before the remark)."""
+    return [_row(each, wide=wide) for each in fits]
 
 
 def class_page(fits: Sequence[Fitted], links: Sequence[str | None] | None = None) -> str:
@@ -253,7 +254,7 @@ def class_page(fits: Sequence[Fitted], links: Sequence[str | None] | None = None
     from pendpipe.report.page import own_files
     from pendpipe.templates import render
 
-    rows = [(Path(cells[0]).name, *cells[1:]) for cells in _cells(fits)]
+    rows = [(Path(cells[0]).name, *cells[1:]) for cells in cells_of(fits)]
     return render(
         "pendpipe.report",
         "class.html",
@@ -296,7 +297,7 @@ def latex(text: str) -> str:
 
 def _latex(fits: Sequence[Fitted]) -> str:
     head = (*HEAD[:5], *WIDE)
-    rows = [(*cells[:5], *cells[6:9]) for cells in _cells(fits)]
+    rows = [(*cells[:5], *cells[6:9]) for cells in cells_of(fits)]
     lines = [" & ".join(map(latex, cells)) + r" \\" for cells in rows]
     return "\n".join(
         [

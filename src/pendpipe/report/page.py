@@ -10,7 +10,7 @@ import math
 import os
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape, unescape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -32,7 +32,6 @@ from pendpipe.report.captions import (
     Caption,
 )
 from pendpipe.report.tables import (
-    CHI2_RANGE,
     STATES,
     Health,
     findings,
@@ -214,10 +213,10 @@ def render(
         records=lines,
         files=links.present(_OF_THE_CAMPAIGN),
         counts=Counter(line["health"][:3] for line in lines),
-        chi2_range=CHI2_RANGE,
         states=STATES,
         comparison=comparison,
         fitted=used(comparison),
+        **({"fits": ()} if has_theory else _fits(folder, lines)),
         equations=EQUATIONS,
         glossary=GLOSSARY,
         error=error,
@@ -228,6 +227,26 @@ def render(
         warned=grouped_warnings(entries),
         **shared,
     )
+
+
+def _fits(folder: Path, lines: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Of recordings without a theory, the table that `fit` prints: period, Q and losses."""
+    from pendpipe.analysis.fit.result import FitResult
+    from pendpipe.report.class_table import HEAD, Fitted, cells_of, together
+
+    found = []
+    for line in lines:
+        path = folder / line["name"] / "fit.json"
+        fit = (
+            FitResult.from_json(read_json(path)) if not line["refused"] and path.is_file() else None
+        )
+        found.append(Fitted(line["name"], fit, without_folders(str(line["refused"] or ""))))
+    links = [line["link"] for line in lines]
+    return {
+        "fits_head": ("record", *HEAD[1:]),
+        "fits": list(zip(cells_of(found, wide=False), links, strict=True)),
+        "fits_together": [str(each) for each in together(found)],
+    }
 
 
 class Links(NamedTuple):
@@ -259,7 +278,7 @@ def _draw_records(folder: Path, lines: list[dict[str, Any]], room: Room, links: 
     """Give the records their drawings while there is room, those that need a look first."""
     for line in lines:
         found = line["diagnosis"] and line["diagnosis"]["content"]["effects"]
-        line["marked"] = bool(line["refused"] or line["health"].word == "failed" or found)
+        line["marked"] = bool(line["refused"] or line["health"].word == "red" or found)
         line |= dict.fromkeys(("waveform", "quality", "map", "decay", "page"))
         line |= {"drawn": False, "zoom": False, "files": []}
     first = sorted(lines, key=lambda line: not line["marked"])
