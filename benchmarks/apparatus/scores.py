@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import re
+import subprocess
+import sys
 from collections.abc import Mapping
 from statistics import median
 from typing import Any, Final
 
-from benchmarks.null_families import ROOT, wilson
+from benchmarks.null_families import wilson
 
 LIKELY: Final = 0.5
 """A probability from which a name is meant."""
@@ -17,9 +18,10 @@ Kept = Mapping[str, Any]
 
 
 def catalogue() -> frozenset[str]:
-    """Names that the library knows, by its page, and can know from a file of angles."""
-    page = (ROOT / "docs/effects.md").read_text(encoding="utf-8")
-    return frozenset(re.findall(r"^### ([\w-]+)$", page, re.MULTILINE)) - {"tracking-noise"}
+    """Names that the library knows, as it prints them, and can know from a file of angles."""
+    command = [sys.executable, "-m", "pendpipe", "effects", "--list"]
+    listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    return frozenset(line.split()[0] for line in listed.splitlines()) - {"tracking-noise"}
 
 
 def judge(kept: Kept, names: frozenset[str]) -> dict[str, Any]:

@@ -4,7 +4,7 @@
 begins with a copy of `examples/`, and shows each with what it prints (`:silent:` leaves standard
 error out); `run-python` does the same with a block of Python, and `made` shows a picture that one
 of them has written. A command that fails is an error of the build. `command-help` and
-`configuration` print the parser's and the schema's own words.
+`configuration` print the parser's and the schema's own words, `catalogue` the effects' own.
 """
 
 from __future__ import annotations
@@ -146,6 +146,16 @@ class Configuration(SphinxDirective):
         return self.parse_text_to_nodes(manual())
 
 
+class Catalogue(SphinxDirective):
+    """Every effect, from its own declaration."""
+
+    def run(self) -> list[nodes.Node]:
+        """Parse the catalogue's manual as Markdown."""
+        from pendpipe.commands.effects import manual
+
+        return self.parse_text_to_nodes(manual().partition("\n")[2])
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Add the directives."""
     for name, directive in {
@@ -154,6 +164,7 @@ def setup(app: Any) -> dict[str, bool]:
         "made": Picture,
         "command-help": CommandHelp,
         "configuration": Configuration,
+        "catalogue": Catalogue,
     }.items():
         app.add_directive(name, directive)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import csv
-import re
 from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.apparatus.scores import catalogue
 
 from benchmarks import known_physics as known
 
@@ -73,8 +73,7 @@ def test_every_item_of_the_table_can_be_judged() -> None:
     words = {"quality", "period", "from", "until", "says", "gap", *known.TESTS}
     new = {"count-slips", "clock-slips", "rolling-shutter", "camera-geometry", "tracking-noise"}
     new |= {"amplitude-linear-stiffness", "keulegan-carpenter-drag"}
-    page = (known.ROOT / "docs/effects.md").read_text(encoding="utf-8")
-    new |= set(re.findall(r"^### ([\w-]+)$", page, re.MULTILINE))
+    new |= catalogue()
     new |= {"unnamed-restoring", "unnamed-measurement", "unnamed-drive", "unnamed-damping"}
     for row in rows:
         listed = known.items(row["known"]) + known.items(row["by_hand"])

@@ -1,4 +1,4 @@
-"""Print the catalogue of effects that may have been left out, as docs/effects.md has it.
+"""Print the catalogue of effects that may have been left out.
 
 With --list, one line an effect: identifier, kind, name.
 """
@@ -26,7 +26,7 @@ def run(arguments: Arguments) -> None:
         {"id": each.identifier, "name": each.name, "kind": each.kind, "equation": each.equation}
         for each in CATALOGUE
     ]
-    listed = "\n".join(f"{each.identifier:<22}{each.kind:<13}{each.name}" for each in CATALOGUE)
+    listed = "\n".join(f"{each.identifier:<27} {each.kind:<12} {each.name}" for each in CATALOGUE)
     print_answer(
         arguments,
         {"schema_version": 1, "effects": entries},
@@ -35,7 +35,7 @@ def run(arguments: Arguments) -> None:
 
 
 def manual() -> str:
-    """Return docs/effects.md, made from the effects' own declarations."""
+    """Return the catalogue as Markdown, made from the effects' own declarations."""
     return render(
         "pendpipe.effects",
         "manual.md",
