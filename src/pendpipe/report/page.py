@@ -245,7 +245,7 @@ def _fits(folder: Path, lines: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {
         "fits_head": ("record", *HEAD[1:]),
         "fits": list(zip(cells_of(found, wide=False), links, strict=True)),
-        "fits_together": [str(each) for each in together(found)],
+        "alike": [str(each) for each in together(found)],
     }
 
 
@@ -399,10 +399,6 @@ def _diagnosis(place: Path) -> dict[str, Any] | None:
     }
 
 
-LIGHTS = {"green": ("good", "✓"), "amber": ("look", "!"), "red": ("bad", "✗")}
-"""Colour class and symbol of a light: colour never carries a meaning alone."""
-
-
 def render_recording(
     name: str,
     recording: Recording,
@@ -449,8 +445,7 @@ def render_recording(
         "recording.html",
         name_of_recording=name,
         style=own_files()["style"],
-        light=(result.light, *LIGHTS[result.light]),
-        reason=result.light_reason,
+        light=Health(result.light, *STATES[result.light], result.light_reason),
         heading=heading(result, name).partition(": ")[2],
         advice=sentence(result),
         facts=list(facts(result)),

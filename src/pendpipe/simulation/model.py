@@ -139,7 +139,9 @@ class Given(NamedTuple):
 def _read(place: str, table: dict[str, Any]) -> Given:
     identifier = table.pop("id", None)
     if not isinstance(identifier, str):
-        raise InputError(place, "its id is missing", 'add id = "...", a name of docs/effects.md')
+        raise InputError(
+            place, "its id is missing", 'add id = "...", a name that pendpipe effects --list prints'
+        )
     effect = by_identifier(identifier, place)
     place = f"{place} ({identifier})"
     known = [parameter.name for parameter in effect.parameters]

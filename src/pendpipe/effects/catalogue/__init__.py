@@ -65,7 +65,9 @@ def by_identifier(name: str, place: str | Path = "effect") -> Effect:
     found = _BY_IDENTIFIER.get(name)
     if found is None:
         close = difflib.get_close_matches(name, _BY_IDENTIFIER, n=1, cutoff=0.5)
-        nearest = f"did you mean '{close[0]}'?" if close else "see docs/effects.md for all names"
+        nearest = (
+            f"did you mean '{close[0]}'?" if close else "pendpipe effects --list prints all names"
+        )
         raise InputError(place, f"there is no effect '{name}'", nearest)
     return found
 
