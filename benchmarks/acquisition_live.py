@@ -19,7 +19,6 @@ from typing import Final
 import numpy as np
 
 from pendpipe.acquisition.decode import decode_recording
-from pendpipe.acquisition.drivers import find_driver
 from pendpipe.acquisition.raw import read_raw
 from pendpipe.acquisition.recorder import acquire_simulated
 from pendpipe.arrays import FloatArray
@@ -247,8 +246,7 @@ def flip(whole: bytes, bit: int) -> Flip:
     raw_before, raw_after = read_raw(whole), read_raw(bytes(damaged))
     good = after.usable if after.quality is None else after.usable & (after.quality == GOOD)
     # Times count from the first scan that is there: the first frame of all may be lost.
-    size = find_driver(raw_after.header["model"]).decoder(1).bytes_per_scan
-    first = sum(-(-h.bytes_missing // size) for h in raw_after.holes if not h.at_byte)
+    first = sum(-(-h.bytes_missing // 2) for h in raw_after.holes if not h.at_byte)
     rate_hz = 1.0 / before.interval_s
     index = np.rint(after.time_s[good] * rate_hz).astype(np.int64) + first
     inside = index < len(before)

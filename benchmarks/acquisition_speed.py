@@ -21,7 +21,6 @@ from pendpipe.acquisition.recorder import acquire_simulated
 from pendpipe.formats import ReadOptions, text, windaq
 
 SAMPLES = 1 << 19
-PIECE = 65536
 SUSTAINED_S = 20.0
 ASKED = {"binary": 20e6, "ASCII": 2e6}
 
@@ -59,17 +58,10 @@ def _codes(bits: int, channels: int) -> np.ndarray[tuple[int, int], np.dtype[np.
 
 
 def _binary(model: str, channels: int) -> float:
-    """A stream in pieces of 64 kB."""
+    """A stream as a whole."""
     driver = find_driver(model)
     data = DEVICES[model]().encode(_codes(driver.bits, channels))
-    pieces = [data[at : at + PIECE] for at in range(0, len(data), PIECE)]
-
-    def work() -> None:
-        decoder = driver.decoder(channels)
-        for piece in pieces:
-            decoder.feed(piece)
-
-    return _best(work, SAMPLES)
+    return _best(lambda: driver.decode(data, channels), SAMPLES)
 
 
 def _captured(channels: int) -> float:

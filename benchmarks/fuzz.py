@@ -48,7 +48,6 @@ from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.devices.simulated import Dialect
 from pendpipe.acquisition.drivers import DRIVERS, find_driver
-from pendpipe.acquisition.drivers.base import SyncBitDecoder
 from pendpipe.acquisition.line import Line
 from pendpipe.errors import InputError
 from pendpipe.formats import inspect, read
@@ -327,34 +326,22 @@ def run_raw(case: Case) -> bool:
 
 
 def run_decoder(case: Case) -> bool:
-    """Decode a stream whole and in pieces: nothing is lost to the books, both give the same."""
-    model, channels, seed = case.detail.split()
-    driver, count, random = find_driver(model), int(channels), Random(int(seed))
-    whole = driver.decoder(count)
-    one, end = whole.feed(case.data), whole.finish()
-    counts = np.concatenate([one.counts, end.counts])
-    losses = [*one.losses, *end.losses]
-    limit = 1 << (driver.bits - 1)
-    if counts.shape[1:] != (count,) or (
-        len(counts) and not -limit <= counts.min() <= counts.max() < limit
+    """Decode a stream: every byte is in a scan, in a loss or waiting."""
+    model, channels, _ = case.detail.split()
+    driver, count = find_driver(model), int(channels)
+    scans = driver.decode(case.data, count)
+    limit, size = 1 << (driver.bits - 1), 2 * count
+    if scans.counts.shape != (len(scans.suspect), count) or (
+        len(scans.counts) and not -limit <= scans.counts.min() <= scans.counts.max() < limit
     ):
-        raise InvalidError(f"counts {counts.shape}")
-    spent = len(counts) * whole.bytes_per_scan + sum(loss.discarded_bytes for loss in losses)
-    if not 0 <= len(case.data) - spent < whole.bytes_per_scan:
+        raise InvalidError(f"counts {scans.counts.shape}")
+    spent = len(scans.counts) * size + sum(loss.discarded_bytes for loss in scans.losses)
+    if not 0 <= len(case.data) - spent < size:
         raise InvalidError(f"{spent} of {len(case.data)} bytes accounted for")
-    places = [loss.after_scan for loss in losses]
-    if places != sorted(places) or any(not 0 <= place <= len(counts) for place in places):
+    places = [loss.after_scan for loss in scans.losses]
+    if places != sorted(places) or any(not 0 <= place <= len(scans.counts) for place in places):
         raise InvalidError(f"losses after scans {places}")
-    cut = driver.decoder(count)
-    pieces, at = [], 0
-    while at < len(case.data):
-        step = random.choice((1, 2, 3, 7, 64))
-        pieces.append(cut.feed(case.data[at : at + step]).counts)
-        at += step
-    pieces.append(cut.finish().counts)
-    if not np.array_equal(np.concatenate(pieces), counts):
-        raise InvalidError("pieces give other scans than the whole")
-    return bool(len(counts))
+    return bool(len(scans.counts))
 
 
 class AnsweringLine(Line):
@@ -403,7 +390,7 @@ def run_answers(case: Case) -> bool:
         driver.identify()
         driver.configure((1, 2), 50.0)
         driver.start()
-        driver.decoder(2).feed(driver.line.receive(0.0))
+        driver.decode(driver.line.receive(0.0), 2)
         driver.stop()
     except InputError as fault:
         _one_line(fault)
@@ -556,7 +543,7 @@ def targets() -> dict[str, Target]:
         "answers of devices": Target(_answers, run_answers, 94_800),
     }
     for model in MODELS:
-        marked = isinstance(find_driver(model).decoder(1), SyncBitDecoder)
+        marked = not find_driver(model).sends_stop_codes
         inputs = 20_000 if marked else 25_000
         found[f"decoder {model}"] = Target(_stream(model), run_decoder, inputs)
     found["XML projects and zips"] = Target(_files(seeds.projects()), run_file, 30_000)

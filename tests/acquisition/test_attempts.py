@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pendpipe.acquisition.decode import accept, choose, new_path, read_attempts, refuse_lost
+from pendpipe.acquisition.attempts import accept, choose, new_path, read_attempts, refuse_lost
 from pendpipe.acquisition.line import LineLostError
 from pendpipe.acquisition.raw import RawWriter, append_event, lock, read_raw
 from pendpipe.errors import InputError

@@ -37,7 +37,7 @@ def test_di154rs_session(script: Any) -> None:
     setup = driver.configure([3, 1], 60.0)
     assert (setup.channels, setup.rate_hz) == ((1, 3), 60.0)
     driver.start()
-    assert driver.decoder(2).feed(driver.line.receive(1.0)).counts.tolist() == [[1234 - 2048, 0]]
+    assert driver.decode(driver.line.receive(1.0), 2).counts.tolist() == [[1234 - 2048, 0]]
     driver.stop()
     assert line.finished
 
@@ -132,7 +132,7 @@ def test_di2108_session(script: Any) -> None:
     assert (identity.model, identity.firmware, identity.serial_number) == ("DI-2108", "141", "5F2A")
     assert driver.configure([1, 7], 100.0).rate_hz == 100.0
     driver.start()
-    assert driver.decoder(2).feed(driver.line.receive(1.0)).counts.tolist() == [[32767, -32768]]
+    assert driver.decode(driver.line.receive(1.0), 2).counts.tolist() == [[32767, -32768]]
     driver.stop()
     assert line.finished
 

@@ -10,8 +10,8 @@ import pytest
 from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.drivers import DRIVERS, find_driver
-from pendpipe.acquisition.drivers.base import Loss, WordDecoder
 from pendpipe.acquisition.drivers.letters import DI245
+from pendpipe.acquisition.drivers.streams import Loss, plain_scans
 from pendpipe.acquisition.drivers.text import DI149, DI155
 from pendpipe.errors import InputError
 
@@ -51,7 +51,7 @@ def test_worked_bytes_decode(
     kind: str, received: str, count: int, high: float, volts: float
 ) -> None:
     driver = find_driver(kind)
-    assert driver.decoder(1).feed(bytes.fromhex(received)).counts.tolist() == [[count]]
+    assert driver.decode(bytes.fromhex(received), 1).counts.tolist() == [[count]]
     assert count * high / 2 ** (driver.bits - 1) == pytest.approx(volts, abs=5e-6)
 
 
@@ -62,7 +62,7 @@ def test_worked_bytes_are_sent(kind: str, sent: str, code: int, high: float, vol
 
 def test_digital_inputs_below_a_left_justified_word_are_no_signal() -> None:
     """On the DI-1100 the two low bits of the first item are digital inputs."""
-    assert WordDecoder(1, 12).feed(bytes.fromhex("F3 7F")).counts.tolist() == [[2047]]
+    assert plain_scans(bytes.fromhex("F3 7F"), 1, 12).counts.tolist() == [[2047]]
 
 
 @pytest.mark.parametrize("kind", sorted(DRIVERS))
@@ -74,11 +74,9 @@ def test_what_the_device_sends_the_driver_reads(kind: str, channels: int) -> Non
     assert device.model == driver.model
     half = 2 ** (driver.bits - 1)
     codes = np.stack([np.roll(np.arange(-half, half), 5 * c) for c in range(channels)], axis=1)
-    decoder = driver.decoder(channels)
-    fed, end = decoder.feed(device.encode(codes)), decoder.finish()
-    assert np.array_equal(np.concatenate([fed.counts, end.counts]), codes)
-    assert not fed.losses
-    assert not end.losses
+    scans = driver.decode(device.encode(codes), channels)
+    assert np.array_equal(scans.counts, codes)
+    assert not scans.losses
 
 
 def test_di149_session(script: Any) -> None:
@@ -97,7 +95,7 @@ def test_di149_session(script: Any) -> None:
     assert driver.identify().serial_number == "12345601"
     assert driver.configure([3, 1], 100.0).rate_hz == 100.0
     driver.start()
-    assert driver.decoder(2).feed(driver.line.receive(1.0)).counts.tolist() == [[12, 1024]]
+    assert driver.decode(driver.line.receive(1.0), 2).counts.tolist() == [[12, 1024]]
     driver.stop()
     assert line.finished
 
@@ -134,7 +132,7 @@ def test_di245_session(script: Any) -> None:
     setup = driver.configure([1, 4], 10.0, range_volts=3.0)
     assert (setup.rate_hz, setup.range_volts) == (10.0, 5.0)
     driver.start()
-    assert driver.decoder(2).feed(driver.line.receive(1.0)).counts.tolist() == [[1, 4096]]
+    assert driver.decode(driver.line.receive(1.0), 2).counts.tolist() == [[1, 4096]]
     driver.stop()
     assert line.finished
 
@@ -201,17 +199,8 @@ def test_what_the_box_cannot_do_is_refused(
         find_driver(kind)(script(), FAST).configure(channels, rate_hz, volts)
 
 
-@pytest.mark.parametrize("cut", range(1, 8))
-def test_a_stop_code_is_recognised_however_it_is_cut(cut: int) -> None:
-    data = bytes.fromhex("01 00 02 00") + b"stop 02\rxx"
-    decoder = WordDecoder(1)
-    fed = [decoder.feed(data[: 4 + cut]), decoder.feed(data[4 + cut :]), decoder.finish()]
-    assert np.concatenate([part.counts for part in fed]).ravel().tolist() == [1, 2]
-    assert fed[-1].losses == (Loss(2, 10, 0, reason="stop 02"),)
-
-
-def test_what_only_begins_like_a_stop_code_is_data() -> None:
-    decoder = WordDecoder(1)
-    fed = [decoder.feed(b"stop"), decoder.feed(b" 0"), decoder.finish()]
-    counts = np.concatenate([part.counts for part in fed]).astype("<i2")
-    assert counts.tobytes() == b"stop 0"
+def test_a_stop_code_ends_the_scans_and_what_only_begins_like_one_is_data() -> None:
+    scans = plain_scans(bytes.fromhex("01 00 02 00") + b"stop 02\rxx", 1)
+    assert scans.counts.ravel().tolist() == [1, 2]
+    assert scans.losses == (Loss(2, 10, 0, reason="stop 02"),)
+    assert plain_scans(b"stop 0", 1).counts.tobytes() == b"stop 0"

@@ -21,10 +21,9 @@ import psutil
 import pytest
 
 from pendpipe.acquisition.decode import decode_recording
-from pendpipe.acquisition.drivers.text import DI2108
 from pendpipe.acquisition.raw import read_raw
 from pendpipe.acquisition.recorder import acquire_simulated, example_signal
-from pendpipe.acquisition.view import Follower, thinned
+from pendpipe.acquisition.view import state, thinned
 from pendpipe.cli import main
 from pendpipe.recording import read_plain
 
@@ -140,31 +139,27 @@ def test_the_page_is_for_this_machine_alone(recorder: Recorder) -> None:
         assert fault.value.code == 404
 
 
-def test_a_growing_file_is_followed_to_the_count(tmp_path: Path) -> None:
-    """Handed over in pieces that end anywhere, it comes to what the whole file holds."""
+def test_a_growing_file_is_shown_as_far_as_it_has_come(tmp_path: Path) -> None:
+    """Wherever it ends: nothing, the half of a frame, all of it."""
     raw, growing = tmp_path / "whole.raw", tmp_path / "growing.raw"
     options = {"channels": (1,), "rate_hz": 110.0, "duration_s": 90.0, "raw_path": raw}
     acquire_simulated("di2108", example_signal(1, 3.85), clock_scale=200.0, **options)
-    counts = DI2108.decoder(1).feed(read_raw(raw).data).counts[:, 0]
-    volts_of = read_raw(raw).header["range_volts"] / 2**15 * counts
-    content, follower = raw.read_bytes(), Follower(growing)
-    assert follower.state() == {"scans": 0}
-    cuts = np.sort(np.random.default_rng(5).integers(0, len(content), 40))
-    for begin, end in zip([0, *cuts], [*cuts, len(content)], strict=True):
-        with growing.open("ab") as stream:
-            stream.write(content[begin:end])
-        follower.read()
-    state = follower.state()
-    assert state["scans"] == len(counts)
-    assert state["reason"] == "scans"
-    assert state["duration_s"] == 90.0
-    time_s, volts = np.array(state["last"]).T
+    recording, content = decode_recording(raw), raw.read_bytes()
+    assert state(growing) == {"scans": 0}
+    growing.write_bytes(content[: len(content) // 2])
+    half = state(growing)
+    assert 0.3 * len(recording) < half["scans"] < 0.7 * len(recording)
+    assert half["reason"] == ""
+    growing.write_bytes(content)
+    whole = state(growing)
+    assert (whole["scans"], whole["lost"]) == (len(recording), 0)
+    assert (whole["reason"], whole["duration_s"]) == ("scans", 90.0)
+    time_s, volts = np.array(whole["last"]).T
     assert time_s[-1] - time_s[0] == pytest.approx(60.0, abs=0.1)
-    recent = volts_of[-6600:]
-    assert (volts.min(), volts.max()) == pytest.approx((recent.min(), recent.max()), abs=1e-9)
-    at, amplitude = np.array(state["amplitude"])[0]
-    first = volts_of[: int(2 * at * 110)]
-    assert amplitude == pytest.approx(0.5 * np.ptp(first), rel=0.02)
+    recent = recording.values[-6600:]
+    assert (volts.min(), volts.max()) == (recent.min(), recent.max())
+    at, amplitude = np.array(whole["amplitude"])[0]
+    assert amplitude == pytest.approx(0.5 * np.ptp(recording.values[: int(2 * at * 110)]), rel=0.02)
 
 
 def test_thinning_keeps_every_extreme() -> None:

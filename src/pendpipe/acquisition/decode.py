@@ -1,23 +1,16 @@
 """Raw bytes to a recording: a step of its own that can be repeated at any time.
 
-The recorder's clock shows the true scan rate, and whole scans that were lost. Bytes arrive late,
-never early: by how much changes with every piece. The pieces that were least late lie on a straight
-line whose slope is the true interval between scans. In a stream without marks lost scans leave no
-trace but one: everything after them arrives late, and stays so. Other delays (a busy host) pass,
-and the pieces that were not held up are as early as before.
-
-Each attempt at a recording keeps its bytes in a raw file of its own, never overwritten: a campaign
-in ``results/<record>/raw/``, the command line beside ``--out``. A recording is always decoded from
-such a file, so it can be made again at any time.
+Where a device marks a loss, the scans that are missing are rows of quality 2. Where it does not,
+nothing is moved: the stretch in which something was lost has quality 1, and it is said. Two things
+show such a loss. Plain words that are cut across are rough where they were smooth
+(`drivers.streams.out_of_step`). And whole scans that are missing make everything after them late by
+the recorder's clock: bytes come late, never early, by how much changes with every piece, and other
+delays (a busy host) pass.
 """
 
 import math
-import re
-import secrets
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 from typing import Final, Literal
@@ -25,55 +18,52 @@ from typing import Final, Literal
 import numpy as np
 
 from pendpipe.acquisition.drivers import find_driver
-from pendpipe.acquisition.drivers.base import Decoder, Driver, Loss, WordDecoder
-from pendpipe.acquisition.line import LineLostError
-from pendpipe.acquisition.raw import (
-    Hole,
-    NothingRecordedError,
-    RawRecording,
-    append_event,
-    is_being_recorded,
-    read_raw,
-)
-from pendpipe.acquisition.slips import Cut, find_slips
+from pendpipe.acquisition.drivers.base import Driver
+from pendpipe.acquisition.drivers.streams import Loss, Scans
+from pendpipe.acquisition.raw import NothingRecordedError, RawRecording, check_description, read_raw
 from pendpipe.arrays import AnyArray, ByteArray, FloatArray, IntArray
-from pendpipe.errors import InputError, refuse_if
-from pendpipe.files import is_stream
+from pendpipe.errors import refuse_if
 from pendpipe.recording import GOOD, MISSING, SUSPECT, Recording
 
-_NUMBERS: Final[Mapping[str, tuple[float, float]]] = {
-    "rate_hz": (1e-6, 1e9),
-    "range_volts": (1e-6, 1e6),
-    "clock_scale": (1e-3, 1e9),
-    "volts_per_radian": (-1e9, 1e9),
-}
-"""What can be true of any instrument."""
-_NEEDED: Final = ("model", "port", "channels", "rate_hz", "recorded_at")
-_TEXTS: Final = ("model", "port", "recorded_at")
-_MOST_CHANNELS: Final = 64
+
+@dataclass(frozen=True)
+class Delay:
+    """A step of the arrivals' lateness that stays.
+
+    Parameters
+    ----------
+    begin, end
+        The arrivals between which it happened, by their index.
+    late_s
+        By how much, in s.
+    """
+
+    begin: int
+    end: int
+    late_s: float
 
 
 @dataclass(frozen=True)
 class Segment:
-    """The scans of one stream.
+    """One stream of a recording, from a start of the device to its end.
 
     Parameters
     ----------
-    counts
-        Shape (scans, channels).
-    losses
-        Those met in it, in order.
-    arrival_s, scans_made
-        By ``arrival_s[i]`` the device had made ``scans_made[i]`` scans since the first
-        good one, shape (n,).
+    scans
+        What the bytes are.
+    arrival_s, made
+        By ``arrival_s[i]`` of the recorder's clock the device had made ``made[i]`` scans since the
+        first good one, shape (n,).
+    delays
+        Where whole scans seem to be missing.
     limit_s
-        Whole scans lost for less than this leave no trace.
+        Scans missing for less than this leave no trace.
     """
 
-    counts: AnyArray
-    losses: tuple[Loss, ...]
+    scans: Scans
     arrival_s: FloatArray
-    scans_made: FloatArray
+    made: FloatArray
+    delays: Sequence[Delay]
     limit_s: float
 
 
@@ -126,10 +116,11 @@ def decode_recording(
     Returns
     -------
     Recording
-        Volts on an even grid of times, the first scan at 0 s. Lost scans are rows of
-        quality 2, one each; a scan next to bytes out of step has quality 1. After a break
-        (unplugged, silent, overflowed) the grid begins anew at the time that the
-        recorder's clock tells, and rows of quality 2 fill the gap.
+        Volts on an even grid of times, the first scan at 0 s. Lost scans that the bytes tell of are
+        rows of quality 2, one each; a scan next to bytes out of step, and a stretch in
+        which something was lost without a mark, have quality 1. After a break (unplugged, silent,
+        overflowed) the grid begins anew at the time that the recorder's clock tells, and rows of
+        quality 2 fill the gap.
 
     Raises
     ------
@@ -138,8 +129,9 @@ def decode_recording(
     """
     raw = source if isinstance(source, RawRecording) else read_raw(source)
     place = str(source) if isinstance(source, str | Path) else str(raw.header.get("port"))
-    _check_description(place, raw)
-    channels: list[int] = list(raw.header["channels"])
+    check_description(place, raw)
+    header = raw.header
+    channels: list[int] = list(header["channels"])
     chosen = channels[0] if channel is None else channel
     refuse_if(
         chosen not in channels,
@@ -147,8 +139,8 @@ def decode_recording(
         f"channel {chosen} was not recorded",
         f"choose from {', '.join(map(str, channels))}",
     )
-    driver = find_driver(raw.header["model"])
-    segments = _wanted(raw, split(raw, driver))
+    driver = find_driver(header["model"])
+    segments = _segments(raw, driver)
     refuse_if(
         not segments,
         place,
@@ -156,190 +148,175 @@ def decode_recording(
         "check the device, and record again",
         NothingRecordedError,
     )
-    longest = max(segments, key=lambda segment: len(segment.arrival_s))
-    time_base = measure_rate(
-        longest.arrival_s,
-        longest.scans_made,
-        float(raw.header["rate_hz"]),
-        float(raw.header.get("clock_scale", 1.0)),
-    )
-    high = float(raw.header.get("range_volts", driver.range_volts))
+    time_base = _time_base(raw, segments)
+    high = float(header.get("range_volts", driver.range_volts))
     step = high / 2 ** (driver.bits - 1)
-    time_s, values, quality = _join(segments, time_base.rate_hz, channels.index(chosen), step)
+    time_s, values, quality = _rows(segments, time_base.rate_hz, channels.index(chosen), step)
+    kept = ("firmware", "serial_number", "clock_scale", "volts_per_radian")
     return Recording(
         time_s=time_s,
         values=values,
         quantity="volts",
         quality=quality if quality.any() else None,
-        metadata=_metadata(raw, chosen, time_base, high, segments),
+        metadata={
+            "source": str(header.get("source") or f"{header['model']} on {header['port']}"),
+            "model": str(header["model"]),
+            "channel": str(chosen),
+            "bits": str(driver.bits),
+            "range_volts": repr(high),
+            "sample_rate_hz": repr(time_base.rate_hz),
+            "sample_rate_nominal_hz": repr(time_base.nominal_hz),
+            "sample_rate_measured_hz": repr(time_base.measured_hz),
+            "sample_rate_measured_sd_hz": repr(time_base.measured_sd_hz),
+            "time_base": time_base.chosen,
+            "unseen_loss_below_s": f"{max(segment.limit_s for segment in segments):.4g}",
+            "recorded_at": str(header["recorded_at"]),
+        }
+        | {key: str(header[key]) for key in kept if header.get(key)},
         resolution=step,
         notes=_notes(raw, segments, time_base, time_s),
     )
 
 
-def _wanted(raw: RawRecording, segments: list[Segment]) -> list[Segment]:
-    """Leave out what arrived beyond the number of scans that was asked for."""
+def _segments(raw: RawRecording, driver: type[Driver]) -> list[Segment]:
+    """Decode each stream of a raw recording; those without a scan are left out."""
+    starts = [int(event["at_byte"]) for event in raw.events if event.get("event") == "restarted"]
+    scale, rate_hz = float(raw.header.get("clock_scale", 1.0)), float(raw.header["rate_hz"])
+    channels = len(raw.header["channels"])
+    found: list[Segment] = []
+    for number, (begin, end) in enumerate(pairwise([0, *starts, len(raw.data)])):
+        holes = [(h.at_byte - begin, h.bytes_missing) for h in raw.holes if h.stream == number]
+        scans = _scans(raw.data[begin:end], holes, driver, channels)
+        inside = (raw.arrived_bytes > begin) & (raw.arrived_bytes <= end)
+        arrival_s = raw.arrival_s[inside]
+        made = _made(raw.arrived_bytes[inside] - begin, scans.losses, 2 * channels)
+        if len(scans.counts):
+            delays, limit_s = find_delays(arrival_s, made, rate_hz, scale)
+            found.append(Segment(scans, arrival_s, made, delays, limit_s))
     kept = raw.event("stopped").get("keep_scans")
-    if kept is None or len(segments) != 1:
-        return segments
-    gone = _lost([loss for loss in segments[0].losses if loss.reason == "damage"])
-    return [replace(segments[0], counts=segments[0].counts[: max(1, int(kept) - gone)])]
+    if kept is not None and len(found) == 1:
+        # What arrived beyond the number of scans that was asked for.
+        scans = found[0].scans
+        gone = sum(loss.lost_scans for loss in scans.losses if loss.reason == "damage")
+        wanted = max(1, int(kept) - gone)
+        scans = replace(scans, counts=scans.counts[:wanted], suspect=scans.suspect[:wanted])
+        found = [replace(found[0], scans=scans)]
+    return found
 
 
-def _check_description(place: str, raw: RawRecording) -> None:
-    """Refuse a raw recording whose description can't be true.
-
-    Raises
-    ------
-    InputError
-        On a missing or impossible entry, or time stamps that fall.
-    """
-    header, channels = raw.header, raw.header.get("channels")
-    kept = raw.event("stopped").get("keep_scans")
-    faults = (
-        *((key not in header, f"{key} is missing") for key in _NEEDED),
-        *((not isinstance(header.get(key), str), f"{key} is no text") for key in _TEXTS),
-        *(
-            # (A comparison with NaN is false; and True is no number.)
-            (not (type(value) in (int, float) and low <= value <= high), f"{key} is {value!r:.40}")
-            for key, (low, high) in _NUMBERS.items()
-            for value in (header.get(key, low),)
-        ),
-        (
-            not isinstance(channels, list)
-            or not 0 < len(channels) <= _MOST_CHANNELS
-            or not all(type(channel) is int and channel > 0 for channel in channels)
-            or len(set(channels)) != len(channels),
-            f"channels are {channels!r:.40}",
-        ),
-        (kept is not None and not (type(kept) is int and kept > 0), f"keep_scans is {kept!r:.40}"),
-        (
-            not np.isfinite(raw.arrival_s).all() or np.any(np.diff(raw.arrival_s) < 0),
-            "time stamps that fall",
-        ),
-    )
-    for wrong, fault in faults:
-        refuse_if(
-            wrong,
-            place,
-            f"the description of the recording is damaged ({fault})",
-            "give another copy",
-        )
+def _scans(
+    data: bytes, holes: Sequence[tuple[int, int]], driver: type[Driver], channels: int
+) -> Scans:
+    """Decode a stream on both sides of every hole in it, from whole scan to whole scan."""
+    size = 2 * channels
+    parts: list[Scans] = []
+    losses: list[Loss] = []
+    begin = scans = 0
+    for at_byte, missing in (*holes, (len(data), 0)):
+        last = at_byte - (at_byte - begin) % size
+        parts.append(driver.decode(data[begin : last if missing else at_byte], channels))
+        losses += [replace(loss, after_scan=scans + loss.after_scan) for loss in parts[-1].losses]
+        scans += len(parts[-1].counts)
+        if missing:
+            begin = min(at_byte + -(at_byte - last + missing) % size, len(data))
+            lost = -(-(begin - last + missing) // size)
+            losses.append(Loss(scans, begin - last, lost, "damage"))
+    joined: AnyArray = np.concatenate([part.counts for part in parts])
+    return Scans(joined, np.concatenate([part.suspect for part in parts]), tuple(losses))
 
 
-def _join(
+def _made(arrived_bytes: IntArray, losses: Sequence[Loss], size: int) -> FloatArray:
+    """Turn bytes arrived into scans that the device has made."""
+    thrown = np.array([loss.discarded_bytes for loss in losses], dtype=np.float64)
+    ends = np.array([loss.after_scan * size for loss in losses]) + np.cumsum(thrown)
+    lost = np.array([loss.lost_scans * loss.is_gap for loss in losses], dtype=np.float64)
+    more = np.concatenate(([0.0], np.cumsum(lost - thrown / size)))
+    return np.asarray(arrived_bytes / size + more[np.searchsorted(ends, arrived_bytes, "right")])
+
+
+def _rows(
     segments: Sequence[Segment], rate_hz: float, column: int, step: float
 ) -> tuple[FloatArray, FloatArray, ByteArray]:
-    """Put the streams one after the other, with rows for what is missing between them."""
-    parts: list[tuple[FloatArray, FloatArray, ByteArray]] = []
+    """Put the streams one after the other, with rows for what is missing in and between them."""
+    times, readings, qualities = [np.empty(0)], [np.empty(0)], [np.empty(0, dtype=np.uint8)]
+
+    def put(time_s: FloatArray, values: FloatArray, quality: ByteArray) -> None:
+        times.append(time_s)
+        readings.append(values)
+        qualities.append(quality)
+
     for segment, begin_s in zip(segments, offsets_s(segments, rate_hz), strict=True):
-        length = len(segment.counts)
-        # What came before the first scan was never one, unless its frame was damaged.
-        inside = [loss for loss in segment.losses if loss.after_scan < length and loss.is_gap]
-        number, index, quality = _place(length, inside)
-        if parts:
-            last_s = float(parts[-1][0][-1])
+        scans = segment.scans
+        count = len(scans.counts)
+        most = max(_MOST_ROWS, count)
+        if len(times) > 1:
+            last_s = float(times[-1][-1])
             # Late stamps must not make time stand still.
             begin_s = max(begin_s, last_s + 1.0 / rate_hz)
             rows = max(0, math.ceil((begin_s - last_s) * rate_hz - 0.5) - 1)
-            shown = np.arange(1, rows + 1) if rows <= _most_rows(length) else np.array([1, rows])
-            nothing = np.full(len(shown), np.nan), np.full(len(shown), MISSING, dtype=np.uint8)
-            parts.append((last_s + shown / rate_hz, *nothing))
-        reading = np.full(len(quality), np.nan)
-        reading[index] = segment.counts[:, column] * step
-        parts.append((begin_s + number / rate_hz, reading, quality))
-    time_s, values, qualities = zip(*parts, strict=True)
-    return np.concatenate(time_s), np.concatenate(values), np.concatenate(qualities)
+            gap = _numbers(1, rows, most)
+            put(last_s + gap / rate_hz, np.full(len(gap), np.nan), np.full(len(gap), MISSING, "u1"))
+        lost = np.zeros(count, dtype=np.int64)
+        for loss in scans.losses:
+            # What came before the first scan was never one, unless its frame was damaged.
+            if loss.is_gap and loss.after_scan < count:
+                lost[loss.after_scan] += loss.lost_scans
+        number = np.arange(count) + np.cumsum(lost)
+        doubt = scans.suspect.copy()
+        for delay in segment.delays:
+            doubt |= (number >= segment.made[delay.begin] - 1) & (number < segment.made[delay.end])
+        gaps = [_numbers(number[at] - lost[at], lost[at], most) for at in np.flatnonzero(lost)]
+        missing = np.concatenate([np.empty(0, dtype=np.int64), *gaps])
+        every = np.append(number, missing)
+        order = np.argsort(every, kind="stable")
+        values = np.append(scans.counts[:, column] * step, np.full(len(missing), np.nan))
+        quality = np.append(np.where(doubt, SUSPECT, GOOD), np.full(len(missing), MISSING))
+        put(begin_s + every[order] / rate_hz, values[order], quality[order].astype(np.uint8))
+    return np.concatenate(times), np.concatenate(readings), np.concatenate(qualities)
 
 
-def _most_rows(scans: int) -> int:
-    """The most rows that fill a gap; a longer one (the computer slept) gets its first and last."""
-    return max(1 << 20, scans)
+_MOST_ROWS: Final = 1 << 20
 
 
-def _place(scans: int, losses: Sequence[Loss]) -> tuple[IntArray, IntArray, ByteArray]:
-    """Give every scan, good or lost, its row.
-
-    Returns
-    -------
-    number
-        Each row's place in time, in scans, shape (rows,).
-    index
-        The rows of the good scans.
-    quality
-        Of each row.
-    """
-    lost = np.zeros(scans, dtype=np.int64)
-    for loss in losses:
-        lost[loss.after_scan] += loss.lost_scans
-    long = lost > _most_rows(scans)
-    index = np.arange(scans) + np.cumsum(np.where(long, 2, lost))
-    quality = np.full(int(index[-1]) + 1, MISSING, dtype=np.uint8)
-    quality[index] = GOOD
-    for loss in losses:
-        if loss.suspect_before:
-            quality[index[loss.after_scan - 1]] = SUSPECT
-    left_out = np.zeros(len(quality), dtype=np.int64)
-    left_out[index[long] - 1] = lost[long] - 2
-    return np.arange(len(quality)) + np.cumsum(left_out), index, quality
+def _numbers(first: int, count: int, most: int) -> IntArray:
+    """Number the rows of a gap; a long one (the computer slept) gets its first and last alone."""
+    return first + (np.arange(count) if count <= most else np.array([0, count - 1]))
 
 
-def _metadata(
-    raw: RawRecording,
-    channel: int,
-    time_base: TimeBase,
-    range_volts: float,
-    segments: Sequence[Segment],
-) -> dict[str, str]:
-    """Where the recording comes from, as text."""
-    header = raw.header
-    told = ("firmware", "serial_number", "clock_scale", "volts_per_radian")
-    return {
-        "source": str(header.get("source") or f"{header['model']} on {header['port']}"),
-        "model": str(header["model"]),
-        "channel": str(channel),
-        "bits": str(find_driver(header["model"]).bits),
-        "range_volts": repr(range_volts),
-        "sample_rate_hz": repr(time_base.rate_hz),
-        "sample_rate_nominal_hz": repr(time_base.nominal_hz),
-        "sample_rate_measured_hz": repr(time_base.measured_hz),
-        "sample_rate_measured_sd_hz": repr(time_base.measured_sd_hz),
-        "time_base": time_base.chosen,
-        "unseen_loss_below_s": f"{max(segment.limit_s for segment in segments):.4g}",
-        "recorded_at": str(header["recorded_at"]),
-    } | {key: str(header[key]) for key in told if header.get(key)}
-
-
-def _lost(losses: Sequence[Loss]) -> int:
-    """How many scans were lost."""
-    return sum(loss.lost_scans for loss in losses)
-
-
-_SHORT: Final = ("the recording was cut short", "ended early")
+SHORT: Final = ("the recording was cut short", "ended early")
 
 
 def _notes(
     raw: RawRecording, segments: Sequence[Segment], time_base: TimeBase, time_s: FloatArray
 ) -> tuple[str, ...]:
     """What a user should know about the session, one clause each."""
-    losses = [loss for segment in segments for loss in segment.losses]
+    losses = [loss for segment in segments for loss in segment.scans.losses]
     met = [loss for loss in losses if loss.after_scan and not loss.reason]
-    silent = [loss for loss in losses if loss.reason == "clock"]
-    damaged = [loss for loss in losses if loss.reason == "damage"]
-    slipped = [loss.reason for loss in losses if loss.reason.startswith("slip")]
-    unsure = len(slipped) - slipped.count("slip")
-    doubt = f"; behind {unsure} of them which channel is which is a guess" if unsure else ""
-    discarded = sum(loss.discarded_bytes for loss in met)
-    pieces = ", ".join(f"{len(segment.counts)} scans" for segment in segments)
+    lost, damaged = (
+        sum(loss.lost_scans for loss in losses if loss.reason == reason and loss.is_gap)
+        for reason in ("", "damage")
+    )
+    delays = [delay for segment in segments for delay in segment.delays]
+    late_s = ", ".join(f"{delay.late_s:.3g} s" for delay in delays)
+    doubtful = 0 if met else sum(int(segment.scans.suspect.sum()) for segment in segments)
+    pieces = ", ".join(f"{len(segment.scans.counts)} scans" for segment in segments)
     stopped, asked_s = raw.event("stopped"), raw.header.get("duration_s")
     asked = f" of {asked_s:g} s" if isinstance(asked_s, int | float) else ""
     extent = f"{time_s[-1]:.6g} s{asked}"
     notes = (
-        (met, f"{_lost(met)} scans lost at {len(met)} places ({discarded} bytes out of step)"),
-        (silent, f"{_lost(silent)} scans lost at {len(silent)} places, by the recorder's clock"),
         (
-            slipped,
-            f"bytes slipped at {len(slipped)} places: put into step again behind a gap{doubt}",
+            met,
+            f"{lost} scans lost at {len(met)} places"
+            f" ({sum(loss.discarded_bytes for loss in met)} bytes out of step)",
+        ),
+        (
+            delays,
+            f"readings come late for good ({late_s}): scans were lost without a mark where the"
+            " quality is 1, and the times behind are early by as much",
+        ),
+        (
+            doubtful,
+            f"bytes were lost without a mark: {doubtful} scans are out of step (quality 1)",
         ),
         *(
             (loss.reason.startswith("stop"), f"the device's buffer overflowed ('{loss.reason}')")
@@ -355,15 +332,14 @@ def _notes(
             f"the device scans at {time_base.measured_hz:.6g} Hz, "
             f"not at {time_base.nominal_hz:.6g} Hz as it should: times follow the recorder's clock",
         ),
-        (not stopped, f"{_SHORT[0]}: the {extent} that had arrived are kept"),
+        (not stopped, f"{SHORT[0]}: the {extent} that had arrived are kept"),
         (
             stopped and not raw.is_complete,
-            f"{_SHORT[1]}: {stopped.get('reason')} ({extent} kept)",
+            f"{SHORT[1]}: {stopped.get('reason')} ({extent} kept)",
         ),
         (
             raw.damaged_bytes,
-            f"{raw.damaged_bytes} bytes of the raw file are damaged:"
-            f" {_lost(damaged)} scans are lost",
+            f"{raw.damaged_bytes} bytes of the raw file are damaged: {damaged} scans are lost",
         ),
     )
     return tuple(note for is_so, note in notes if is_so)
@@ -373,127 +349,15 @@ _NEAR: Final = 64
 """Arrivals on either side of a break that fix its extent."""
 
 
-def split(raw: RawRecording, driver: type[Driver]) -> list[Segment]:
-    """Decode each stream of a raw recording; those without a scan are left out."""
-    edges = [0, *(int(e["at_byte"]) for e in raw.events if e.get("event") == "restarted")]
-    edges.append(len(raw.data))
-    scale = float(raw.header.get("clock_scale", 1.0))
-    found: list[Segment] = []
-    for number, (begin, end) in enumerate(pairwise(edges)):
-        inside = (raw.arrived_bytes > begin) & (raw.arrived_bytes <= end)
-        segment = _decode(
-            raw.data[begin:end],
-            [
-                hole._replace(at_byte=hole.at_byte - begin)
-                for hole in raw.holes
-                if hole.stream == number
-            ],
-            driver.decoder(len(raw.header["channels"])),
-            raw.arrival_s[inside],
-            raw.arrived_bytes[inside] - begin,
-            float(raw.header["rate_hz"]),
-            scale,
-        )
-        if len(segment.counts):
-            found.append(segment)
-    return found
-
-
 def offsets_s(segments: Sequence[Segment], rate_hz: float) -> list[float]:
     """Return when each stream began, by the recorder's clock, since the first did.
 
     The least late arrivals on either side of a break count, so that a delay that is alike
     on both sides does not matter.
     """
-    late = [segment.arrival_s - segment.scans_made / rate_hz for segment in segments]
+    late = [segment.arrival_s - segment.made / rate_hz for segment in segments]
     steps = [float(new[:_NEAR].min() - old[-_NEAR:].min()) for old, new in pairwise(late)]
     return [0.0, *np.cumsum(steps).tolist()]
-
-
-def _decode(
-    data: bytes,
-    holes: Sequence[Hole],
-    decoder: Decoder,
-    arrival_s: FloatArray,
-    arrived_bytes: IntArray,
-    rate_hz: float,
-    scale: float,
-) -> Segment:
-    """Decode one stream and look for what only the clock can tell."""
-    counts, losses = _scans_of(data, holes, decoder)
-    made, good = _scans_by(arrived_bytes, losses, decoder.bytes_per_scan)
-    missing, limit_s = find_clock_losses(arrival_s, made, rate_hz, scale)
-    for arrival, lost in missing:
-        # It was lost on the way to this arrival, behind what the one before had brought.
-        place = min(len(counts), max(1, round(float(good[arrival - 1]))))
-        losses = (*losses, Loss(place, 0, lost, suspect_before=True, reason="clock"))
-        made[arrival:] += lost
-    return Segment(
-        counts, tuple(sorted(losses, key=lambda loss: loss.after_scan)), arrival_s, made, limit_s
-    )
-
-
-def _scans_of(
-    data: bytes, holes: Sequence[Hole], decoder: Decoder
-) -> tuple[AnyArray, tuple[Loss, ...]]:
-    """Decode a stream, realigned after every hole and, where scans have no marks, every slip."""
-    size = decoder.bytes_per_scan
-    parts: list[AnyArray] = []
-    losses: list[Loss] = []
-    begin = scans = 0
-    marked = not isinstance(decoder, WordDecoder)
-    for cut in (*_cuts(data, holes, size, marked=marked), None):
-        fed = decoder.feed(data[begin : cut.last_byte if cut else len(data)])
-        # (What might be the beginning of a stop code is held back.)
-        ended = decoder.finish()
-        # A decoder counts its scans on over a cut.
-        parts += [fed.counts, ended.counts]
-        # A decoder of words tells of a stop code whenever it ends: once is enough.
-        losses += [*fed.losses, *ended.losses] if marked or not cut else []
-        scans += len(fed.counts) + len(ended.counts)
-        if not cut:
-            break
-        thrown = cut.next_byte - cut.last_byte
-        lost = -(-(thrown + cut.bytes_missing) // size)
-        losses.append(
-            Loss(scans, thrown, lost, suspect_before=cut.reason != "damage", reason=cut.reason)
-        )
-        begin = cut.next_byte
-    counts = [part for part in parts if len(part)] or parts[:1]
-    return np.concatenate(counts) if len(counts) > 1 else counts[0], tuple(losses)
-
-
-def _cuts(data: bytes, holes: Sequence[Hole], size: int, *, marked: bool) -> list[Cut]:
-    """Find the places where a stream of scans of so many bytes is out of step."""
-    cuts: list[Cut] = []
-    begin = 0
-    for hole in (*holes, None):
-        end = len(data) if hole is None else hole.at_byte
-        if not marked:
-            cuts += find_slips(data[:end], size // 2, begin)
-            begin = cuts[-1].next_byte if cuts else begin
-        if hole is None:
-            break
-        last = end - (end - begin) % size
-        following = end + -(end - last + hole.bytes_missing) % size
-        cuts.append(Cut(last, min(following, len(data)), "damage", hole.bytes_missing))
-        begin = cuts[-1].next_byte
-    return cuts
-
-
-def _scans_by(
-    arrived_bytes: IntArray, losses: Sequence[Loss], bytes_per_scan: int
-) -> tuple[FloatArray, FloatArray]:
-    """Turn bytes arrived into scans the device has made, and into those that are good."""
-    good = arrived_bytes / bytes_per_scan
-    made, discarded = good.copy(), 0
-    for loss in losses:
-        discarded += loss.discarded_bytes
-        later = arrived_bytes >= loss.after_scan * bytes_per_scan + discarded
-        good[later] -= loss.discarded_bytes / bytes_per_scan
-        made[later] -= loss.discarded_bytes / bytes_per_scan
-        made[later] += loss.lost_scans if loss.is_gap else 0
-    return made, good
 
 
 _HOST_S: Final = 0.010
@@ -504,17 +368,19 @@ _RATE_TRUST: Final = 6.0
 """How many standard deviations the measured rate must differ from the nominal one before
 it is believed: by chance alone (ten degrees of freedom) once in 8000 records."""
 
-_IN_STRETCH: Final = 8
-"""Arrivals in a stretch, at least; the least late of them counts."""
-_LOSS_STRETCHES: Final = 256
-"""At most."""
-_BESIDE: Final = 3
-"""Stretches on either side that must bear a step out: nearer to the ends it can't be distinguished
-from a busy host."""
-_BESIDE_STEP: Final = 5
-"""Stretches on either side whose median tells the height of a step."""
-_FEWEST_SCANS: Final = 1.5
-_SPREADS: Final = 8.0
+
+def _time_base(raw: RawRecording, segments: Sequence[Segment]) -> TimeBase:
+    """Measure the rate over the most arrivals between which nothing seems to be missing."""
+    runs = [
+        (segment.arrival_s[begin:end], segment.made[begin:end])
+        for segment in segments
+        for begin, end in pairwise(
+            [0, *(delay.end for delay in segment.delays), len(segment.arrival_s)]
+        )
+    ]
+    arrival_s, made = max(runs, key=lambda run: len(run[0]))
+    scale = float(raw.header.get("clock_scale", 1.0))
+    return measure_rate(arrival_s, made, float(raw.header["rate_hz"]), scale)
 
 
 def measure_rate(
@@ -564,10 +430,21 @@ def measure_rate(
     return TimeBase(nominal_hz, float(1.0 / interval), float(sd / interval**2))
 
 
-def find_clock_losses(
+_IN_STRETCH: Final = 8
+"""Arrivals in a stretch, at least; the least late of them counts."""
+_STRETCHES: Final = 256
+"""At most."""
+_BESIDE: Final = 3
+"""Stretches on either side that must bear a step out: nearer to the ends it can't be distinguished
+from a busy host."""
+_FEWEST_SCANS: Final = 1.5
+_SPREADS: Final = 8.0
+
+
+def find_delays(
     arrival_s: FloatArray, scans: FloatArray, nominal_hz: float, clock_scale: float = 1.0
-) -> tuple[list[tuple[int, int]], float]:
-    """Find whole-scan losses.
+) -> tuple[list[Delay], float]:
+    """Find where the arrivals become late and stay so: whole scans were lost there.
 
     Parameters
     ----------
@@ -582,9 +459,8 @@ def find_clock_losses(
 
     Returns
     -------
-    list of tuple
-        Steps of the lateness that stay, in order: the index of the first arrival after each,
-        and how many scans are missing before it, rounded.
+    list of Delay
+        In order.
     float
         The limit: losses shorter than so many seconds, and those within three stretches
         of the ends, are not seen. Infinite for too few arrivals.
@@ -597,7 +473,7 @@ def find_clock_losses(
     eight robust standard deviations of the steps, 10 ms of the host and 1.5 scans, which
     all later stretches keep up and no earlier one had.
     """
-    stretches = min(_LOSS_STRETCHES, len(scans) // _IN_STRETCH)
+    stretches = min(_STRETCHES, len(scans) // _IN_STRETCH)
     if stretches < 4 * _BESIDE:
         return [], math.inf
     late = arrival_s - scans / nominal_hz
@@ -605,199 +481,28 @@ def find_clock_losses(
     # The drift of a wrong rate, per scan: a median is not moved by a few steps.
     slope = float(np.median(np.diff(late[first]) / np.maximum(1.0, np.diff(scans[first]))))
     late = late - slope * scans
-    steps = np.diff(late[first])
+    level = late[first]
+    steps = np.diff(level)
     spread = 1.4826 * float(np.median(np.abs(steps - np.median(steps))))
-    interval_s = slope + 1.0 / nominal_hz
-    limit_s = max(_FEWEST_SCANS * interval_s, _HOST_S * clock_scale, _SPREADS * spread)
-    found = _lasting_steps(late, first, limit_s)
-    return [(at, max(1, round(rise / interval_s))) for at, rise in found], limit_s
+    fewest_s = _FEWEST_SCANS * (slope + 1.0 / nominal_hz)
+    limit_s = max(fewest_s, _HOST_S * clock_scale, _SPREADS * spread)
+    before = np.maximum.accumulate(level)
+    after = np.minimum.accumulate(level[::-1])[::-1]
+    # The stretch in which it happens may show a part of the step: it is passed over.
+    rise = (after[2:] - before[:-2])[_BESIDE - 1 : -_BESIDE]
+    over = np.flatnonzero(rise > limit_s) + _BESIDE - 1
+    groups = np.split(over, np.flatnonzero(np.diff(over) > 1) + 1) if len(over) else []
+    return [
+        Delay(
+            int(first[group[0]]),
+            int(first[group[-1] + 2]),
+            float(rise[group - _BESIDE + 1].max()),
+        )
+        for group in groups
+    ], limit_s
 
 
 def _least_late(late: FloatArray, stretches: int) -> IntArray:
     """Return which arrival was least late in each of so many stretches."""
     parts = np.array_split(np.arange(len(late)), stretches)
     return np.array([part[np.argmin(late[part])] for part in parts])
-
-
-def _lasting_steps(
-    late: FloatArray, first: IntArray, limit_s: float
-) -> Iterator[tuple[int, float]]:
-    """Find steps of the lateness that last: the arrival after each, and its height in s.
-
-    Parameters
-    ----------
-    late
-        Lateness of each arrival, s, shape (n,).
-    first
-        The least late arrival of each stretch.
-    limit_s
-        What a step must exceed.
-    """
-    level = late[first]
-    before = np.maximum.accumulate(level)
-    after = np.minimum.accumulate(level[::-1])[::-1]
-    index = _BESIDE - 1
-    while index < len(first) - _BESIDE - 1:
-        # The stretch in which it happens may show a part of the step: it is passed over.
-        rise = float(after[index + 2] - before[index])
-        if rise <= limit_s:
-            index += 1
-            continue
-        if float(after[index + 3] - before[index + 1]) > rise:
-            index += 1
-        # The detection took extremes of many levels, which exaggerate the delays.
-        near = level[max(0, index - _BESIDE_STEP + 1) : index + 1]
-        rise = float(np.median(level[index + 2 : index + 2 + _BESIDE_STEP]) - np.median(near))
-        # The arrival between the two after which the lateness never falls back.
-        begin, end = int(first[index]), int(first[index + 2])
-        least_after = np.minimum.accumulate(late[begin : end + 1][::-1])[::-1]
-        at = begin + 1 + int(np.argmax(np.diff(least_after)))
-        yield at, rise
-        index += _BESIDE
-
-
-_STAMP: Final = r"\d{8}T\d{6}\.\d{6}Z-[0-9a-f]{8}"
-
-
-def new_path(start: str | Path) -> Path:
-    r"""Name a raw file that nobody else has: `start`, a UTC time stamp, and a random number.
-
-    Examples
-    --------
-    >>> re.sub(r"\d", "0", new_path("raw/").name[:23])
-    '00000000T000000.000000Z'
-    """
-    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
-    return Path(f"{start}{stamp}-{secrets.token_hex(4)}.raw")
-
-
-def new_path_beside(out: Path) -> Path:
-    """Name the raw file of a recording on the command line: ``OUT.raw`` if that is free.
-
-    Beside a device or a pipe nothing is kept: ``recording.raw`` in the current folder is.
-    """
-    out = _file_of(out)
-    first = out.with_suffix(".raw")
-    return new_path(f"{out.with_suffix('')}.") if first.exists() else first
-
-
-def _file_of(out: Path) -> Path:
-    no_file = is_stream(out) or (out.exists() and not out.is_file())
-    return Path("recording.csv") if no_file else out
-
-
-def paths_beside(out: Path) -> list[Path]:
-    """List the raw files that `new_path_beside` has named for a recording."""
-    out = _file_of(out)
-    pattern = re.compile(re.escape(out.stem) + rf"(\.{_STAMP})?\.raw")
-    return [path for path in out.parent.glob("*") if pattern.fullmatch(path.name)]
-
-
-def read_attempts(paths: Iterable[Path]) -> list[RawRecording]:
-    """Read the attempts that hold at least one scan, the oldest first.
-
-    Raises
-    ------
-    InputError
-        If one of them is being recorded now, or none holds a scan and one is damaged.
-    """
-    found: list[RawRecording] = []
-    damages: list[InputError] = []
-    for path in sorted(path for path in paths if path.is_file()):
-        refuse_if(
-            is_being_recorded(path),
-            path,
-            "another process is recording into it",
-            "wait for its end",
-        )
-        try:
-            raw = read_raw(path)
-            decode_recording(raw)
-        except NothingRecordedError:
-            continue
-        except InputError as fault:
-            damages.append(fault)
-        else:
-            found.append(raw)
-    if damages and not found:
-        raise damages[0]
-    # A name has its time stamp down to microseconds; OUT.raw, the first of all, has none.
-    return sorted(
-        found, key=lambda raw: (str(raw.header["recorded_at"]), *re.findall(_STAMP, raw.path.name))
-    )
-
-
-def choose(attempts: Sequence[RawRecording]) -> RawRecording:
-    """Return the newest complete attempt; if none is complete, the longest."""
-    complete = [attempt for attempt in attempts if attempt.is_complete]
-    return complete[-1] if complete else max(attempts, key=lambda attempt: len(attempt.data))
-
-
-def decode_attempt(path: Path, folder: Path, channel: int | None = None) -> Recording:
-    """Decode a raw file; the recording's metadata names it and holds the notes.
-
-    Parameters
-    ----------
-    path
-        The raw file.
-    folder
-        Where the recording goes: the file is named relative to it.
-    channel
-        As printed on the box; the first one recorded by default.
-    """
-    recording = decode_recording(path, channel)
-    named = path.relative_to(folder) if path.is_relative_to(folder) else Path(path.name)
-    short = next((note for note in recording.notes if note.startswith(_SHORT)), "")
-    told = {"raw_file": named.as_posix(), "notes": "; ".join(recording.notes), "incomplete": short}
-    kept = {key: text for key, text in told.items() if text}
-    return replace(recording, metadata={**recording.metadata, **kept})
-
-
-def accept(attempt: RawRecording) -> None:
-    """Note in a raw file that what the line had brought before it was lost is the recording."""
-    append_event(attempt.path, event="accepted")
-
-
-def refuse_lost(attempt: RawRecording, remedy: str) -> None:
-    """Refuse an attempt that a lost line has ended.
-
-    Raises
-    ------
-    LineLostError
-        With the seconds kept of those asked for. The raw file stays.
-    """
-    if not attempt.lost_line:
-        return
-    kept_s, asked_s = decode_recording(attempt).time_s[-1], attempt.header.get("duration_s")
-    asked = f" of {asked_s:g} s" if isinstance(asked_s, int | float) else ""
-    raise LineLostError(
-        str(attempt.header["port"]),
-        f"{attempt.lost_line}; {kept_s:.6g} s{asked} are kept in {attempt.path}",
-        remedy,
-    )
-
-
-def mark_saved(path: Path, out: Path) -> None:
-    """Note in a raw file, where it may be written to, that its recording was written."""
-    with suppress(OSError):
-        append_event(path, event="saved", file=out.name)
-
-
-@contextmanager
-def kept_in(raw_path: Path, out: Path) -> Iterator[None]:
-    """Name the raw file that still holds a recording, if writing the recording fails.
-
-    Raises
-    ------
-    InputError
-        Where the recording can't be written, for a full disk for one.
-    """
-    kept = f"the recording is kept in {raw_path}: call again to write it"
-    try:
-        yield
-    except OSError as fault:
-        raise InputError(
-            out, f"it can't be written ({fault.strerror or fault})", f"make room; {kept}"
-        ) from None
-    except InputError as fault:
-        raise InputError(fault.place, fault.problem, f"{fault.remedy}; {kept}") from None

@@ -86,19 +86,23 @@ class Line(AbstractContextManager["Line"]):
 
     def __init__(self, port: str, baudrate: int) -> None:
         self.port = port
-        check_port(port)
+        self.open(baudrate)
+
+    def open(self, baudrate: int) -> None:
+        """Open it, or open it again."""
+        check_port(self.port)
         try:
-            self._serial = serial.serial_for_url(port, do_not_open=True)
+            self._serial = serial.serial_for_url(self.port, do_not_open=True)
             self._serial.baudrate = baudrate
             self._serial.timeout = 0
             self._serial.write_timeout = 2.0
             # DTR and RTS feed the RS-232 models, which have no other supply.
             self._serial.dtr = self._serial.rts = True
-            if "://" not in port:
+            if "://" not in self.port:
                 self._serial.exclusive = True
             self._serial.open()
         except (OSError, ValueError) as fault:
-            raise cannot_open(port, fault) from None
+            raise cannot_open(self.port, fault) from None
 
     def __exit__(self, *_fault: object) -> None:
         self.close()

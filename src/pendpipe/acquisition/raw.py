@@ -307,6 +307,59 @@ def read_raw(source: str | Path | bytes) -> RawRecording:
     )
 
 
+_NUMBERS: Final[Mapping[str, tuple[float, float]]] = {
+    "rate_hz": (1e-6, 1e9),
+    "range_volts": (1e-6, 1e6),
+    "clock_scale": (1e-3, 1e9),
+    "volts_per_radian": (-1e9, 1e9),
+}
+"""What can be true of any instrument."""
+_NEEDED: Final = ("model", "port", "channels", "rate_hz", "recorded_at")
+_TEXTS: Final = ("model", "port", "recorded_at")
+_MOST_CHANNELS: Final = 64
+
+
+def check_description(place: str, raw: RawRecording) -> None:
+    """Refuse a raw recording whose description can't be true.
+
+    Raises
+    ------
+    InputError
+        On a missing or impossible entry, or time stamps that fall.
+    """
+    header, channels = raw.header, raw.header.get("channels")
+    kept = raw.event("stopped").get("keep_scans")
+    faults = (
+        *((key not in header, f"{key} is missing") for key in _NEEDED),
+        *((not isinstance(header.get(key), str), f"{key} is no text") for key in _TEXTS),
+        *(
+            # (A comparison with NaN is false; and True is no number.)
+            (not (type(value) in (int, float) and low <= value <= high), f"{key} is {value!r:.40}")
+            for key, (low, high) in _NUMBERS.items()
+            for value in (header.get(key, low),)
+        ),
+        (
+            not isinstance(channels, list)
+            or not 0 < len(channels) <= _MOST_CHANNELS
+            or not all(type(channel) is int and channel > 0 for channel in channels)
+            or len(set(channels)) != len(channels),
+            f"channels are {channels!r:.40}",
+        ),
+        (kept is not None and not (type(kept) is int and kept > 0), f"keep_scans is {kept!r:.40}"),
+        (
+            not np.isfinite(raw.arrival_s).all() or np.any(np.diff(raw.arrival_s) < 0),
+            "time stamps that fall",
+        ),
+    )
+    for wrong, fault in faults:
+        refuse_if(
+            wrong,
+            place,
+            f"the description of the recording is damaged ({fault})",
+            "give another copy",
+        )
+
+
 def _header(place: str, content: bytes) -> tuple[Mapping[str, Any], int]:
     """Return the description, from the first line or its copy, and where the frames begin."""
     end = content.find(b"\n", 0, _LONGEST_HEADER)
@@ -331,38 +384,6 @@ def _header(place: str, content: bytes) -> tuple[Mapping[str, Any], int]:
         "install a newer pendpipe",
     )
     return header, end + 1
-
-
-def parse_header(line: bytes) -> dict[str, Any]:
-    """Read the first line of a file that is being recorded.
-
-    Raises
-    ------
-    InputError
-        If it is no description.
-    """
-    header = _description(line)
-    if header is None:
-        raise InputError("raw recording", "its first line is no description", "give another file")
-    return header
-
-
-def whole_frames(content: bytes) -> tuple[list[Frame], int]:
-    """Read the frames of a file that is being recorded, up to one that is not whole yet.
-
-    Returns
-    -------
-    list of Frame
-        In order.
-    int
-        Where the first begins that is not whole.
-    """
-    frames: list[Frame] = []
-    begin = 0
-    for _, frame in _frames(content, 0):
-        frames.append(frame)
-        begin += _HEAD.size + _CHECK.size + len(frame.content)
-    return frames, begin
 
 
 def _description(line: bytes) -> dict[str, Any] | None:

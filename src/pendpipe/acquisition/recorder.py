@@ -3,11 +3,13 @@
 A simulated device is recorded from as a real one is, over a line of its own (`acquire_simulated`).
 """
 
+from __future__ import annotations
+
 import math
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, closing, nullcontext, suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from io import BytesIO, StringIO
@@ -20,17 +22,17 @@ from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.devices.simulated import Signal, SimulatedDevice
 from pendpipe.acquisition.drivers import find_driver, identify
-from pendpipe.acquisition.drivers.base import Driver, Identity, Scans, Setup
+from pendpipe.acquisition.drivers.base import Driver, Identity, Setup
+from pendpipe.acquisition.drivers.streams import STOP_CODE, Scans
 from pendpipe.acquisition.line import Line, LineLostError
 from pendpipe.acquisition.raw import (
-    COMPLETE,
     INTERRUPTED,
     RawWriter,
     is_being_recorded,
     lock,
     read_raw,
 )
-from pendpipe.arrays import AnyArray, FloatArray
+from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.recording import Recording
 
@@ -85,8 +87,8 @@ class AcquisitionRequest:
             )
 
 
-_REFRESH_S = 0.2
-_MEMORY_S = 5.0
+_REFRESH_S: Final = 0.2
+_MEMORY_S: Final = 5.0
 """The amplitude shown is that of the last seconds, of the recorder's clock."""
 
 
@@ -106,37 +108,41 @@ class ProgressLine:
         self._duration_s = duration_s
         self._shown = 0.0
         self._scans = self._lost = self._breaks = 0
-        self._recent: deque[tuple[float, AnyArray]] = deque()
-        self._step = 0.0
+        self._new = b""
+        self._extremes: deque[tuple[float, float, float]] = deque()
 
-    def begin(self, step_volts: float) -> None:
-        """Show a stream of counts of so many volts each; another one after a break."""
-        self._breaks += self._step > 0.0
-        self._recent.clear()
-        self._step = step_volts
-
-    def update(self, elapsed_s: float, scans: Scans) -> None:
-        """Show further scans, by `elapsed_s` of the recorder's clock."""
+    def add(self, elapsed_s: float, data: bytes, session: Session) -> None:
+        """Show further bytes of the stream, by `elapsed_s` of the recorder's clock."""
         if not self._stream.isatty():
             return
+        self._new += data
+        if time.monotonic() - self._shown <= _REFRESH_S:
+            return
+        self._shown = time.monotonic()
+        scans = session.decode(self._new)
+        self._new = b""
         self._scans += len(scans.counts)
         self._lost += sum(loss.lost_scans for loss in scans.losses if loss.after_scan)
         if len(scans.counts):
-            self._recent.append((elapsed_s, scans.counts[:, 0]))
-        while len(self._recent) > 1 and self._recent[0][0] < elapsed_s - _MEMORY_S:
-            self._recent.popleft()
-        if time.monotonic() - self._shown > _REFRESH_S:
-            self._shown = time.monotonic()
-            self._write(f"\r{self.text(elapsed_s)}\x1b[K")
+            volts = scans.counts[:, 0] * session.step_volts
+            self._extremes.append((elapsed_s, float(volts.min()), float(volts.max())))
+        while len(self._extremes) > 1 and self._extremes[0][0] < elapsed_s - _MEMORY_S:
+            self._extremes.popleft()
+        self._write(f"\r{self.text(elapsed_s)}\x1b[K")
+
+    def interrupt(self) -> None:
+        """Count a break; what follows is another stream."""
+        self._breaks += 1
+        self._new = b""
+        self._extremes.clear()
 
     def text(self, elapsed_s: float) -> str:
         """The line without its control characters."""
-        recent = [counts.astype(np.int64) for _, counts in self._recent]
-        amplitude = 0.5 * self._step * float(np.ptp(np.concatenate(recent))) if recent else 0.0
-        rate = self._scans / elapsed_s if elapsed_s > 0 else 0.0
+        _, low, high = zip(*self._extremes or [(0.0, 0.0, 0.0)], strict=True)
         return (
-            f"{elapsed_s:.1f} of {self._duration_s:g} s, {self._scans} scans, {rate:.1f} Hz, "
-            f"amplitude {amplitude:.3f} V, {self._lost} lost"
+            f"{elapsed_s:.1f} of {self._duration_s:g} s, {self._scans} scans,"
+            f" {self._scans / max(elapsed_s, 1e-9):.1f} Hz,"
+            f" amplitude {0.5 * (max(high) - min(low)):.3f} V, {self._lost} lost"
             + (f", {self._breaks} break(s)" if self._breaks else "")
         )
 
@@ -152,169 +158,173 @@ class ProgressLine:
             self._stream.flush()
 
 
+@dataclass(frozen=True)
 class Session:
-    """One recording with one instrument, kept as it comes.
+    """An instrument that has been set.
 
     Parameters
     ----------
-    line
-        The open line; the session closes it, and opens it again after a break.
-    driver
-        The model.
-    request
-        What is to be recorded.
-    clock
-        The recorder's clock.
-    progress
-        A display to keep up to date.
+    instrument
+        Its driver.
+    identity, setup
+        What it says of itself, and how it samples.
     """
 
-    def __init__(
-        self,
-        line: Line,
-        driver: type[Driver],
-        request: AcquisitionRequest,
-        clock: ScaledClock,
-        progress: ProgressLine | None = None,
-    ) -> None:
-        self._line = line
-        self._driver = driver
-        self._request = request
-        self._clock = clock
-        self._progress = progress or ProgressLine(StringIO(), request.duration_s)
-        self._received = 0
-        self._by_clock = False  # the clock ends it, not the count of scans
-        self.identity, self.setup = self._introduce()
+    instrument: Driver
+    identity: Identity
+    setup: Setup
 
-    def close(self) -> None:
-        """Close the line."""
-        self._line.close()
+    @property
+    def scan_bytes(self) -> int:
+        """Bytes in a scan: two a sample, in all families."""
+        return 2 * len(self.setup.channels)
 
-    def description(self) -> dict[str, object]:
+    @property
+    def step_volts(self) -> float:
+        """Volts a count."""
+        return float(self.setup.range_volts / 2 ** (self.instrument.bits - 1))
+
+    def decode(self, data: bytes) -> Scans:
+        """Turn bytes of the stream into scans."""
+        return self.instrument.decode(data, len(self.setup.channels))
+
+    def description(self, request: AcquisitionRequest, clock: ScaledClock) -> dict[str, object]:
         """What instrument this is, and how it records."""
         return {
             "model": self.identity.model,
             "firmware": self.identity.firmware or None,
             "serial_number": self.identity.serial_number or None,
             "channels": list(self.setup.channels),
-            "bits": self._driver.bits,
+            "bits": self.instrument.bits,
             "range_volts": self.setup.range_volts,
             "rate_hz": self.setup.rate_hz,
-            "requested_rate_hz": self._request.rate_hz,
-            "duration_s": self._request.duration_s,
-            "clock_scale": self._clock.scale,
+            "requested_rate_hz": request.rate_hz,
+            "duration_s": request.duration_s,
+            "clock_scale": clock.scale,
             "recorded_at": datetime.now(UTC).isoformat(timespec="seconds"),
         }
 
-    def run(self, stream: IO[bytes], header: Mapping[str, object]) -> None:
-        """Keep everything from start to end, with its time; a break ends or resumes it."""
-        known = {key: value for key, value in header.items() if value is not None}
-        bytes_per_s = self.setup.rate_hz * self._decoder.bytes_per_scan
-        writer = RawWriter(stream, known, bytes_per_s=bytes_per_s)
-        # Taken before the start, so that a device can only seem late, never early.
-        self._origin_s = self._clock.now()
-        reason = ""
-        try:
-            self._instrument.start()
-            reason = self._listen(writer)
-            while reason not in COMPLETE and self._resume(reason, writer):
-                reason = self._listen(writer)
-            self._instrument.stop()
-        except LineLostError as fault:
-            reason = reason or fault.problem
-        except KeyboardInterrupt:
-            reason = INTERRUPTED
-            self._stop()
-        except OSError:
-            # The disk, not the line: the device need not fill its buffer meanwhile.
-            self._stop()
-            raise
-        finally:
-            self._progress.end()
-        keep = {"keep_scans": self._scans} if reason == "scans" else {}
-        writer.event(self._elapsed_s(), event="stopped", reason=reason, **keep)
 
-    @property
-    def _scans(self) -> int:
-        """How many scans were requested, at the device's own rate."""
-        return max(1, round(self._request.duration_s * self.setup.rate_hz))
+def begin(
+    line: Line, driver: type[Driver], request: AcquisitionRequest, clock: ScaledClock
+) -> Session:
+    """Ask the device who it is, and set it."""
+    instrument = driver(line, clock)
+    identity = instrument.identify()
+    setup = instrument.configure(request.channels, request.rate_hz, request.range_volts)
+    return Session(instrument, identity, setup)
 
-    def _elapsed_s(self) -> float:
-        return self._clock.now() - self._origin_s
 
-    def _stop(self) -> None:
-        try:
-            self._instrument.stop()
-        except InputError:
-            self._line.close()
-
-    def _introduce(self) -> tuple[Identity, Setup]:
-        """Ask the device who it is, and set it."""
-        self._instrument = self._driver(self._line, self._clock)
-        request = self._request
-        identity = self._instrument.identify()
-        setup = self._instrument.configure(request.channels, request.rate_hz, request.range_volts)
-        self._decoder = self._driver.decoder(len(setup.channels))
-        self._progress.begin(setup.range_volts / 2 ** (self._driver.bits - 1))
-        return identity, setup
-
-    def _listen(self, writer: RawWriter) -> str:
-        """Keep what comes until it is enough or breaks off; return which."""
-        scans, request, scale = self._scans, self._request, self._clock.scale
-        wanted = scans * self._decoder.bytes_per_scan
-        poll_s = min(_LONGEST_POLL_S, max(_SHORTEST_POLL_S, request.duration_s / scale / _POLLS))
-        latest_s = 1.1 * request.duration_s + _PATIENCE_S * scale
-        # A packet may gather many scans before it is sent.
-        silence_s = _SILENCE_S + 64 / self.setup.rate_hz / scale
-        while True:
+def receive(
+    session: Session,
+    request: AcquisitionRequest,
+    clock: ScaledClock,
+    writer: RawWriter,
+    progress: ProgressLine,
+) -> None:
+    """Keep everything from start to end, with its time; a break ends or resumes it."""
+    line, scale, rate_hz = session.instrument.line, clock.scale, session.setup.rate_hz
+    wanted = max(1, round(request.duration_s * rate_hz))
+    poll_s = min(_LONGEST_POLL_S, max(_SHORTEST_POLL_S, request.duration_s / scale / _POLLS))
+    # A packet may gather many scans before it is sent.
+    silence_s = _SILENCE_S + 64 / rate_hz / scale
+    latest_s = 1.1 * request.duration_s + _PATIENCE_S * scale
+    received, recent, by_clock, reason = 0, b"", False, ""
+    # Taken before the start, so that a device can only seem late, never early.
+    origin_s = clock.now()
+    try:
+        session.instrument.start()
+        while not reason:
             try:
-                data = self._line.receive(silence_s)
+                data = line.receive(silence_s)
+                broken = ""
             except LineLostError as fault:
-                return fault.problem
-            elapsed_s = self._elapsed_s()
+                data, broken = b"", fault.problem
+            elapsed_s = clock.now() - origin_s
             if data:
                 writer.data(elapsed_s, data)
-                self._received += len(data)
-            self._progress.update(elapsed_s, self._decoder.feed(data))
-            enough = self._received >= wanted
-            if enough and elapsed_s < 0.9 * (scans - 1) / self.setup.rate_hz:
-                self._by_clock = True
-            if elapsed_s >= (request.duration_s if self._by_clock else latest_s):
-                return "time"
-            if not data:
-                return f"the device fell silent after {elapsed_s:.6g} s"
-            if self._decoder.ended:
-                return f"the device ended its stream with '{self._decoder.ended}'"
-            if enough and not self._by_clock:
-                return "scans"
-            if len(data) < _BACKLOG:
-                time.sleep(poll_s)
-
-    def _resume(self, reason: str, writer: RawWriter) -> bool:
-        """Find the device again and start it; return whether that was possible in time."""
-        writer.event(self._elapsed_s(), event="broken", reason=reason)
-        self._by_clock = True
-        until_s = time.monotonic() + self._request.reconnect_s
-        while time.monotonic() < until_s and self._elapsed_s() < self._request.duration_s:
-            try:
-                if not self._line.is_open:
-                    self._line = Line(self._line.port, self._driver.baudrate)
-                self._line.set_baudrate(self._driver.baudrate)
-                # Another device, or an answer that was damaged: it is asked again.
-                refuse_if(
-                    self._introduce() != (self.identity, self.setup),
-                    self._line.port,
-                    "another device answers",
-                    "ask it again",
+                received += len(data)
+            progress.add(elapsed_s, data, session)
+            recent = recent[-16:] + data
+            stop = STOP_CODE.search(recent) if session.instrument.sends_stop_codes else None
+            enough = received >= wanted * session.scan_bytes
+            # A device that is faster than it claims is recorded for the whole time.
+            by_clock |= enough and elapsed_s < 0.9 * (wanted - 1) / rate_hz
+            if elapsed_s >= (request.duration_s if by_clock else latest_s) and not broken:
+                reason = "time"
+            elif broken or not data or stop:
+                broken = broken or (
+                    f"the device ended its stream with '{stop.group().decode()}'"
+                    if data and stop
+                    else f"the device fell silent after {elapsed_s:.6g} s"
                 )
-                writer.event(self._elapsed_s(), event="restarted", reason=reason)
-                self._instrument.start()
-            except InputError:
-                self._line.close()
-                time.sleep(_RETRY_S)
-            else:
-                return True
-        return False
+                writer.event(elapsed_s, event="broken", reason=broken)
+                by_clock, recent = True, b""
+                again = _resumed(session, request, clock, origin_s, writer, broken)
+                if again is None:
+                    reason = broken
+                else:
+                    session = again
+                    progress.interrupt()
+            elif enough and not by_clock:
+                reason = "scans"
+            elif len(data) < _BACKLOG:
+                time.sleep(poll_s)
+        session.instrument.stop()
+    except LineLostError as fault:
+        reason = reason or fault.problem
+    except KeyboardInterrupt:
+        reason = INTERRUPTED
+        _stop(session)
+    except OSError:
+        # The disk, not the line: the device need not fill its buffer meanwhile.
+        _stop(session)
+        raise
+    finally:
+        progress.end()
+    keep = {"keep_scans": wanted} if reason == "scans" else {}
+    writer.event(clock.now() - origin_s, event="stopped", reason=reason, **keep)
+
+
+def _stop(session: Session) -> None:
+    try:
+        session.instrument.stop()
+    except InputError:
+        session.instrument.line.close()
+
+
+def _resumed(
+    session: Session,
+    request: AcquisitionRequest,
+    clock: ScaledClock,
+    origin_s: float,
+    writer: RawWriter,
+    reason: str,
+) -> Session | None:
+    """Find the device again and start it, if that is possible in time."""
+    line, driver = session.instrument.line, type(session.instrument)
+    until_s = time.monotonic() + request.reconnect_s
+    while time.monotonic() < until_s and clock.now() - origin_s < request.duration_s:
+        try:
+            if not line.is_open:
+                line.open(driver.baudrate)
+            line.set_baudrate(driver.baudrate)
+            # Another device, or an answer that was damaged: it is asked again.
+            again = begin(line, driver, request, clock)
+            refuse_if(
+                (again.identity, again.setup) != (session.identity, session.setup),
+                line.port,
+                "another device answers",
+                "ask it again",
+            )
+            writer.event(clock.now() - origin_s, event="restarted", reason=reason)
+            again.instrument.start()
+        except InputError:
+            line.close()
+            time.sleep(_RETRY_S)
+        else:
+            return again
+    return None
 
 
 def record(
@@ -364,17 +374,20 @@ def record(
     """
     request, clock = AcquisitionRequest(**wanted), clock or ScaledClock()
     kind = find_driver(driver or identify(port).model)
-    with (
-        Line(port, kind.baudrate) as line,
-        closing(Session(line, kind, request, clock, progress)) as session,
-        _opened(raw_path) as stream,
-    ):
+    with Line(port, kind.baudrate) as line:
+        session = begin(line, kind, request, clock)
         own = {"port": port, "volts_per_radian": volts_per_radian, "source": source}
-        try:
-            session.run(stream, session.description() | own)
-        except OSError as fault:
-            raise _cannot_write(raw_path or "memory", fault) from None
-        content = stream.getvalue() if isinstance(stream, BytesIO) else None
+        header = session.description(request, clock) | own
+        known = {key: value for key, value in header.items() if value is not None}
+        bytes_per_s = session.setup.rate_hz * session.scan_bytes
+        with _opened(raw_path) as stream:
+            try:
+                writer = RawWriter(stream, known, bytes_per_s=bytes_per_s)
+                progress = progress or ProgressLine(StringIO(), request.duration_s)
+                receive(session, request, clock, writer, progress)
+            except OSError as fault:
+                raise _cannot_write(raw_path or "memory", fault) from None
+            content = stream.getvalue() if isinstance(stream, BytesIO) else None
     return decode_recording(content if content is not None else Path(raw_path or ""))
 
 

@@ -17,9 +17,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.acquisition.drivers import find_driver
-from pendpipe.acquisition.raw import parse_header, whole_frames
+from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition.raw import read_raw
 from pendpipe.arrays import FloatArray
+from pendpipe.errors import InputError
 from pendpipe.templates import render
 
 _LAST_S: Final = 60.0
@@ -49,99 +50,32 @@ def shown(raw: Path) -> Iterator[None]:
             viewer.wait()
 
 
-class Follower:
-    """What a growing raw file holds so far.
-
-    Parameters
-    ----------
-    path
-        The file; it need not be there yet.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._read = 0
-        self._rest = b""
-        self._header: dict[str, Any] = {}
-        self._elapsed_s, self._scans, self._lost, self._reason = 0.0, 0, 0, ""
-        self._time_s, self._volts = np.empty(0), np.empty(0)
-        self._low: dict[int, float] = {}
-        self._high: dict[int, float] = {}
-
-    def read(self) -> None:
-        """Take in what was appended since the last time."""
-        with suppress(FileNotFoundError), self._path.open("rb") as stream:
-            stream.seek(self._read)
-            new = stream.read()
-            self._read += len(new)
-            self._rest += new
-        if not self._header:
-            line, feed, rest = self._rest.partition(b"\n")
-            if not feed:
-                return
-            self._header, self._rest = parse_header(line), rest
-            self._start()
-        frames, end = whole_frames(self._rest)
-        self._rest = self._rest[end:]
-        for frame in frames:
-            self._elapsed_s = frame.time_s
-            if frame.kind == b"D":
-                self._take(frame.content)
-            elif frame.kind == b"E":
-                event = json.loads(frame.content)
-                if event.get("event") == "restarted":
-                    self._start()
-                self._reason = str(event.get("reason") or "")
-
-    def _start(self) -> None:
-        """A device counts anew after each start."""
-        driver = find_driver(self._header["model"])
-        self._decoder = driver.decoder(len(self._header["channels"]))
-        self._step = self._header["range_volts"] / 2 ** (driver.bits - 1)
-        self._begin = self._elapsed_s, self._scans + self._lost
-
-    def _take(self, content: bytes) -> None:
-        scans = self._decoder.feed(content)
-        count = len(scans.counts)
-        self._scans += count
-        self._lost += sum(loss.lost_scans for loss in scans.losses if loss.after_scan)
-        if not count:
-            return
-        first = self._scans - count - self._begin[1] + self._lost
-        time_s = self._begin[0] + (first + np.arange(count)) / self._header["rate_hz"]
-        volts = self._step * scans.counts[:, 0].astype(np.float64)
-        stretch = (time_s / self.stretch_s).astype(int)
-        for number in range(int(stretch[0]), int(stretch[-1]) + 1):
-            if len(part := volts[stretch == number]):
-                self._low[number] = min(self._low.get(number, np.inf), float(part.min()))
-                self._high[number] = max(self._high.get(number, -np.inf), float(part.max()))
-        time_s, volts = np.append(self._time_s, time_s), np.append(self._volts, volts)
-        recent = time_s > time_s[-1] - _LAST_S
-        self._time_s, self._volts = time_s[recent], volts[recent]
-
-    @property
-    def stretch_s(self) -> float:
-        """Length of a stretch of which the amplitude is drawn."""
-        return max(_SHORTEST_STRETCH_S, float(self._header["duration_s"]) / _STRETCHES)
-
-    def state(self) -> dict[str, Any]:
-        """Return what the page draws: times in s, readings in V."""
-        if not self._header:
-            return {"scans": 0}
-        whole = [n for n in self._low if (n + 1) * self.stretch_s <= self._elapsed_s]
-        return {
-            "elapsed_s": self._elapsed_s,
-            "duration_s": self._header["duration_s"],
-            "model": self._header["model"],
-            "scans": self._scans,
-            "lost": self._lost,
-            "bytes": self._read,
-            "reason": self._reason,
-            "last": thinned(self._time_s, self._volts),
-            "amplitude": [
-                ((n + 0.5) * self.stretch_s, 0.5 * (self._high[n] - self._low[n])) for n in whole
-            ],
-        }
+def state(path: Path) -> dict[str, Any]:
+    """Return what the page draws of a raw file so far: times in s, readings in V."""
+    try:
+        raw = read_raw(path)
+        recording = decode_recording(raw)
+    except InputError:
+        return {"scans": 0}
+    read = np.isfinite(recording.values)
+    time_s, volts = recording.time_s[read], recording.values[read]
+    duration_s = float(raw.header["duration_s"])
+    # Whole stretches alone: the last one is still growing.
+    stretch_s = max(_SHORTEST_STRETCH_S, duration_s / _STRETCHES)
+    number, first = np.unique(time_s // stretch_s, return_index=True)
+    extent = np.maximum.reduceat(volts, first) - np.minimum.reduceat(volts, first)
+    recent = time_s > time_s[-1] - _LAST_S
+    return {
+        "elapsed_s": float(raw.arrival_s[-1]),
+        "duration_s": duration_s,
+        "model": raw.header["model"],
+        "scans": len(time_s),
+        "lost": len(recording) - len(time_s),
+        "bytes": len(raw.data),
+        "reason": (raw.event("stopped") or raw.event("broken")).get("reason", ""),
+        "last": thinned(time_s[recent], volts[recent]),
+        "amplitude": np.stack([(number + 0.5) * stretch_s, 0.5 * extent], axis=1)[:-1].tolist(),
+    }
 
 
 def thinned(time_s: FloatArray, values: FloatArray) -> list[tuple[float, float]]:
@@ -157,7 +91,7 @@ def thinned(time_s: FloatArray, values: FloatArray) -> list[tuple[float, float]]
 
 
 class _Handler(BaseHTTPRequestHandler):
-    follower: Follower
+    raw: Path
     page: bytes
     lock = threading.Lock()
 
@@ -170,9 +104,7 @@ class _Handler(BaseHTTPRequestHandler):
         kind, content = "text/html; charset=utf-8", self.page
         if self.path == "/data":
             with self.lock:
-                self.follower.read()
-                state = self.follower.state()
-            kind, content = "application/json", json.dumps(state).encode()
+                kind, content = "application/json", json.dumps(state(self.raw)).encode()
         self.send_response(200)
         self.send_header("Content-Type", kind)
         self.send_header("Cache-Control", "no-store")
@@ -185,7 +117,7 @@ class _Handler(BaseHTTPRequestHandler):
 
 def main(raw: str) -> None:
     """Serve the page of a raw file until standard input ends."""
-    _Handler.follower = Follower(Path(raw))
+    _Handler.raw = Path(raw)
     _Handler.page = render("pendpipe.acquisition", "view.html", file=Path(raw).name).encode()
     with ThreadingHTTPServer(("127.0.0.1", 0), _Handler) as server:
         server.daemon_threads = True

@@ -149,7 +149,7 @@ def _signals_end_like_ctrl_c() -> Iterator[None]:
 def _record(arguments: Arguments) -> None:
     """Record, or write what an earlier call has recorded and could not write."""
     refuse_if(not arguments.out, "--out", "no file is named", "give --out FILE.csv")
-    from pendpipe.acquisition import decode
+    from pendpipe.acquisition import attempts
     from pendpipe.formats.writing import check_name, write
 
     out = Path(arguments.out)
@@ -161,9 +161,9 @@ def _record(arguments: Arguments) -> None:
         check_writable(out.parent)
     if arguments.samples is not None:
         arguments.duration = arguments.samples / max(arguments.rate, 1e-9)
-    kept = [Path(arguments.raw)] if arguments.raw else decode.paths_beside(out)
+    kept = [Path(arguments.raw)] if arguments.raw else attempts.paths_beside(out)
     no_earlier_one = arguments.recover or arguments.anew
-    earlier = [] if no_earlier_one else decode.read_attempts(kept)
+    earlier = [] if no_earlier_one else attempts.read_attempts(kept)
     if not arguments.accept_short:
         earlier = [attempt for attempt in earlier if not attempt.lost_line]
     if arguments.recover:
@@ -176,18 +176,18 @@ def _record(arguments: Arguments) -> None:
             file=sys.stderr,
         )
     else:
-        raw = Path(arguments.raw) if arguments.raw else decode.new_path_beside(out)
+        raw = Path(arguments.raw) if arguments.raw else attempts.new_path_beside(out)
         with _view(arguments, raw):
             _from_device(arguments, raw)
         if not arguments.accept_short:
-            (attempt,) = decode.read_attempts([raw])
+            (attempt,) = attempts.read_attempts([raw])
             remedy = "call again to record anew, or with --accept-short to take what is kept"
-            decode.refuse_lost(attempt, remedy)
-    recording = decode.decode_attempt(raw, out.parent, arguments.channel)
-    with decode.kept_in(raw, out):
+            attempts.refuse_lost(attempt, remedy)
+    recording = attempts.decode_attempt(raw, out.parent, arguments.channel)
+    with attempts.kept_in(raw, out):
         lost = write(out, recording, original=True)
     if not arguments.recover:
-        decode.mark_saved(raw, out)
+        attempts.mark_saved(raw, out)
     for note in (*recording.notes, *lost):
         print(f"pendpipe: {out}: {note}", file=sys.stderr)
     rate = recording.metadata["sample_rate_hz"]

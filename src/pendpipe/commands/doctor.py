@@ -180,7 +180,7 @@ def _undecoded(raw: Path) -> Iterator[Finding]:
         with table.open("rb") as stream:
             if stream.read(10) != b"# refused:":
                 return
-    from pendpipe.acquisition.decode import read_attempts
+    from pendpipe.acquisition.attempts import read_attempts
 
     call = "snakemake" if in_campaign else f"pendpipe acquire --recover {raw} --out {table}"
     problem, safe = f"there is no {table.name} of it", f"{call} makes it"

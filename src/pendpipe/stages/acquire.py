@@ -97,7 +97,7 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool, accept_sho
     InputError
         If nothing is kept and nothing can be recorded, or what is kept can't be decoded.
     """
-    from pendpipe.acquisition.decode import (
+    from pendpipe.acquisition.attempts import (
         accept,
         choose,
         decode_attempt,

@@ -9,7 +9,8 @@ binary words; one whose buffer overflows writes ``stop 01`` (02, 03) into its da
 import math
 from typing import ClassVar, Final
 
-from pendpipe.acquisition.drivers.base import Driver, Identity, WordDecoder
+from pendpipe.acquisition.drivers.base import Driver, Identity
+from pendpipe.acquisition.drivers.streams import plain_scans
 from pendpipe.errors import InputError
 
 _DI149_HZ: Final = 750_000
@@ -81,7 +82,13 @@ class DI155(
     """
 
 
-class DI2108(TextDriver, model="DI-2108", bits=16):
+class DI2108(
+    TextDriver,
+    model="DI-2108",
+    bits=16,
+    scans_of=staticmethod(plain_scans),
+    sends_stop_codes=True,
+):
     """The DI-2108: 8 channels, 16 bits, +-10 V, 160 kHz, in CDC mode.
 
     The rate is 60 MHz/(srate dec deca); the nearest one to be had is taken. Sources disagree
@@ -113,11 +120,6 @@ class DI2108(TextDriver, model="DI-2108", bits=16):
 
     def _start_stream(self) -> None:
         self.line.write(b"start\r")
-
-    @classmethod
-    def decoder(cls, channels: int) -> WordDecoder:
-        """Return a fresh decoder for scans of so many channels."""
-        return WordDecoder(channels, cls.bits)
 
     def _divisors(self, rate_hz: float) -> tuple[int, int, int]:
         """Find srate, dec and deca whose rate is nearest to `rate_hz`."""
