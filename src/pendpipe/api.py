@@ -459,7 +459,6 @@ def diagnose(
             "say together=True if they are of one pendulum; else diagnose them one by one",
         )
         refuse_if(fixed, "fixed", "nothing is held in several recordings", "leave it out")
-        refuse_if(torque, "restoring", "it is for one recording", "leave it out")
         if not isinstance(recording, Mapping):
             files = [
                 f"recording {number}" if isinstance(each, Recording) else each
@@ -471,6 +470,7 @@ def diagnose(
             list(recording),
             baseline=baseline,
             level=level,
+            restoring=torque,
             seed=seed,
             own=own,
             same_sensor=same_sensor,

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 import pendpipe as pp
+from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import Drag, Restoring
 from pendpipe.simulation.model import read_model, simulate
 
@@ -89,3 +92,21 @@ def test_a_drag_that_follows_the_speed_is_fitted_and_presumed() -> None:
     assert presumed == ["circular-error", "drag-form"]
     assert answer["verdict"] == "consistent"
     assert abs(fit["a"].value - 0.02) < 4.0 * fit["a"].sd
+
+
+@pytest.mark.parametrize(
+    "spoilt",
+    [
+        lambda time_s, angle: (time_s + 2e-5 * time_s**2, angle),  # fitted to turning points
+        lambda time_s, angle: (time_s, angle + 2e-5 * time_s),  # fitted with a zero that drifts
+        lambda time_s, angle: (time_s, np.where(time_s > 80.0, 0.9 * angle, angle)),  # to a part
+        lambda time_s, angle: (time_s, np.where(time_s == time_s[900], angle + 0.1, angle)),
+    ],
+    ids=["clock", "zero", "gain", "glitch"],
+)
+def test_what_is_found_never_leaves_more_of_the_readings_than_was_left_without_it(
+    spoilt: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]],
+) -> None:
+    plain = simulated(20.0, amplitude=0.3)
+    found = pp.diagnose(pp.Recording(*spoilt(plain.time_s, plain.values), "angle_rad"))
+    assert found.improved.residual_rms_rad <= found.baseline.residual_rms_rad

@@ -76,6 +76,13 @@ def test_shared_values_are_better_known_than_in_the_best_recording() -> None:
     assert found.to_dict()["improved"]["parameters"]["c"]["sd"] < best
 
 
+def test_a_torque_that_is_known_is_that_of_all() -> None:
+    pair = [swing(amplitude, 7) for amplitude in (0.05, 0.4)]
+    springs = pp.diagnose(pair, volts_per_radian=1.0, together=True, restoring="linear")
+    assert {each.restoring for each in (springs, *springs.alone)} == {"linear"}
+    assert "circular-error" not in {each.identifier for each in springs.effects}
+
+
 def test_each_release_is_predicted_from_the_others_within_its_band() -> None:
     for each in together("nothing").to_dict()["recordings"]:
         # 1000 readings: a fraction of 0.95 has a standard deviation of 0.007.

@@ -31,6 +31,7 @@ from pendpipe.arguments import (
 )
 from pendpipe.diagnosis.result import FILE_NAME, Diagnosis, not_analysable
 from pendpipe.diagnosis.run import diagnose_decay, diagnose_recording
+from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
 from pendpipe.files import check_output, distinct_names, make_folder, write_json, write_whole
@@ -196,10 +197,10 @@ def _diagnose_several(arguments: Arguments) -> int:
     """Diagnose recordings of one pendulum together."""
     from pendpipe.diagnosis.several import diagnose_several
 
-    for single in ("fix", "turning_points", "restoring"):
+    for single in ("fix", "turning_points"):
         option, given = f"--{single.replace('_', '-')}", getattr(arguments, single)
         refuse_if(
-            given not in (None, [], "auto"),
+            given not in (None, []),
             option,
             "it is for one recording",
             "give one FILE, or leave it out",
@@ -233,6 +234,7 @@ def _diagnose_several(arguments: Arguments) -> int:
         list(recordings),
         baseline=arguments.baseline,
         level=arguments.level,
+        restoring=_torque(arguments),
         seed=arguments.seed,
         same_sensor=arguments.same_sensor,
         own=arguments.own,
@@ -246,13 +248,17 @@ def _diagnose_several(arguments: Arguments) -> int:
     return FOUND if arguments.fail_on == joint.verdict else 0
 
 
+def _torque(arguments: Arguments) -> Restoring | None:
+    return None if arguments.restoring == "auto" else arguments.restoring
+
+
 def _outcome(arguments: Arguments, recording: Recording, **more: Any) -> Diagnosis:
     """Diagnose a recording, with the turning points of an earlier stage if given."""
     more |= {
         "baseline": arguments.baseline,
         "seed": arguments.seed,
         "level": arguments.level,
-        "restoring": None if arguments.restoring == "auto" else arguments.restoring,
+        "restoring": _torque(arguments),
         "place": arguments.file,
         "progress": _print_progress,
     }

@@ -25,6 +25,7 @@ from pendpipe.diagnosis.remainder import INCOMPLETE, Remainder, remainder_of
 from pendpipe.diagnosis.result import Finding
 from pendpipe.diagnosis.rivals import Rival
 from pendpipe.diagnosis.summary import COLOURED_NOISE
+from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue.reading import SoftClipping
@@ -258,6 +259,13 @@ def settled(
             break
         left, better = again, refine(fit.model, finer, again, better.value, held=held)
     return better, finer, left
+
+
+def catalogue_beside(restoring: Restoring | None) -> list[Effect]:
+    """Return the catalogue; without sin x where the torque is known."""
+    from pendpipe.effects.catalogue import CATALOGUE
+
+    return [each for each in CATALOGUE if not (restoring and each is circular_error)]
 
 
 def applicable(

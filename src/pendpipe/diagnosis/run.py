@@ -25,10 +25,10 @@ from pendpipe.diagnosis.forensics.colour import level_note, wander_note
 from pendpipe.diagnosis.forensics.corrections import loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.held_out import held_out
-from pendpipe.diagnosis.hypothesis import Hypothesis
+from pendpipe.diagnosis.hypothesis import Hypothesis, catalogue_beside
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.remainder import remainder_of
+from pendpipe.diagnosis.remainder import remainder_of, with_errors
 from pendpipe.diagnosis.result import (
     Diagnosis,
     FittedModel,
@@ -168,8 +168,6 @@ def diagnose_decay(
     InputError
         If a parameter can't be held, or the decay can't be analysed.
     """
-    from pendpipe.effects.catalogue import CATALOGUE
-
     fixed = fixed or {}
     check_fixed(fixed, baseline)
     samples = with_true_step(prepare(part, place))
@@ -182,7 +180,7 @@ def diagnose_decay(
         found = search(
             beginning,
             samples,
-            [each for each in CATALOGUE if not (restoring and each is circular_error)],
+            catalogue_beside(restoring),
             baseline=baseline,
             level=level,
             seed=seed,
@@ -205,7 +203,12 @@ def diagnose_decay(
     # With a red light the fit has lost the motion, which the search follows by its phase; and a
     # part of b that is held bounds b here alone.
     stands = fit is not None and fit.light != "red" and not beginning.model.parts
-    before = FittedModel.of_fit(fit) if fit and stands else _fitted_model(found.baseline, found)
+    before = _fitted_model(with_errors(found.baseline, found.data, found.noise), found)
+    if fit and stands:
+        printed = FittedModel.of_fit(fit)
+        of_all = fit.method == "waveform" and not fit.cuts and fit.zero_drift is None
+        # What it leaves of other readings, or beside a zero that drifts, compares with nothing.
+        before = printed if of_all else replace(before, parameters=printed.parameters)
     same = found.fit.value is found.baseline.value and found.fit.error_scale == 1.0
     law = law_of(found, weighed)
     after = before if same else _fitted_model(found.fit, found, law)

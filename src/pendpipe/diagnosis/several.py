@@ -23,7 +23,14 @@ from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.held_out import held_out
-from pendpipe.diagnosis.hypothesis import Hypothesis, Step, Task, loses_phase, price
+from pendpipe.diagnosis.hypothesis import (
+    Hypothesis,
+    Step,
+    Task,
+    catalogue_beside,
+    loses_phase,
+    price,
+)
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
@@ -48,6 +55,7 @@ from pendpipe.diagnosis.weighing import (
     with_other_descriptions,
 )
 from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import BASELINE, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
@@ -73,6 +81,7 @@ def diagnose_several(
     baseline: Baseline = "eq8",
     level: float = LEVEL,
     seed: int = 0,
+    restoring: Restoring | None = None,
     same_sensor: bool = False,
     own: Sequence[str] = (),
     provenance: Mapping[str, Any] | None = None,
@@ -84,7 +93,7 @@ def diagnose_several(
     ----------
     recordings, names
         At least two, and what to call them.
-    baseline, level, seed, provenance, progress
+    baseline, level, seed, restoring, provenance, progress
         As for `diagnose_recording`.
     same_sensor
         Whether the sensor's errors are the same in all.
@@ -108,7 +117,13 @@ def diagnose_several(
         progress(f"{name} alone")
         outcomes.append(
             diagnose_recording(
-                recording, baseline=baseline, level=level, seed=seed, place=name, progress=progress
+                recording,
+                baseline=baseline,
+                level=level,
+                seed=seed,
+                restoring=restoring,
+                place=name,
+                progress=progress,
             )
         )
     if len({_search(outcome).data.unit for outcome in outcomes}) > 1:
@@ -120,6 +135,7 @@ def diagnose_several(
             baseline=baseline,
             level=level,
             seed=seed,
+            restoring=restoring,
             same_sensor=same_sensor,
             own=own,
             progress=progress,
@@ -320,6 +336,7 @@ def search_together(
     baseline: str,
     level: float,
     seed: int,
+    restoring: Restoring | None = None,
     same_sensor: bool,
     own: Sequence[str],
     progress: Progress,
@@ -330,7 +347,7 @@ def search_together(
     ----------
     outcomes
         Of each recording alone.
-    baseline, level, seed, progress
+    baseline, level, seed, restoring, progress
         As in a single diagnosis.
     same_sensor
         Whether the sensor's errors have the same sizes in all.
@@ -367,7 +384,7 @@ def search_together(
         if name not in own
         for number in range(len(searches) == 2, len(searches))
     ]
-    task = Task(CATALOGUE, differing, baseline, level, seed, progress)
+    task = Task(catalogue_beside(restoring), differing, baseline, level, seed, progress)
     state = Hypothesis(beginning, fit, data, noise, tuple(held), fit).settle(fit)
     state = _known_first(state, task, searches)
     return swap_in_likelier(grown(state, task), progress)
