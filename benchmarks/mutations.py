@@ -204,7 +204,7 @@ def main() -> None:
     first, journal = trees.queue[0], PLACE / f"{commit}.jsonl"
     every = listed(first, PLACE / f"{commit}.sqlite")
     lines = journal.read_text("utf-8").splitlines() if journal.exists() else []
-    known: dict[str, str] = {text: by for text, by in map(json.loads, lines)}
+    known: dict[str, str] = dict(map(json.loads, lines))
     chosen: list[Mutation] = []
     print(f"{len(every)} mutations of {commit[:12]}", flush=True)
     for mutation, why in drawn(first, every, commit):
