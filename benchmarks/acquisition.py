@@ -24,6 +24,7 @@ from benchmarks.faulty_device import Fault, FaultyPath
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.drivers import DRIVERS, find_driver
+from pendpipe.acquisition.drivers.streams import marked_scans
 from pendpipe.acquisition.raw import read_raw
 from pendpipe.acquisition.recorder import acquire_simulated
 from pendpipe.errors import InputError
@@ -72,7 +73,7 @@ def one_fault(random: np.random.Generator, model: str, label: str) -> tuple[bool
 def fault_table() -> str:
     """Count, over all families of devices; what a protocol can't mark, no decoder sees."""
     random = np.random.default_rng(20261121)
-    marked = {m: m in ("di154", "di194", "di149", "di155", "di245") for m in DRIVERS}
+    marked = {m: find_driver(m).scans_of is marked_scans for m in DRIVERS}
     cells = [(m, k) for m in DRIVERS for k in KINDS if not (marked[m] and "stop" in k)]
     tally = defaultdict(list)
     for model, label in cells:
