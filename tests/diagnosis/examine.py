@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
-from pendpipe.diagnosis.forensics import TESTS
+from pendpipe.diagnosis.forensics import FINDERS
 from pendpipe.diagnosis.result import Finding
 
 from .decays import Fitted
 
 _SURE = 1e-3
 """p-value from which a finding's readings are left out of the tests that follow."""
+
+
+def _made(name: str) -> Callable[..., Finding]:
+    """Make the tests for one fault: what the first says that can be made."""
+    finds = [finder.find for finder in FINDERS if finder.name == name]
+
+    def make(*given: Any) -> Finding:
+        found = (find(*given) for find in finds)
+        return next((each for each in found if each is not None), Finding(name, 1.0))
+
+    return make
+
+
+TESTS = {finder.name: _made(finder.name) for finder in FINDERS}
+"""By name of a fault, its test."""
 
 
 def examine(record: Fitted) -> list[Finding]:

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.forensics import TESTS
 from pendpipe.diagnosis.forensics.codes import spacing_of, with_true_step
 from pendpipe.diagnosis.forensics.converter import worst_comb
 from pendpipe.diagnosis.result import Finding
@@ -21,6 +20,7 @@ from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.recording import Recording
 
 from .decays import fitted, rounded
+from .examine import TESTS
 from .faults import AIR, STEP_16, white
 
 

@@ -11,8 +11,8 @@ import pytest
 from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.detect import Detection
-from pendpipe.diagnosis.faults import correct, examine_again
-from pendpipe.diagnosis.hypothesis import Fault, Hypothesis, Task, is_gross
+from pendpipe.diagnosis.faults import correct
+from pendpipe.diagnosis.hypothesis import Hypothesis, Task, is_gross
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
@@ -50,7 +50,7 @@ def blamed(error: float, odd: int = ODD) -> tuple[Task, Hypothesis]:
     data = data.masked(mask)
     noise = white_noise(data, NOISE_RAD)
     fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
-    faults = (Fault(Finding("glitches", 1e-9, mask=mask), 1e-7, 0, mask),)
+    faults = (Finding("glitches", 1e-7, mask=mask),)
     samples = prepare(Recording(TIME_S, readings, "angle_rad"), "the test")
     state = hypothesis_of(fit, data, noise, (), fit, samples, faults=faults, first=NOTHING)
     return task_of(samples), state
@@ -59,7 +59,7 @@ def blamed(error: float, odd: int = ODD) -> tuple[Task, Hypothesis]:
 @pytest.mark.parametrize("error", [0.5, 3.0, -3.5])
 def test_a_reading_that_noise_explains_in_the_end_returns(error: float) -> None:
     task, before = blamed(error)
-    state = examine_again(before, task)
+    state = correct(before, task)
     assert state.faults == ()
     assert state.data.used == len(TIME_S)
     assert np.array_equal(state.noise.weight, state.data.weight)
@@ -71,13 +71,13 @@ def test_a_reading_that_noise_explains_in_the_end_returns(error: float) -> None:
 @pytest.mark.parametrize("error", [12.0, -30.0])
 def test_a_reading_that_nothing_explains_stays_out_and_is_measured_anew(error: float) -> None:
     task, state = blamed(error)
-    state = examine_again(state, task)
+    state = correct(state, task)
     (fault,) = state.faults
     assert state.data.weight[ODD] == 0.0
     assert state.data.used == len(TIME_S) - 1
     assert fault.p_value < LEVEL
     assert state.p_value == fault.p_value
-    largest = fault.finding.parameters["largest"].value
+    largest = fault.parameters["largest"].value
     assert largest == pytest.approx(error * NOISE_RAD, abs=2.0 * NOISE_RAD)
 
 
@@ -110,7 +110,7 @@ def test_glitches_are_masked_before_a_model_that_is_far_off_is_mended() -> None:
     begun = hypothesis_of(fit, data, noise, (OMEGA,), fit, right.samples)
     state = correct(begun, task)
     (fault,) = state.faults
-    assert fault.finding.identifier == "glitches"
+    assert fault.identifier == "glitches"
     assert np.flatnonzero(state.data.weight == 0.0).tolist() == wild
 
 

@@ -10,13 +10,13 @@ import pytest
 
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.forensics import TESTS
 from pendpipe.diagnosis.forensics.colour import level_note
-from pendpipe.diagnosis.forensics.corrections import find_lost_samples
+from pendpipe.diagnosis.forensics.lost_samples import find_lost_samples
 from pendpipe.diagnosis.forensics.tails import Tail, fit_tail, tail_of_squares
 from pendpipe.diagnosis.hypothesis import settled
 
 from .decays import Fitted, Pendulum, fitted, rounded
+from .examine import TESTS
 from .faults import AIR, NOISES, STEP_16, Noisy, null, smoothed
 
 _RECORDS = 6

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.forensics import TESTS
 
 from .decays import Fitted, Pendulum, fitted
+from .examine import TESTS
 from .faults import AIR, FAULTS
 
 

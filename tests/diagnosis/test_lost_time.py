@@ -10,7 +10,7 @@ import pytest
 
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.forensics.corrections import loss_confirmed
+from pendpipe.diagnosis.forensics.lost_samples import loss_confirmed
 from pendpipe.diagnosis.result import Confirmation
 
 OMEGA, LOSS, AT = 5.3, 0.006, 31.0

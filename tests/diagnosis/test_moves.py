@@ -14,10 +14,8 @@ from scipy.interpolate import CubicSpline
 from pendpipe.analysis.turning_points.measure import prepare as prepare_samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import silent
-from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import Lead
-from pendpipe.diagnosis.faults import SLIPS, _examined, _slips
-from pendpipe.diagnosis.forensics import TESTS, corrections
+from pendpipe.diagnosis.faults import _applied
 from pendpipe.diagnosis.hypothesis import CHOICE, FURTHER, Hypothesis, Step, price
 from pendpipe.diagnosis.moves import describe, improve
 from pendpipe.diagnosis.refine import Fit, refine
@@ -314,9 +312,7 @@ def test_a_rare_name_that_looks_like_nothing_that_was_found_is_no_rival() -> Non
 
 @pytest.mark.parametrize("names", [(), ("sensor-quadratic",)])
 @pytest.mark.parametrize("name", ["jitter", "broadband-drive", "clipping"])
-def test_a_random_cause_pays_the_price_of_a_name(
-    name: str, names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_random_cause_pays_the_price_of_a_name(name: str, names: tuple[str, ...]) -> None:
     """Beside one name more than beside none; a fault that shows by itself pays nothing."""
     readings = with_effects(*names) + white(5)
     samples = prepare_samples(recording(readings, 6), "the test")
@@ -324,9 +320,10 @@ def test_a_random_cause_pays_the_price_of_a_name(
     least = {"clipping": 0.0}.get(name, FURTHER if names else CHOICE)
     for gain, told in ((least - 1.0, least == 0.0), (least + 1.0, True)):
         finding = Finding(name, 1e-9, gain)
-        monkeypatch.setitem(TESTS, name, lambda *_, finding=finding: finding)
-        after, _ = _examined(name, state, task_of(samples))
-        assert [fault.finding.identifier for fault in after.faults] == [name] * told
+        after = _applied(finding, state, task_of(samples))
+        assert [fault.identifier for fault in (after.state.faults if after else ())] == [
+            name
+        ] * told
 
 
 @pytest.mark.parametrize("times", [3.0, 10.0])
@@ -352,27 +349,3 @@ def test_a_name_is_tried_on_credit_if_it_takes_a_good_part_of_the_misfit(
     step = Step((Rival(lead, state.fit, part * excess, worth, worth),), 0.0, state.fit)
     assert worth < CHOICE
     assert _on_trial(step, state) == tried
-
-
-def test_slips_are_looked_for_again_once_the_misfit_has_halved(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Each search is long, and finds what it found before."""
-    asked: list[str] = []
-
-    def nothing_found(name: str, data: Data, *_: object) -> tuple[Data, Finding]:
-        asked.append(name)
-        return data, Finding(name, 1.0)
-
-    monkeypatch.setattr(corrections, "find_slips", nothing_found)
-    whole, part = (
-        state_with(other_engine(TRUTH) + share * (pulled() - other_engine(TRUTH)) + white(6))
-        for share in (3.0, 1.5)
-    )
-    samples = prepare_samples(recording(whole.data.values, 6), "the test")
-    state, task = replace(whole, samples=samples), task_of(samples)
-    for _ in range(3):
-        state = _slips(state, task)
-    assert asked == [*SLIPS]
-    _slips(replace(state, fit=part.fit, data=part.data, noise=part.noise), task)
-    assert asked == [*SLIPS, *SLIPS]

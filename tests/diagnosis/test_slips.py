@@ -12,7 +12,8 @@ from scipy.integrate import solve_ivp
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics import corrections
+from pendpipe.diagnosis.faults import _with
+from pendpipe.diagnosis.forensics import slips
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.result import Finding
@@ -121,7 +122,10 @@ def found(name: str, samples: Samples) -> tuple[Data, Finding]:
         time_noise=samples.counts,
         noise_rms=samples.noise_rms,
     )
-    return corrections.find_slips(name, data, fit_of(data), samples)
+    find = slips.find_clock if name == "clock-slips" else slips.find_counts
+    noise = white_noise(data, 2e-4)
+    finding = find(data, fit_of(data), noise, samples) or Finding(name, 1.0)
+    return _with(finding, data), finding
 
 
 def clocked(swing: Swing, rows: IntArray, sizes: FloatArray, seed: int) -> Samples:
@@ -157,7 +161,7 @@ def test_a_clock_slips_by_whole_samples_or_it_is_no_slip(swing: Swing, whole: bo
 def test_steps_of_any_size_are_seldom_whole(number: int) -> None:
     sizes = np.random.default_rng(number).uniform(0.5, 3.5, (4000, number))
     rows = np.arange(number)
-    p_values = np.array([corrections.Slips(rows, each).p_value for each in sizes])
+    p_values = np.array([slips.Slips(rows, each).p_value for each in sizes])
     for level in (0.05, 0.01):
         assert 0.5 * level < np.mean(p_values < level) < 1.5 * level
 

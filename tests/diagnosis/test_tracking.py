@@ -10,7 +10,7 @@ from scipy.stats import kstest
 
 from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.forensics.corrections import rows_of, wander, wander_confirmed
+from pendpipe.diagnosis.forensics.tracking import rows_of, wander, wander_confirmed
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.formats import read
 from pendpipe.recording import Recording, read_plain, write_plain

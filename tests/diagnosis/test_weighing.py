@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from pendpipe.diagnosis.detect import Chance, Lead, Trials
-from pendpipe.diagnosis.hypothesis import Fault
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Diagnosis, Finding
 from pendpipe.diagnosis.rivals import Rival, Scale, class_width, evidence, probabilities
@@ -188,7 +187,7 @@ def test_a_random_cause_is_no_more_probable_than_the_names_beside_it(
 ) -> None:
     """It takes what a wrong name leaves; what the codes show it does not touch."""
     found, probable = jumped().search, np.array([1.0 - none, none])
-    fault = Fault(Finding(name, 1e-9, delta_chi2=100.0), 1e-7)
+    fault = Finding(name, 1e-7, delta_chi2=100.0)
     given = [weigh(found, step)._replace(weights=probable) for step in found.steps]
     sure = [each._replace(weights=np.array([1.0, 0.0])) for each in given]
     ratio = (
@@ -201,9 +200,9 @@ def test_a_random_torque_that_explains_no_more_than_a_smooth_misfit_is_not_confi
     """What a law lacks changes amplitude and phase too."""
     found = jumped().search
     margins = (math.inf, 10.0, 0.0, -10.0)
-    findings = [Finding("broadband-drive", 1e-9, 100.0, margin=margin) for margin in margins]
+    findings = [Finding("broadband-drive", 1e-7, 100.0, margin=margin) for margin in margins]
     sure = [weigh(found, step)._replace(weights=np.array([1.0, 0.0])) for step in found.steps]
-    chances = [fault_named(found, Fault(each, 1e-7), sure).probability for each in findings]
+    chances = [fault_named(found, each, sure).probability for each in findings]
     assert chances == sorted(chances, reverse=True)
     assert chances[1] > 0.98 * chances[0]
     assert chances[2] < 0.5

@@ -7,12 +7,11 @@ each of figures 3 to 10 is written all the same, with the reason in its place.
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import Arguments, tell
+from pendpipe.arguments import OUTPUTS, Arguments, shared, tell
 from pendpipe.files import write_json
 from pendpipe.manifest import job
-from pendpipe.options import OUTPUTS, flags
 
-ARGUMENTS: Final = flags("--campaign", "--comparison", required=True) | {
+ARGUMENTS: Final = shared("--campaign", "--comparison", required=True) | {
     "--out": {
         "required": True,
         "type": Path,

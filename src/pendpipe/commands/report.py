@@ -8,12 +8,11 @@ campaign's numbers go to standard output too, beside the paper's and the simulat
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import Arguments, tell
-from pendpipe.options import INPUT, OUTPUT, flags
+from pendpipe.arguments import INPUT, OUTPUT, Arguments, shared, tell
 
 ARGUMENTS: Final = {
-    **flags("--campaign", required=True),
-    **flags("--comparison"),
+    **shared("--campaign", required=True),
+    **shared("--comparison"),
     "--summary": {
         "type": Path,
         "metavar": "FILE",

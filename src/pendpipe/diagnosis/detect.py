@@ -563,7 +563,7 @@ def _tone_leads(
         found = []
         for scan, scores, p_values in zip(scanner.scans, tones, local, strict=True):
             # Beyond 10^-308 all p-values are zero: there the scores decide.
-            index = int(np.lexsort((-scores, p_values))[0])
+            index = int(np.argmax(np.where(p_values == p_values.min(), scores, -np.inf)))
             shape = effect.tone(float(scan.frequency_hz[index]), scan.decay_s)
             if shape is not None:
                 trials = Trials(0.5 * len(scores), 0.0)

@@ -1,304 +1,165 @@
-"""Faults of the measurement within a search: tested, corrected and reported.
+"""Faults of the measurement within a search: one loop applies the finding that pays most.
 
-One lost sample changes chi^2 more than most physics. So faults that can corrupt the fit are
-tested before the catalogue, and those that only small residuals reveal after it. Tests are
-functions from a hypothesis to a better one; what is not significant leaves it as it is.
+One lost sample changes chi^2 more than most physics. So what can corrupt the fit is tested before
+the catalogue is, and what only small residuals reveal after it (`Finder.last`). Each round makes
+every test that the model is good enough for; the finding that gains most is applied, and the model
+fitted again, until none pays. A finding that no longer pays with a better model goes the same way.
 """
 
 import math
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.arrays import BoolArray
+from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data, at_even_times
 from pendpipe.diagnosis.detect import TESTS_SHARE
-from pendpipe.diagnosis.forensics import TESTS, Test, corrections
-from pendpipe.diagnosis.forensics.glitches import find_in_misfit
-from pendpipe.diagnosis.hypothesis import (
-    RANDOM,
-    Fault,
-    Hypothesis,
-    Task,
-    is_further,
-    is_gross,
-    loses_phase,
-    price_of_another,
-)
+from pendpipe.diagnosis.forensics import FINDERS, RANDOM_TORQUE, Finder
+from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Task, is_further, price_of_another
 from pendpipe.diagnosis.instants import with_better_instants
-from pendpipe.diagnosis.noise import white_noise
-from pendpipe.diagnosis.refine import SETTLED, refine
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.refine import SETTLED, Fit, refine
 from pendpipe.diagnosis.remainder import remainder_of
-from pendpipe.diagnosis.result import Finding, Location
+from pendpipe.diagnosis.result import Finding
 from pendpipe.diagnosis.rivals import Rival
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.estimate import Estimate
 
-_TESTED_BEFORE: Final = ("clipping", "glitches")
-_TESTED_AFTER: Final = (
-    "missing-codes",
-    "coarse-quantisation",
-    "jitter",
-    "coloured-noise",
-    "broadband-drive",
-)
-_SHARE_OF_EACH: Final = TESTS_SHARE / (len(_TESTED_BEFORE) + len(_TESTED_AFTER))
-_ROUNDS: Final = 3
-_CLEAN_CHI2: Final = 1.3
-"""Largest chi^2 per degree of freedom at which the fine tests are made."""
-_IN_PHASE: Final = 0.3
-"""Largest phase error in rad at which residuals reveal errors of the time stamps."""
-SLIPS: Final = {"count-slips": 3.0, "clock-slips": _IN_PHASE}
-"""Slips that are looked for, and the largest phase error in rad: the level hardly depends on it."""
+_ANY: Final = 7
+"""Tests that are made on any recording; others need uneven stamps, a tracked mark, or a misfit."""
+_SHARE_OF_EACH: Final = TESTS_SHARE / _ANY
+_MOST_ROUNDS: Final = 12
+
+
+class Applied(NamedTuple):
+    """A hypothesis with a finding applied, or withdrawn, what that gains, and what is said."""
+
+    gain: float
+    state: Hypothesis
+    said: str
 
 
 def correct(state: Hypothesis, task: Task) -> Hypothesis:
-    """Correct what would corrupt the fit: time stamps, lost samples, clipping, glitches."""
-    if state.samples is None:
+    """Correct what corrupts the fit: time stamps, lost samples, clipping, glitches."""
+    if state.tested is state.fit:
         return state
-    for find in (_even_times, _lost_samples, _tracking, _slips):
-        state = find(state, task)
-    if is_gross(state.fit, state.data):
-        return _examined("glitches", state, task, find_in_misfit)[0]
-    for name in _TESTED_BEFORE:
-        for _ in range(_ROUNDS):
-            state, again = _examined(name, state, task)
-            if not again:
-                break
-    return state
+    state = _with_findings(state, task, last=False)
+    return replace(state, tested=state.fit)
 
 
 def examine(state: Hypothesis, task: Task) -> Hypothesis:
-    """Make the tests that need a clean residual: a misfit could look like any fault."""
-    if state.samples is None:
-        return state
-    # Dead bits show in the codes themselves, whatever the model.
-    dead = state.samples.promised_step is not None
-    tests: tuple[str, ...] = ("coarse-quantisation",) if dead else ()
-    if not is_gross(state.fit, state.data) and state.fit.chi2 <= _CLEAN_CHI2 * state.data.used:
-        tests = _TESTED_AFTER
-    known = [fault.finding.identifier for fault in state.faults]
-    for name in [name for name in tests if name not in known]:
-        state, _ = _examined(name, state, task)
+    """Make the tests that need the final model: any misfit could look like what they find."""
+    return _with_findings(state, task, last=True)
+
+
+def _with_findings(state: Hypothesis, task: Task, *, last: bool) -> Hypothesis:
+    """Apply the finding that pays most, and fit again, until none pays."""
+    for _ in range(_MOST_ROUNDS if state.samples is not None else 0):
+        found = [
+            finding
+            for finder in FINDERS
+            if finder.last is last
+            and (finder.repeats or _known(finder.name, state) is None)
+            and finder.may_ask(state.data, state.fit)
+            and (finding := _asked(finder, state, task)) is not None
+        ]
+        better = [after for each in found if (after := _applied(each, state, task)) is not None]
+        if not better:
+            return _measured_anew(found, state, task)
+        _, state, said = max(better, key=lambda after: after.gain)
+        task.progress(said)
     return state
 
 
-def _examined(
-    name: str, state: Hypothesis, task: Task, test: Test | None = None
-) -> tuple[Hypothesis, bool]:
-    """Make one test and keep its finding; return whether to repeat it."""
-    assert state.samples is not None
-    finding = (test or TESTS[name])(state.data, state.fit, state.noise, state.samples)
-    p_value = _global(finding)
-    known = next((each for each in state.faults if each.finding.identifier == name), None)
-    if finding.kind != "fault":
-        return state, False
-    pays = _pays(finding, state)
-    if p_value > task.level or not pays:
-        # What does not pay its price is no more than chance, whatever its p-value.
-        least = p_value if pays else max(p_value, task.level)
-        return (state if known else _unremarkable(state, name, least)), False
-    task.progress(f"{name}: {finding.summary}")
-    if known is None:
-        known = Fault(finding, p_value, len(state.steps), finding.mask)
-        state = replace(state, faults=(*state.faults, known))
-    if finding.mask is None or not np.any(finding.mask & (state.data.weight > 0.0)):
-        return state, False
-    if known.mask is not None:
-        more = replace(known, mask=known.mask[: len(state.data)] | finding.mask)
-        state = replace(state, faults=_exchanged(state, known, more))
-    return _refit(state, (state.data.weight == 0.0) | finding.mask), True
+def _asked(finder: Finder, state: Hypothesis, task: Task) -> Finding | None:
+    """Make a test on the readings, with what its earlier finding left out or took off put back."""
+    data, fit, noise = state.data, state.fit, state.noise
+    samples = task.samples if finder.as_recorded else state.samples
+    known = _known(finder.name, state)
+    if known is not None:
+        data = _without(known, data)
+        noise = replace(noise, weight=data.weight)
+        if data.used > state.data.used and any(effect.local for effect in fit.model.effects):
+            # Without the readings about it an instant is known less well.
+            fit = refine(fit.model, data, noise, fit.value, held=state.held)
+            fit = with_better_instants(fit, data, noise, state.held)
+    finding = finder.find(data, fit, noise, samples) if samples is not None else None
+    if finding is None:
+        return None
+    p_value = min(finding.p_value / _SHARE_OF_EACH, 1.0)
+    return replace(finding, p_value=p_value, after=known.after if known else len(state.steps))
 
 
-def _unremarkable(state: Hypothesis, name: str, p_value: float) -> Hypothesis:
-    """Keep the p-value of a test that found nothing: the record is no less likely than that."""
-    least = min(p_value, state.quiet.get(name, 1.0))
-    return replace(state, quiet={**state.quiet, name: least})
+def _known(name: str, state: Hypothesis) -> Finding | None:
+    """Return an earlier finding of a test, unless it moved the times: those stay."""
+    found = (each for each in state.faults if each.identifier == name)
+    return next((each for each in found if each.time_s is None), None)
 
 
-def _exchanged(state: Hypothesis, known: Fault, *others: Fault) -> tuple[Fault, ...]:
-    """Return the faults with others in the place of one."""
-    at = next(number for number, each in enumerate(state.faults) if each is known)
-    return (*state.faults[:at], *others, *state.faults[at + 1 :])
+def _without(finding: Finding, data: Data) -> Data:
+    """Put back what a finding left out, or took off."""
+    count = len(data)
+    if finding.mask is not None:
+        data = replace(data, weight=np.where(finding.mask[:count], 1.0, data.weight))
+    if finding.taken is not None:
+        data = replace(data, values=data.values + finding.taken[:count])
+    return data
 
 
-def examine_again(state: Hypothesis, task: Task) -> Hypothesis:
-    """Repeat, with the final model, the tests that masked readings.
-
-    A misfit of the motion (or another fault) displaces readings in a local fit. With complete
-    physics in the model they may be as good as any.
-    """
-    if state.samples is None:
-        return state
-    for fault in [fault for fault in state.faults if fault.mask is not None]:
-        if is_gross(state.fit, state.data):
-            break
-        state = _tested_again(fault, state, task)
-    return state
+def _with(finding: Finding, data: Data) -> Data:
+    """Leave out, take off and give other times as a finding says."""
+    if finding.mask is not None:
+        data = data.masked((data.weight == 0.0) | finding.mask)
+    if finding.taken is not None:
+        data = replace(data, values=data.values - finding.taken)
+    return data if finding.time_s is None else at_even_times(data, finding.time_s)
 
 
-def _tested_again(fault: Fault, state: Hypothesis, task: Task) -> Hypothesis:
-    name, masked = fault.finding.identifier, state.data
-    assert fault.mask is not None
-    assert state.samples is not None
-    others = (masked.weight == 0.0) & ~fault.mask[: len(masked)]
-    whole = replace(masked, weight=np.where(others, 0.0, 1.0))
-    noise, fit = replace(state.noise, weight=whole.weight), state.fit
-    if any(effect.local for effect in fit.model.effects):
-        # Without the readings about it an instant is known less well.
-        fit = refine(fit.model, whole, noise, fit.value, held=state.held)
-        fit = with_better_instants(fit, whole, noise, state.held)
-    finding = TESTS[name](whole, fit, noise, state.samples)
-    p_value = _global(finding)
-    if p_value > task.level or finding.mask is None:
-        task.progress(f"{name}: no longer needed with the final model")
-        state = replace(
-            state, faults=_exchanged(state, fault), quiet={**state.quiet, name: p_value}
-        )
-        return _refit(state, others)
-    anew = Fault(finding, p_value, fault.after, finding.mask)
-    state = replace(state, faults=_exchanged(state, fault, anew))
-    if np.any((others | finding.mask) != (masked.weight == 0.0)):
-        return _refit(state, others | finding.mask)
-    return state
-
-
-def _even_times(state: Hypothesis, task: Task) -> Hypothesis:
-    """Use the times of a regular clock if the readings agree better with it."""
-    if state.fit.max_phase_error_rad > _IN_PHASE or state.clock_notes:
-        return state
-    assert state.samples is not None
-    finding = TESTS["time-stamps"](state.data, state.fit, state.noise, state.samples)
-    if finding.time_s is None or finding.p_value > task.level * _SHARE_OF_EACH:
-        return state
-    data = at_even_times(state.data, finding.time_s)
-    noise = white_noise(data, state.noise.white_rms)
-    model = state.fit.model.at_times(data.time_s)
-    fit = refine(model, data, noise, state.fit.value, held=state.held)
-    if fit.chi2 / data.used > state.fit.chi2 / state.data.used:
-        return state
-    task.progress(finding.summary)
-    noted = replace(state, clock_notes=(*state.clock_notes, finding.summary))
-    return noted.settle(fit, data, noise)
-
-
-def _lost_samples(state: Hypothesis, task: Task) -> Hypothesis:
-    """Correct the times of the readings after lost samples."""
+def _applied(finding: Finding, state: Hypothesis, task: Task) -> Applied | None:
+    """Apply a finding that is significant and pays, withdraw one that does no more."""
+    known, others = _known(finding.identifier, state), state.faults
+    if finding.kind == "property" and known is None:
+        return None
     data = state.data
-    interval = data.interval_s / data.fold
-    lost = corrections.find_lost_samples(data, state.fit)
-    if not lost:
-        return state
-    time = data.time_s.copy()
-    for each in lost:
-        time[data.time_s >= each.time_s - 1e-9] += each.number * interval
-    number = sum(each.number for each in lost)
-    found = Finding(
-        "dropped-samples",
-        0.0,
-        parameters={
-            "d": Estimate(number * interval, 0.0, "s"),
-            "samples": Estimate(float(number), 0.0, ""),
-        },
-        location=Location(time_s=(lost[0].time_s, lost[-1].time_s)),
-        summary="samples were lost at "
-        + ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6]),
-    )
-    rows = np.searchsorted(data.time_s, [each.time_s - 1e-9 for each in lost])
-    weight = corrections.weight_beside(data, rows)
-    corrected = replace(data, time_s=time, uniform=False, weight=weight)
-    return corrected_by(state, task, corrected, found, least=0.1 * state.fit.chi2)
-
-
-def _tracking(state: Hypothesis, task: Task) -> Hypothesis:
-    """Take the wander of a tracked mark from the readings: more with each better model."""
-    if loses_phase(state.fit) or task.samples is None:
-        return state
-    known = [f for f in state.faults if f.finding.identifier == corrections.TRACKING_NOISE]
-    taken = known[0].finding.parameters["kappa"].value if known else 0.0
-    corrected, finding = corrections.find_wander(state.data, state.fit, task.samples, taken)
-    kappa = finding.parameters.get("kappa")
-    if kappa is None or abs(kappa.value - taken) < kappa.sd:
-        return state
-    gained = sum(fault.finding.delta_chi2 for fault in known)
-    after = corrected_by(state, task, corrected, replace(finding, delta_chi2=gained))
-    if after is state:
-        return state
-    return replace(after, faults=tuple(each for each in after.faults if each not in known))
-
-
-def _slips(state: Hypothesis, task: Task) -> Hypothesis:
-    """Correct the values of an encoder that loses counts, or the times of a slipping clock.
-
-    Where none were found they are looked for again once the squares left have halved.
-    """
-    # Slips that go on and on are as steady as noise, but never white.
-    if state.fit.chi2 <= _CLEAN_CHI2 * state.data.used and not state.noise.coloured:
-        return state
-    assert state.samples is not None
-    left = float(np.sum((state.data.residual(state.fit.at.reading) * state.data.weight) ** 2))
-    for name, most in SLIPS.items():
-        if (
-            state.fit.max_phase_error_rad > most
-            or any(fault.finding.identifier == name for fault in state.faults)
-            or left > 0.5 * state.squares.get(name, math.inf)
-        ):
-            continue
-        state = replace(state, squares={**state.squares, name: left})
-        assert state.samples is not None
-        corrected, finding = corrections.find_slips(name, state.data, state.fit, state.samples)
-        state = corrected_by(state, task, corrected, finding)
-    return state
-
-
-def corrected_by(
-    state: Hypothesis, task: Task, corrected: Data, finding: Finding, least: float = SETTLED
-) -> Hypothesis:
-    """Keep a significant finding and its correction if chi^2 falls by more than `least`."""
-    model, p_value = state.fit.model, _global(finding)
-    if p_value > task.level:
-        return state
-    if corrected.time_s is not state.data.time_s:
-        model = model.at_times(corrected.time_s)
-    noise = replace(state.noise, weight=corrected.weight)
-    before = replace(state.data, weight=corrected.weight)
+    if known is not None:
+        others = tuple(each for each in others if each is not known)
+        data = _without(known, data)
+    if finding.p_value > task.level or not _pays(finding, state):
+        if known is None:
+            return None
+        said = f"{finding.identifier}: no longer needed with the final model"
+        return Applied(math.inf, _settled(data, state, others), said)
+    if finding.taken is None and finding.time_s is None:
+        return _left_out(finding, state, _with(finding, data), others)
+    data = _with(finding, data)
+    before = replace(state.data.first(len(data)), weight=data.weight)
     try:
-        fit = refine(model, corrected, noise, state.fit.value, held=state.held)
-        as_it_was = refine(state.fit.model, before, noise, state.fit.value, held=state.held)
+        fit, noise = _refined(data, state)
+        gain = _refined(before, state)[0].chi2 - fit.chi2
     except NoMotionError:
-        return state  # the model comes to rest before the corrected times
-    gain = as_it_was.chi2 - fit.chi2
-    if gain <= least:
-        return state
-    task.progress(finding.summary)
-    found = replace(finding, delta_chi2=finding.delta_chi2 + gain)
-    # The later tests look at the values as they were recorded.
-    samples = state.samples
-    assert samples is not None
-    row = np.searchsorted(state.data.time_s, samples.time_s, side="right") - 1
-    lost = (state.data.values - corrected.values)[np.maximum(row, 0)]
-    after = replace(
-        state,
-        samples=replace(samples, values=samples.values - lost),
-        faults=(*state.faults, Fault(found, p_value, len(state.steps))),
-    )
-    return after.settle(fit, corrected, noise)
+        return None  # the model comes to rest before the corrected times
+    if gain <= max(finding.price, SETTLED):
+        return None
+    if finding.kind == "note":
+        after = replace(state, clock_notes=(*state.clock_notes, finding.summary))
+    else:
+        gains = gain + (known.delta_chi2 if known else 0.0)
+        found = replace(finding, delta_chi2=finding.delta_chi2 + gains)
+        after = replace(state, faults=(*others, found))
+    after = _less(before.values - data.values, before.time_s, after)
+    return Applied(gain, after.settle(fit, data, noise), finding.summary)
 
 
-def random_torque(state: Hypothesis, rival: Rival, task: Task) -> Hypothesis | None:
-    """Test whether random kicks explain more than an effect that leaves more than noise."""
-    name = "broadband-drive"
-    if state.samples is None or not remainder_of(rival.fit, state.data, state.noise).systematic:
-        return None
-    finding = TESTS[name](state.data, state.fit, state.noise, state.samples)
-    p_value = _global(finding)
-    if p_value > task.level or not _pays(finding, state):
-        return None
-    if finding.delta_chi2 < rival.gain - rival.charge:
-        return None
-    task.progress(f"{name}: {finding.summary}")
-    return replace(state, faults=(*state.faults, Fault(finding, p_value, len(state.steps))))
+def _left_out(
+    finding: Finding, state: Hypothesis, data: Data, others: tuple[Finding, ...]
+) -> Applied | None:
+    """Report a finding, and leave out the readings that are wrong."""
+    said, faults = f"{finding.identifier}: {finding.summary}", (*others, finding)
+    if not np.array_equal(data.weight, state.data.weight):
+        return Applied(finding.delta_chi2, _settled(data, state, faults), said)
+    if len(others) < len(state.faults):
+        return None  # it is known
+    return Applied(finding.delta_chi2, replace(state, faults=faults), said)
 
 
 def _pays(finding: Finding, state: Hypothesis) -> bool:
@@ -306,18 +167,62 @@ def _pays(finding: Finding, state: Hypothesis) -> bool:
     if finding.identifier not in RANDOM:
         return True
     names = sum(map(is_further, state.steps))
-    names += sum(fault.finding.identifier in RANDOM for fault in state.faults)
+    names += sum(fault.identifier in RANDOM for fault in state.faults)
     return finding.delta_chi2 > price_of_another(names)
 
 
-def _global(finding: Finding) -> float:
-    """Return a global p-value, by the test's share of the level."""
-    return min(finding.p_value / _SHARE_OF_EACH, 1.0)
+def _refined(data: Data, state: Hypothesis) -> tuple[Fit, Noise]:
+    """Fit the model to other readings."""
+    model, noise = state.fit.model, replace(state.noise, weight=data.weight)
+    if data.time_s is not state.data.time_s:
+        model = model.at_times(data.time_s)
+    if len(data) < len(state.data):
+        noise = state.noise.first(len(data), data.weight)
+    return refine(model, data, noise, state.fit.value, held=state.held), noise
 
 
-def _refit(state: Hypothesis, out: BoolArray) -> Hypothesis:
-    """Refit without the readings that are `out`, and with all others."""
-    data = replace(state.data, weight=np.where(out, 0.0, 1.0))
-    noise = replace(state.noise, weight=data.weight)
-    fit = refine(state.fit.model, data, noise, state.fit.value, held=state.held)
-    return state.settle(fit, data, noise)
+def _settled(data: Data, state: Hypothesis, faults: tuple[Finding, ...]) -> Hypothesis:
+    """Return the hypothesis with other readings and findings, and its noise estimated anew."""
+    fit, noise = _refined(data, state)
+    return replace(state, faults=faults).settle(fit, data, noise)
+
+
+def _less(taken: FloatArray, time_s: FloatArray, state: Hypothesis) -> Hypothesis:
+    """Take off the recorded readings, which later tests look at, what was taken off these."""
+    samples = state.samples
+    if samples is None or not np.any(taken):
+        return state
+    row = np.searchsorted(time_s, samples.time_s, side="right") - 1
+    values = samples.values - taken[np.maximum(row, 0)]
+    return replace(state, samples=replace(samples, values=values))
+
+
+def _measured_anew(found: list[Finding], state: Hypothesis, task: Task) -> Hypothesis:
+    """Keep what the tests say of the last model.
+
+    A test that found nothing counts by its p-value: the record is no less likely than that. What
+    does not pay its price is no more than chance, whatever its p-value.
+    """
+    faults, quiet = list(state.faults), dict(state.quiet)
+    for finding in found:
+        known = _known(finding.identifier, state)
+        if known is not None and finding.taken is None:
+            faults[faults.index(known)] = finding
+        elif known is None and finding.kind == "fault":
+            least = finding.p_value if _pays(finding, state) else max(finding.p_value, task.level)
+            quiet[finding.identifier] = min(least, quiet.get(finding.identifier, 1.0))
+    return replace(state, faults=tuple(faults), quiet=quiet)
+
+
+def random_torque(state: Hypothesis, rival: Rival, task: Task) -> Hypothesis | None:
+    """Test whether random kicks explain more than an effect that leaves more than noise."""
+    if state.samples is None or not remainder_of(rival.fit, state.data, state.noise).systematic:
+        return None
+    finding = _asked(RANDOM_TORQUE, state, task)
+    if finding is None or finding.delta_chi2 < rival.gain - rival.charge:
+        return None
+    after = _applied(finding, state, task)
+    if after is None:
+        return None
+    task.progress(after.said)
+    return after.state

@@ -12,14 +12,13 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.turning_points.measure import Samples
-from pendpipe.arrays import BoolArray
 from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data, with_lattice
 from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Detection, detect, prepare
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise
-from pendpipe.diagnosis.refine import LARGE_PHASE_ERROR, Fit, refine
+from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR, Fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import INCOMPLETE, Remainder, remainder_of
 from pendpipe.diagnosis.result import Finding
@@ -39,8 +38,6 @@ FURTHER: Final = 22.0
 again as two choices."""
 RANDOM: Final = ("jitter", "broadband-drive")
 """Faults that count as names: a random cause can take what a wrong name leaves."""
-GROSS: Final = 2.0
-"""chi^2 per degree of freedom above which first-order scores are meaningless."""
 _ESTIMATE_AGAIN: Final = 0.95
 """Ratio of noise estimates below which the noise is estimated again."""
 _ROUNDS: Final = 3
@@ -91,20 +88,6 @@ def is_further(step: Step) -> bool:
 
 
 @dataclass(frozen=True)
-class Fault:
-    """A significant finding of a test of the measurement, and its global p-value.
-
-    `after` is the number of effects added before it; `mask` marks all readings left out for it,
-    None for none.
-    """
-
-    finding: Finding
-    p_value: float
-    after: int = 0
-    mask: BoolArray | None = None
-
-
-@dataclass(frozen=True)
 class Hypothesis:
     """What may be true of a recording; a search goes from one to the next.
 
@@ -123,11 +106,11 @@ class Hypothesis:
     steps
         One for each effect.
     faults
-        Of the measurement, found by their own tests.
+        Of the measurement, found by their own tests; their p-values are global.
     quiet
         By name, the p-values of the tests that found nothing.
-    squares
-        By name of a slip, the sum of squares at which none was found.
+    tested
+        The fit with which the measurement was tested.
     clock_notes
         What the tests of the time stamps found, a clause each.
     first, now
@@ -147,9 +130,9 @@ class Hypothesis:
     baseline: Fit
     samples: Samples | None = None
     steps: tuple[Step, ...] = ()
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[Finding, ...] = ()
     quiet: Mapping[str, float] = field(default_factory=dict)
-    squares: Mapping[str, float] = field(default_factory=dict)
+    tested: Fit | None = None
     clock_notes: tuple[str, ...] = ()
     first: Detection | None = None
     now: Detection | None = None
@@ -188,7 +171,7 @@ class Hypothesis:
         nor does the colour of its noise.
         """
         assert self.first is not None
-        faults = [each.p_value for each in self.faults if each.finding.identifier != COLOURED_NOISE]
+        faults = [each.p_value for each in self.faults if each.identifier != COLOURED_NOISE]
         return min(self.first.p_value / CATALOGUE_SHARE, *self.quiet.values(), *faults, 1.0)
 
     @property

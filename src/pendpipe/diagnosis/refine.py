@@ -600,6 +600,8 @@ def fit_in_growing_window(
         return None
 
 
+GROSS: Final = 2.0
+"""chi^2 per degree of freedom above which first-order scores are meaningless."""
 LARGE_PHASE_ERROR: Final = 0.1
 """Phase error in rad from which a model has lost the motion."""
 

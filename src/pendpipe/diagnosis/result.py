@@ -138,7 +138,7 @@ class Confirmation(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """The result of one test, whether it found anything or not; it equals no other.
+    """What one test of the measurement found; it equals no other.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ class Finding:
         Of the effect.
     p_value
         Probability that chance alone does as well in this test, its own trials included;
-        uniform for the null, or larger.
+        uniform for the null, or larger. Once found: of all tests together.
     delta_chi2
         Twice the gain in log-likelihood.
     parameters
@@ -155,19 +155,25 @@ class Finding:
         Where it shows.
     mask
         Readings to leave out, shape (n,); None for none.
+    taken
+        What is to be taken off the readings, shape (n,); None for nothing.
     time_s
         Better times of the readings, shape (n,); None if the time stamps are as good.
+    price
+        By how much chi^2 must fall with better readings or times.
     summary
-        One clause.
+        What is said: one clause.
     kind
-        ``"fault"``: reported as an effect if it is significant. ``"property"``: reported as a
-        property of the record that does no harm.
+        ``"fault"``: reported as an effect if it is significant. ``"note"``: corrected and said.
+        ``"property"``: of the record, which does no harm.
     also
         Identifiers of effects that would give exactly the same codes.
     confirmed
         What a second test found that does not use the model.
     margin
         Twice the log-likelihood by which it exceeds what looks most like it.
+    after
+        The number of effects that were added before it.
     """
 
     identifier: str
@@ -176,17 +182,15 @@ class Finding:
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
     location: Location = field(default_factory=Location)
     mask: BoolArray | None = None
+    taken: FloatArray | None = None
     time_s: FloatArray | None = None
+    price: float = 0.0
     summary: str = ""
-    kind: Literal["fault", "property"] = "fault"
+    kind: Literal["fault", "note", "property"] = "fault"
     also: tuple[str, ...] = ()
     confirmed: Confirmation | None = None
     margin: float = math.inf
-
-
-def nothing(identifier: str) -> Finding:
-    """Return the result of a test that can't be made."""
-    return Finding(identifier, 1.0, summary="not tested")
+    after: int = 0
 
 
 @dataclass(frozen=True, repr=False)

@@ -22,7 +22,7 @@ from pendpipe.diagnosis.data import with_scatter
 from pendpipe.diagnosis.detect import whitened
 from pendpipe.diagnosis.forensics.codes import with_true_step
 from pendpipe.diagnosis.forensics.colour import level_note, wander_note
-from pendpipe.diagnosis.forensics.corrections import loss_confirmed
+from pendpipe.diagnosis.forensics.lost_samples import loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.held_out import held_out
 from pendpipe.diagnosis.hypothesis import Hypothesis, catalogue_beside

@@ -11,7 +11,7 @@ from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Lead, more_leads, printed
-from pendpipe.diagnosis.faults import correct, examine, examine_again, random_torque
+from pendpipe.diagnosis.faults import correct, examine, random_torque
 from pendpipe.diagnosis.held_out import predicts_worse
 from pendpipe.diagnosis.hypothesis import (
     Hypothesis,
@@ -159,12 +159,12 @@ def _grow(state: Hypothesis, task: Task) -> Hypothesis:
 
 
 def _improve(state: Hypothesis, task: Task) -> Hypothesis:
-    """Make the moves that lower the score; masked readings may come back with them."""
+    """Make the moves that lower the score; readings that were left out may come back with them."""
     better = improve(state, task.progress, task.rare(state))
-    after = examine_again(better, task)
-    if np.any(after.data.weight > better.data.weight):
-        return improve(after, task.progress, task.rare(after))
-    return after
+    after = correct(better, task)
+    if after.fit is better.fit:
+        return after
+    return improve(after, task.progress, task.rare(after))
 
 
 def _described(state: Hypothesis, task: Task) -> tuple[Hypothesis, Fit | None]:

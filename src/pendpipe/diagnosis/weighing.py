@@ -10,13 +10,13 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import Progress, silent
-from pendpipe.diagnosis.hypothesis import RANDOM, Fault, Hypothesis, Step, is_further, is_gross
+from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Step, is_further, is_gross
 from pendpipe.diagnosis.instants import with_instants
 from pendpipe.diagnosis.location import locate
 from pendpipe.diagnosis.refine import SETTLED, Fit, best_fit, misfit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import with_errors
-from pendpipe.diagnosis.result import FoundEffect
+from pendpipe.diagnosis.result import Finding, FoundEffect
 from pendpipe.diagnosis.rivals import (
     NEAR,
     Rival,
@@ -192,7 +192,7 @@ def _explained(found: Hypothesis, effect: Effect, gain: float) -> float:
     return max(gain, 0.0) / max(max(gain, 0.0) + open_still, 1.0)
 
 
-def fault_named(found: Hypothesis, fault: Fault, weighed: Sequence[Weighed]) -> FoundEffect:
+def fault_named(found: Hypothesis, finding: Finding, weighed: Sequence[Weighed]) -> FoundEffect:
     """Return a fault of the measurement found by its own test.
 
     A random cause takes what a wrong name leaves: it is no more probable than each name beside it,
@@ -200,7 +200,6 @@ def fault_named(found: Hypothesis, fault: Fault, weighed: Sequence[Weighed]) -> 
     """
     from pendpipe.effects.catalogue import by_identifier
 
-    finding = fault.finding
     effect = by_identifier(finding.identifier)
     doubt = math.exp(-0.5 * _clean_charge(found))
     if finding.confirmed is not None:
@@ -221,7 +220,7 @@ def fault_named(found: Hypothesis, fault: Fault, weighed: Sequence[Weighed]) -> 
         effect.equation,
         finding.parameters,
         finding.delta_chi2,
-        fault.p_value,
+        finding.p_value,
         each,
         tuple((name, each) for name in finding.also),
         effect.discriminating_test,
@@ -241,7 +240,7 @@ def _charge_for_several(found: Hypothesis) -> float:
     Together they leave only noise more easily than one does by itself.
     """
     names = sum(map(is_further, found.steps))
-    names += sum(fault.finding.identifier in RANDOM for fault in found.faults)
+    names += sum(fault.identifier in RANDOM for fault in found.faults)
     alone = 1 if found.unexplained > 0.01 else 2
     return _OF_A_FURTHER_NAME * max(names - alone, 0)
 

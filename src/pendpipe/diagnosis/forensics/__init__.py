@@ -1,9 +1,12 @@
-"""Tests for faults of the measurement without a smooth signature in time.
+"""Tests of the measurement: what no smooth signature in time shows.
 
-Every test is a function ``find(data, fit, noise, samples) -> Finding``.
+Each is a function ``find(data, fit, noise, samples) -> Finding | None``: None where it is not made.
+`diagnosis.faults` asks those that are declared here, and applies what pays.
 """
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 from pendpipe.analysis.turning_points.measure import Samples
@@ -12,22 +15,83 @@ from pendpipe.diagnosis.forensics import (
     colour,
     converter,
     glitches,
+    lost_samples,
     sampling_times,
+    slips,
+    tracking,
 )
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR, Fit
 from pendpipe.diagnosis.result import Finding
 
-Test = Callable[[Data, Fit, Noise, Samples], Finding]
+_CLEAN: Final = 1.3
+"""chi^2 per reading up to which hardly more than noise is left."""
+_IN_PHASE: Final = 0.3
+"""Phase error in rad up to which residuals show errors of the times."""
+_ON_ITS_TURN: Final = 3.0
+"""Phase error in rad up to which the cycles are numbered right: the level hardly depends on it."""
 
-TESTS: Final[dict[str, Test]] = {
-    "time-stamps": sampling_times.find_irregular,
-    "clipping": converter.find_clipping,
-    "glitches": glitches.find,
-    "missing-codes": converter.find_missing_codes,
-    "coarse-quantisation": converter.find_coarse_steps,
-    "jitter": sampling_times.find_jitter,
-    "coloured-noise": colour.find_coloured_noise,
-    "broadband-drive": colour.find_random_torque,
-}
-"""In order: readings masked by one test are not used by those after it."""
+
+@dataclass(frozen=True)
+class Finder:
+    """A test of the measurement, and when it is made.
+
+    Parameters
+    ----------
+    name
+        Of what it finds.
+    find
+        The test.
+    most_misfit, most_phase_rad
+        The largest chi^2 per reading and phase error of the model with which it can be made.
+    last
+        Whether it is made with the final model alone: any misfit could look like this.
+    repeats
+        Whether it is made again with each model once it has found something. What it left out or
+        took off is then put back first, and may stay.
+    as_recorded
+        Whether it is made on what was recorded, whatever was taken off since.
+    """
+
+    name: str
+    find: Callable[[Data, Fit, Noise, Samples], Finding | None]
+    most_misfit: float = math.inf
+    most_phase_rad: float = math.inf
+    last: bool = False
+    repeats: bool = False
+    as_recorded: bool = False
+
+    def may_ask(self, data: Data, fit: Fit) -> bool:
+        """Whether a model is good enough for the test."""
+        good = fit.chi2 <= self.most_misfit * data.used
+        return good and fit.max_phase_error_rad <= self.most_phase_rad
+
+
+def _last(name: str, find: Callable[[Data, Fit, Noise, Samples], Finding | None]) -> Finder:
+    return Finder(name, find, _CLEAN, LARGE_PHASE_ERROR, last=True)
+
+
+RANDOM_TORQUE: Final = _last("broadband-drive", colour.find_random_torque)
+FINDERS: Final = (
+    Finder("time-stamps", sampling_times.find_irregular, most_phase_rad=_IN_PHASE),
+    Finder("dropped-samples", lost_samples.find, repeats=True),
+    Finder(
+        "tracking-noise",
+        tracking.find,
+        most_phase_rad=LARGE_PHASE_ERROR,
+        repeats=True,
+        as_recorded=True,
+    ),
+    Finder("count-slips", slips.find_counts, most_phase_rad=_ON_ITS_TURN),
+    Finder("clock-slips", slips.find_clock, most_phase_rad=_IN_PHASE),
+    Finder("clipping", converter.find_clipping, GROSS, LARGE_PHASE_ERROR, repeats=True),
+    Finder("glitches", glitches.find, repeats=True),
+    # Dead bits show in the codes themselves, whatever the model.
+    Finder("coarse-quantisation", converter.find_dead_bits, last=True),
+    _last("missing-codes", converter.find_missing_codes),
+    _last("coarse-quantisation", converter.find_coarse_steps),
+    _last("jitter", sampling_times.find_jitter),
+    _last("coloured-noise", colour.find_coloured_noise),
+    RANDOM_TORQUE,
+)
+"""The tests of the measurement."""

@@ -21,7 +21,7 @@ from pendpipe.diagnosis.forensics.local import residual_of
 from pendpipe.diagnosis.forensics.tails import tail_of_squares, upper_tail
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import Finding, Location, nothing
+from pendpipe.diagnosis.result import Finding, Location
 from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, compact
@@ -78,7 +78,7 @@ def wander_note(noise: Noise, data: Data, fit: Fit) -> str | None:
     )
 
 
-def find_coloured_noise(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+def find_coloured_noise(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
     """Test whether the density near the pendulum's frequency differs from the mean by over 1.5.
 
     Density and error are those of the spectrum that the readings were weighed with. The null is
@@ -86,14 +86,14 @@ def find_coloured_noise(data: Data, fit: Fit, noise: Noise, samples: Samples) ->
     frequency is not reported.
     """
     if not data.uniform or not noise.coloured or fit.chi2 > _MISFIT * data.used:
-        return nothing(COLOURED_NOISE)
+        return None
     frequency_hz = fit.at.sampled.motion.angular_frequency / (2.0 * math.pi)
     edges = np.append(noise.starts, len(data)) / (2.0 * len(data) * data.interval_s)
     middle, number = 0.5 * (edges[1:] + edges[:-1]), np.diff(np.append(noise.starts, len(data)))
     heard = middle > _LOWEST * frequency_hz
     near = (middle > _NEAR_BAND[0] * frequency_hz) & (middle < _NEAR_BAND[1] * frequency_hz)
     if np.count_nonzero(near) < 3 or np.array_equal(near, heard):
-        return nothing(COLOURED_NOISE)
+        return None
     density = noise.variance[(noise.starts + number // 2).clip(max=len(data) - 1)]
     there = near * number / float(number[near].sum()) * density
     whole = heard * number / float(number[heard].sum()) * density
@@ -150,7 +150,7 @@ class Shapes(NamedTuple):
         return tail_of_squares(float(self.weight @ self.square), self.weight)
 
 
-def find_random_torque(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+def find_random_torque(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
     """Test for a random torque of white density S_a.
 
     In a time dt it adds to both quadratures of the angle independent steps of variance
@@ -161,12 +161,12 @@ def find_random_torque(data: Data, fit: Fit, noise: Noise, samples: Samples) -> 
     motion seldom does: p = max(p_amplitude, p_phase)^2.
     """
     if data.used < 100 or fit.max_phase_error_rad > _LARGEST_PHASE_ERROR:
-        return nothing("broadband-drive")
+        return None
     amplitude, phase, per_kick = _fluctuations(data, fit, noise)
     few = min(len(amplitude.weight), len(phase.weight)) < 5
     # A missing term of the law of motion, or a tone, is not a random walk.
     if few or not (_may_walk(amplitude) and _may_walk(phase)):
-        return nothing("broadband-drive")
+        return None
     p_value = max(amplitude.chance, phase.chance) ** 2
     both = Shapes(
         np.append(amplitude.weight, phase.weight), np.append(amplitude.square, phase.square)

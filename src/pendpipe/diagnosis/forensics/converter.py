@@ -26,7 +26,7 @@ from pendpipe.diagnosis.forensics.local import local_residual
 from pendpipe.diagnosis.forensics.tails import upper_tail
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import Finding, Location, nothing
+from pendpipe.diagnosis.result import Finding, Location
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number
 
@@ -62,7 +62,7 @@ class End(NamedTuple):
     delta_chi2: float
 
 
-def find_clipping(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+def find_clipping(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
     """Test whether the largest (smallest) reading is smaller than the motion's.
 
     With the true angles x_j from the rest of each window (without readings at the end), the
@@ -74,7 +74,7 @@ def find_clipping(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Findi
     equal, as at the end of a converter's range.
     """
     if data.time_noise or samples.counts or data.used < 60:
-        return nothing("clipping")
+        return None
     raw = raw_readings(data, fit, samples)
     lattice = lattice_of(raw.values, samples)
     step = lattice.step if lattice is not None else 0.0
@@ -208,7 +208,7 @@ class Counts(NamedTuple):
         return 2.0 * float(np.sum(likely - self.found + self.expected))
 
 
-def find_missing_codes(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+def find_missing_codes(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
     """Compare how often each code occurs with what motion and noise predict.
 
     Each number is tested against a Poisson distribution (readings scatter less, so the p-value is
@@ -218,7 +218,7 @@ def find_missing_codes(data: Data, fit: Fit, noise: Noise, samples: Samples) -> 
     """
     coded = None if data.time_noise else read_codes(data, fit, samples)
     if coded is None or len(coded.code) < 100 or np.ptp(coded.code) < 2:
-        return nothing("missing-codes")
+        return None
     comb = worst_comb(coded.code, _expectations(coded))
     if comb.p_value > 0.01:
         return Finding("missing-codes", comb.p_value, summary="codes occur as often as expected")
@@ -361,7 +361,7 @@ def worst_comb(code: IntArray, expected: FloatArray) -> Comb:
     )
 
 
-def find_coarse_steps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+def find_coarse_steps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
     """Test whether the errors depend on the angle's position between two codes.
 
     Rounding an angle x with noise s to steps q shifts the mean reading by
@@ -372,14 +372,12 @@ def find_coarse_steps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> F
     it; the null is any noise above a quarter step. If the amplitude stays above twenty steps, the
     errors are pseudo-random and do no harm: a property of the record.
 
-    If the observed codes are several of the converter's steps apart, its lowest bits are dead or
-    an earlier stage has a coarser step, and no estimate is needed.
     """
-    if samples.step is not None and samples.promised_step is not None:
-        return _dead_bits(data, fit, samples, samples.step, samples.promised_step)
+    if samples.promised_step is not None:
+        return None
     coded = None if data.time_noise else read_codes(data, fit, samples)
     if coded is None or len(coded.code) < 60:
-        return nothing("coarse-quantisation")
+        return None
     wave = -np.sin(2.0 * math.pi * coded.position)
     wave = wave - wave.mean()
     error = coded.error - coded.error.mean()
@@ -404,13 +402,18 @@ def find_coarse_steps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> F
     )
 
 
-def _dead_bits(data: Data, fit: Fit, samples: Samples, step: float, promised: float) -> Finding:
+def find_dead_bits(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
     """Report codes that all lie on a coarser lattice; by chance each would with 1/times.
+
+    The converter's lowest bits are dead, or an earlier stage has a coarser step.
 
     With noise above half the converter's step every code is as probable as its neighbours, so
     that each reading contributes ln(times) to the log-likelihood. The lattice's origin is
     estimated from the codes, and so is its spacing if that is not a whole number.
     """
+    step, promised = samples.step, samples.promised_step
+    if step is None or promised is None:
+        return None
     times = step / promised
     whole = abs(times - round(times)) < _WHOLE_WITHIN
     free = len(np.unique(samples.values)) - (1 if whole else 2)

@@ -18,8 +18,8 @@ from pendpipe.diagnosis.forensics.local import (
 )
 from pendpipe.diagnosis.forensics.tails import Tail, fit_tail
 from pendpipe.diagnosis.noise import TAPS, Noise
-from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import Finding, Location, nothing
+from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR, Fit
+from pendpipe.diagnosis.result import Finding, Location
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number
 
@@ -39,7 +39,7 @@ _EXPECTED_BY_CHANCE: Final = 0.05
 """A reading is left out if chance would give fewer than this in the whole record."""
 
 
-def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
     """Test for readings that neither normal nor heavy-tailed noise explains.
 
     Each error is compared with its window. For k = 1, 2, 3, ... the
@@ -53,10 +53,11 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
     of the motion remains in the windows, the test is the one that needs no model.
     """
     if data.used < _FEWEST:
-        return nothing("glitches")
+        return None
     residual, used = error_of(data, fit), data.weight > 0.0
     local = _errors(fit, noise, residual, ~used)
-    if local.smooth():
+    lost = fit.chi2 > GROSS * data.used or fit.max_phase_error_rad > LARGE_PHASE_ERROR
+    if lost or local.smooth():
         return find_in_misfit(data, fit, noise, samples)
     if noise.coloured:
         # The whitening filter lacks neighbours at the ends: errors there are larger by themselves.
@@ -100,13 +101,13 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
         if noise.coloured:
             # Near the ends, where the filter lacks neighbours, a window needs none.
             alone = find_in_misfit(data, fit, noise, samples)
-            return replace(alone, p_value=min(2.0 * alone.p_value, 1.0))
+            return alone and replace(alone, p_value=min(2.0 * alone.p_value, 1.0))
         quiet = "no reading exceeds the noise"
         return Finding("glitches", max(p_value, _EXPECTED_BY_CHANCE), summary=quiet)
     return _described(data, fit, residual, size, mask, p_value, tail)
 
 
-def find_in_misfit(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+def find_in_misfit(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
     """Test for single wrong readings where the model itself is wrong.
 
     This needs no model: the smooth motion is subtracted window by window. Only deviations of eight
@@ -114,7 +115,7 @@ def find_in_misfit(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
     corner of the motion displace several readings.
     """
     if data.used < _FEWEST or data.time_noise:
-        return nothing("glitches")
+        return None
     used, phase = data.weight > 0.0, fit.at.sampled.phase
     values = data.values - float(np.median(data.values[used]))
     mask = np.zeros(len(data), dtype=bool)
@@ -133,7 +134,7 @@ def find_in_misfit(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
     single[single] = [np.all(np.abs(bent - at) > _WINDOW_RAD) for at in phase[single]]
     single &= ~bent_ends(values - local.left, local.scaled, single, used)
     if not single.any():
-        return nothing("glitches")
+        return None
     ordered = np.sort(np.abs(local.scaled)[used & (single | ~mask)])
     step = _rounding_in(data, local.rms)
     p_value, tail = _smallest_p_value(ordered, step), _noise_tail(ordered, step)

@@ -13,7 +13,7 @@ from pendpipe.diagnosis.forensics.local import local_residual, residual_of, whit
 from pendpipe.diagnosis.forensics.tails import tail_of_squares, upper_tail
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import Finding, Location, nothing
+from pendpipe.diagnosis.result import Finding, Location
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import with_error
 
@@ -63,7 +63,7 @@ def gap_note(time_s: FloatArray, half_period_s: float, counts: bool) -> str | No
     return f"{note} (an encoder that writes its counts is silent at rest)" if counts else note
 
 
-def find_irregular(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+def find_irregular(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
     """Test whether the readings were taken more regularly than their time stamps say.
 
     Time stamps that are rounded or written late differ by d_j from a regular clock. If the
@@ -71,13 +71,11 @@ def find_irregular(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
 
         r_j = -k v_j d_j + noise,
 
-    with k = 1 for wrong time stamps and 0 for true ones. The regular times are returned if they
-    are better.
+    with k = 1 for wrong time stamps and 0 for true ones.
     """
-    identifier = "time-stamps"
     clock = None if data.time_noise else regular_clock(data.time_s)
     if clock is None or data.used < 60:
-        return nothing(identifier)
+        return None
     even_s, interval_s = clock
     off_s = data.time_s - even_s
     sampled, used = fit.at.sampled, data.weight > 0.0
@@ -85,12 +83,12 @@ def find_irregular(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
     wave = local_residual(sampled.phase, -sampled.velocity * off_s, used).left
     size = float(wave @ wave)
     if size <= 1e-6 * local.rms**2:
-        return nothing(identifier)
+        return None
     share, sd = float(wave @ local.left) / size, local.rms / math.sqrt(size)
     rms = float(np.std(off_s))
     return Finding(
-        identifier,
-        upper_tail(share / sd),
+        "time-stamps",
+        upper_tail(share / sd) if share > 0.5 else 1.0,
         max(share / sd, 0.0) ** 2,
         {
             "share": Estimate(share, sd, ""),
@@ -98,9 +96,10 @@ def find_irregular(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
             "interval": Estimate(interval_s, rms / len(data), "s"),
         },
         Location.over(data.time_s, sampled.amplitude, (0.25 * math.pi, 0.75 * math.pi)),
-        time_s=even_s if share > 3.0 * sd and share > 0.5 else None,
+        time_s=even_s,
         summary=f"the time stamps are irregular by {rms:.2g} s and the readings are not: they were"
         f" taken every {interval_s:.6g} s",
+        kind="note",
     )
 
 
@@ -149,7 +148,7 @@ class Squares(NamedTuple):
     shared: float
 
 
-def find_jitter(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding:
+def find_jitter(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
     """Test whether the noise's variance is sigma^2 + sigma_t^2 v^2.
 
     The score for sigma_t^2 at zero is a sum of squared errors, weighted by v^2 minus its mean; its
@@ -159,12 +158,12 @@ def find_jitter(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding
     not jitter.
     """
     if data.time_noise or data.used < 60:
-        return nothing("jitter")
+        return None
     coded = read_codes(data, fit, samples)
     squares = _squares(data, fit, noise)
     ruled = coded is not None and coded.ratio < _RULED
     if ruled or squares is None or len(squares.square) < 50:
-        return nothing("jitter")
+        return None
     p_value = _p_value(squares, squares.mean + squares.double)
     # At constant amplitude the mean of v^2 can't be distinguished from the variance of the noise.
     if float(np.std(squares.mean)) > _CONSTANT * float(np.mean(squares.mean)):

@@ -1,0 +1,383 @@
+"""Slips of whole units: an encoder loses counts, a clock misses samples, time and again.
+
+They are a staircase in what is left of the readings: of the level in counts Q, or of the time in
+sampling intervals dt, which moves a reading by v dt. No motion of the pendulum does that. So
+whatever varies slowly is fitted beside the steps (level, amplitude, phase and harmonics, over ten
+cycles), their sizes are free, and that they come out *whole* is the test.
+"""
+
+import itertools
+import math
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.turning_points.measure import Samples
+from pendpipe.arrays import BoolArray, FloatArray, IntArray, scaled_qr
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.forensics.tails import upper_tail
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.result import Confirmation, Finding, Location
+from pendpipe.effects.model import jacobian
+from pendpipe.estimate import Estimate
+
+_SIGNIFICANT_SD: Final = 7.0
+"""Standard deviations from which a step is significant."""
+_SLOW_CYCLES: Final = 10.0
+_HARMONICS: Final = 3
+_NUMBERS: Final = 1 << 22
+"""Numbers in the basis of what varies slowly, at most."""
+_MOST: Final = 150
+"""Slips at most."""
+_CHOICE: Final = 6.0
+"""Price of a slip beside the places where it may have been (2 ln n)."""
+_CLEAN: Final = 1.3
+"""chi^2 per reading up to which white noise alone is left."""
+_FEWEST: Final = 4
+_NEIGHBOURS: Final = 11
+_IN_A_HALF_SWING: Final = 12
+_BESIDE: Final = 0.055
+"""Length of a side about a step of the time, in periods: what a polynomial of the fourth degree
+leaves of a swing there, 1e-6 of it, is less than the noise."""
+_OF_A_STEP: Final = 4
+_BESIDE_A_STEP: Final = 2
+"""Readings left out on each side: a step is placed within one reading or two."""
+_FEWEST_BESIDE: Final = 8
+_ROUNDS: Final = 3
+
+
+class Slips(NamedTuple):
+    """Steps of whole units.
+
+    Parameters
+    ----------
+    rows
+        The first reading after each, shape (k,).
+    sizes
+        As they were fitted, in units.
+    """
+
+    rows: IntArray
+    sizes: FloatArray
+
+    @property
+    def whole(self) -> FloatArray:
+        """The sizes as whole numbers."""
+        return np.round(self.sizes)
+
+    @property
+    def scatter(self) -> float:
+        """Of the sizes about whole numbers."""
+        return float(np.sqrt(np.mean((self.sizes - self.whole) ** 2)))
+
+    @property
+    def p_value(self) -> float:
+        """Probability that steps of any sizes are so near whole numbers.
+
+        Of many, the sum of cosines is normal. Of few, the distances from whole numbers are as near
+        as that in a ball within the cube of side 1 in which they lie (at most: it may stick out).
+        """
+        half = 0.5 * len(self.sizes)
+        near = float(np.sum(np.cos(2.0 * math.pi * self.sizes)))
+        squares = max(2.0 * half * self.scatter**2, 1e-300)
+        ball = half * math.log(math.pi * squares) - math.lgamma(half + 1.0)
+        return min(upper_tail(near / math.sqrt(half)), math.exp(min(ball, 0.0)))
+
+    def when_s(self, data: Data) -> FloatArray:
+        """The instants of the steps."""
+        return np.asarray(data.time_s[self.rows] - 0.5 * data.interval_s)
+
+    def joined(self) -> "Slips":
+        """Join steps in neighbouring readings: one within a reading, which is a mean, makes two."""
+        groups = np.split(np.arange(len(self.rows)), 1 + np.flatnonzero(np.diff(self.rows) > 3))
+        first = [group[np.argmax(np.abs(self.sizes[group]))] for group in groups]
+        sizes = np.array([np.sum(self.sizes[group]) for group in groups])
+        kept = np.abs(sizes) > 0.5
+        return Slips(self.rows[first][kept], sizes[kept])
+
+    def staircase(self, count: int) -> FloatArray:
+        """Return the sum of the whole steps at each of `count` readings."""
+        steps = np.zeros(count)
+        np.add.at(steps, self.rows, self.whole)
+        return np.cumsum(steps)
+
+
+def whole_steps(data: Data, fit: Fit, unit: FloatArray) -> Slips | None:
+    """Find steps of whole units; None where there are too few.
+
+    Parameters
+    ----------
+    data, fit
+        The readings, and a model that keeps their phase.
+    unit
+        What a step of one changes in each reading, rad, shape (n,).
+    """
+    whole_left, slow = data.residual(fit.at.reading) * data.weight, _slow(data, fit)
+    known = slow.shape[1]
+    basis = np.empty((len(slow), known + _MOST), order="F")
+    basis[:, :known] = slow
+    left = whole_left - slow @ (slow.T @ whole_left)
+    whole = _later(unit[:, None] ** 2 * data.weight[:, None])
+    alone = whole - np.sum(_later(unit[:, None] * slow) ** 2, axis=1, keepdims=True)
+    rows: list[int] = []
+    for _ in range(_MOST):
+        seen = alone[:, 0] > 1e-6 * whole[0]
+        product = _later((unit * left)[:, None])[:, 0]
+        gain = np.where(seen, product**2 / np.where(seen, alone[:, 0], 1.0), 0.0)
+        row = int(np.argmax(gain))
+        if gain[row] < (2.0 * math.log(len(left)) + _CHOICE) * spread(left) ** 2:
+            break
+        rows.append(row)
+        column = _beside(_step(row, unit, data), basis[:, :known])
+        if column is not None:
+            left = left - column * float(column @ left)
+            alone -= _later((unit * column)[:, None]) ** 2
+            basis[:, known] = column
+            known += 1
+    return _whole(whole_left, slow, unit, data, np.sort(np.array(rows, dtype=np.int64)))
+
+
+def _later(columns: FloatArray) -> FloatArray:
+    """Sum each column from every reading on."""
+    return np.asarray(np.cumsum(columns[::-1], axis=0)[::-1])
+
+
+def spread(left: FloatArray) -> float:
+    """Return the standard deviation of what is left, whatever single readings do."""
+    return 1.4826 * float(np.median(np.abs(left[left != 0.0])))
+
+
+def _slow(data: Data, fit: Fit) -> FloatArray:
+    """Return an orthonormal basis of what varies slowly, and of the model's own values.
+
+    Over many cycles the fastest of it is slower, or the basis would grow with their square.
+    """
+    sampled = fit.at.sampled
+    turned = sampled.phase - sampled.phase[0]
+    most = _NUMBERS // (len(turned) * (2 * _HARMONICS + 1))
+    number = max(min(int(turned[-1] / (math.pi * _SLOW_CYCLES)), most), 2)
+    waves = np.cos(math.pi / turned[-1] * turned[:, None] * np.arange(number))
+    parts = [waves, waves * sampled.angle[:, None], waves * sampled.velocity[:, None]]
+    for harmonic in range(2, _HARMONICS + 1):
+        turns = harmonic * sampled.phase[:, None]
+        parts += [waves * np.cos(turns), waves * np.sin(turns)]
+    parts.append(jacobian(fit.model, fit.value, fit.at)[:, list(fit.free)])
+    columns = np.concatenate(parts, axis=1) * data.weight[:, None]
+    basis, triangle, _ = scaled_qr(columns)
+    mixing, lengths, _ = np.linalg.svd(triangle)
+    return np.asarray(basis @ mixing[:, lengths > 1e-6 * lengths[0]])
+
+
+def _step(row: int, unit: FloatArray, data: Data) -> FloatArray:
+    """Return a step's change of the readings."""
+    return np.where(np.arange(len(unit)) >= row, unit, 0.0) * data.weight
+
+
+def _beside(column: FloatArray, basis: FloatArray) -> FloatArray | None:
+    """Return what a column has beside a basis, of unit length; None where that is nothing."""
+    length = float(np.linalg.norm(column))
+    for _ in range(2):
+        column = column - basis @ (basis.T @ column)
+    alone = float(np.linalg.norm(column))
+    return None if alone < 1e-6 * length else column / alone
+
+
+def _whole(
+    left: FloatArray, slow: FloatArray, unit: FloatArray, data: Data, rows: IntArray
+) -> Slips | None:
+    """Fit all sizes together, beside what varies slowly."""
+    while len(rows) >= _FEWEST:
+        columns = np.column_stack([_step(row, unit, data) for row in rows.tolist()])
+        columns -= slow @ (slow.T @ columns)
+        sizes = np.asarray(np.linalg.lstsq(columns, left, rcond=1e-10)[0], dtype=np.float64)
+        kept = np.abs(sizes) > 0.5
+        if kept.all():
+            return Slips(rows, sizes)
+        rows = rows[kept]
+    return None
+
+
+def find_counts(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
+    """Test whether an encoder loses counts: steps of any sizes are a wandering level as well."""
+    count = count_of(samples)
+    if not count:
+        return None
+    slips = _whole_steps(data, fit, noise, np.full(len(data), count))
+    if slips is None:
+        return None
+    seen = steps_of_the_level(samples, count)
+    finding = _described(data, slips, count, seen)
+    return replace(finding, taken=count * slips.staircase(len(data)))
+
+
+def find_clock(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
+    """Test whether a clock misses samples: steps of any sizes are a wandering clock as well."""
+    interval = data.interval_s / data.fold
+    if not data.uniform or data.time_noise:
+        return None
+    slips = _whole_steps(data, fit, noise, interval * fit.at.sampled.velocity)
+    slips = slips and slips.joined()
+    if slips is None or len(slips.rows) < _FEWEST:
+        return None
+    seen = steps_of_the_time(samples, slips.when_s(data), data.fold, fit.at.span.period_s)
+    finding = _described(data, slips, interval, seen, clock=True)
+    time_s = data.time_s + interval * slips.staircase(len(data))
+    return replace(finding, p_value=seen.p_value if seen else slips.p_value, time_s=time_s)
+
+
+def _whole_steps(data: Data, fit: Fit, noise: Noise, unit: FloatArray) -> Slips | None:
+    """Find steps of whole units, unless only noise is left that slips have no part in.
+
+    Slips that go on and on are as steady as noise, but never white.
+    """
+    if fit.chi2 <= _CLEAN * data.used and not noise.coloured:
+        return None
+    return whole_steps(data, fit, unit)
+
+
+def _described(
+    data: Data, slips: Slips, unit: float, seen: Confirmation | None, *, clock: bool = False
+) -> Finding:
+    when, squares = slips.when_s(data), float(np.sum(slips.whole**2))
+    size = float(slips.sizes @ slips.whole) / squares
+    words = "the clock slips by whole samples" if clock else "whole counts are lost, or gained,"
+    return Finding(
+        "clock-slips" if clock else "count-slips",
+        slips.p_value,
+        parameters={
+            "dt" if clock else "step": Estimate(
+                unit * size, unit * slips.scatter / math.sqrt(squares), "s" if clock else data.unit
+            ),
+            "number": Estimate(float(len(when)), 0.0, ""),
+        },
+        location=Location((float(when[0]), float(when[-1]))),
+        mask=beside(data, slips.rows),
+        summary=f"{words} {len(when)} times between {when[0]:.5g} and {when[-1]:.5g} s: fitted"
+        f" freely, the steps are whole within {slips.scatter:.2f} (by chance 0.29)",
+        confirmed=seen,
+    )
+
+
+def beside(data: Data, rows: IntArray) -> BoolArray:
+    """Return the readings about each step, which may have come a few off."""
+    out = np.zeros(len(data), dtype=bool)
+    near = rows[:, None] + np.arange(-_BESIDE_A_STEP, _BESIDE_A_STEP)
+    out[np.clip(near, 0, len(data) - 1)] = True
+    return out
+
+
+def count_of(samples: Samples) -> float:
+    """Return the step of the readings, rad: between rows, where there is one at each count."""
+    if samples.counts:
+        return float(np.median(np.abs(np.diff(samples.values))))
+    return samples.step or 0.0
+
+
+def steps_of_the_level(samples: Samples, count: float) -> Confirmation | None:
+    """Test whether the level changes by whole counts between half swings, without any model.
+
+    Four half swings at a time are one oscillation with slopes and a third harmonic, each at a
+    level of its own; the step between the middle two counts. Above half a count it is whole,
+    or not.
+    """
+    from scipy.ndimage import median_filter
+
+    ends = _turns(samples.values)
+    found = [
+        _middle_step(samples, ends[first : first + 5]) / count for first in range(len(ends) - 4)
+    ]
+    steps = np.array([step for step in found if math.isfinite(step)])
+    # An edge of the scale has a width, which is a step of either sign at each reversal.
+    for way in (slice(0, None, 2), slice(1, None, 2)):
+        steps[way] -= median_filter(steps[way], _NEIGHBOURS, mode="nearest")
+    rows = np.flatnonzero(np.abs(steps) > 0.5)
+    large = Slips(rows, steps[rows])
+    if len(rows) < _FEWEST:
+        return None
+    return Confirmation(
+        f"of {len(steps)} steps of the level between half swings, from four half swings each,"
+        f" {len(rows)} are above half a count, and these whole within {large.scatter:.2f}"
+        " (by chance 0.29)",
+        large.p_value,
+    )
+
+
+def steps_of_the_time(
+    samples: Samples, when_s: FloatArray, within: int, period_s: float
+) -> Confirmation | None:
+    """Test whether the time steps by whole samples at instants, without any model.
+
+    About each instant, known to `within` samples, a polynomial in time with a step of the time is
+    fitted to the raw readings: after the step it changes them as the velocity does. The row where
+    the step is most significant counts.
+    """
+    interval, floor = np.median(np.diff(samples.time_s)), (samples.step or 0.0) / math.sqrt(12.0)
+    side = max(int(_BESIDE * period_s / interval), _FEWEST_BESIDE)
+    found: list[float] = []
+    for row in np.searchsorted(samples.time_s, when_s).tolist():
+        near = samples.values[max(row - side - within, 0) : row + side + within]
+        if len(near) < 2 * side:
+            continue
+        windows = np.lib.stride_tricks.sliding_window_view(near, 2 * side).T
+        sizes, sd = _step_of_time(windows, 0.0, floor)
+        best = int(np.argmax(np.abs(sizes) / sd))
+        size = float(sizes[best])
+        for _ in range(_ROUNDS):
+            more, sd = _step_of_time(windows[:, [best]], size, floor)
+            size += float(more[0])
+        if abs(size) > max(_SIGNIFICANT_SD * sd[0], 0.5):
+            found.append(size)
+    seen = Slips(np.arange(len(found)), np.array(found))
+    if len(found) < _FEWEST:
+        return None
+    return Confirmation(
+        f"{len(found)} steps of the time, each from a polynomial through the raw readings, are"
+        f" whole within {seen.scatter:.2f} samples (by chance 0.29)",
+        seen.p_value,
+    )
+
+
+def _step_of_time(windows: FloatArray, size: float, floor: float) -> tuple[FloatArray, FloatArray]:
+    """Fit what a step of the time in the middle of each window lacks, and its sd; shape (windows,).
+
+    In sampling intervals. Windows have the shape (rows, windows); of the step, `size` is known.
+    """
+    side = len(windows) // 2
+    later = np.arange(2 * side) >= side
+    at = (np.arange(2 * side) - side + 0.5 + size * later) / side
+    powers = np.vander(at, _OF_A_STEP + 1, increasing=True)
+    basis = np.linalg.qr(powers)[0]
+    slopes = powers[:, :-1] * np.arange(1, _OF_A_STEP + 1) @ np.linalg.pinv(powers)[1:]
+    steps = slopes @ windows * later[:, None] / side
+    left, steps = (each - basis @ (basis.T @ each) for each in (windows, steps))
+    square = np.maximum(np.sum(steps**2, axis=0), 1e-300)
+    more = np.sum(steps * left, axis=0) / square
+    rest = (np.sum(left**2, axis=0) - more**2 * square) / (2 * side - _OF_A_STEP - 2)
+    return more, np.sqrt(np.maximum(rest, floor**2) / square)
+
+
+def _turns(values: FloatArray) -> list[int]:
+    """Return the rows of the turning points: the extremes between crossings of the middle."""
+    above = values > 0.5 * (np.max(values) + np.min(values))
+    crossed = np.flatnonzero(above[:-1] != above[1:]) + 1
+    return [
+        first + int(np.argmax(np.abs(values[first:last] - values[first])))
+        for first, last in itertools.pairwise(crossed.tolist())
+    ]
+
+
+def _middle_step(samples: Samples, ends: list[int]) -> float:
+    """Return the step of the level between the second and the third of four half swings, rad."""
+    if min(np.diff(ends)) < _IN_A_HALF_SWING:
+        return math.nan
+    time, values = samples.time_s[ends[0] : ends[4]], samples.values[ends[0] : ends[4]]
+    late = (time - time[0]) / (time[-1] - time[0]) - 0.5
+    phase = 4.0 * math.pi * late
+    halves = np.searchsorted(np.array(ends[1:4]) - ends[0], np.arange(len(time)), side="right")
+    waves = [halves == half for half in range(4)]
+    waves += [wave * late**power for wave in (np.cos(phase), np.sin(phase)) for power in (0, 1)]
+    columns = np.column_stack([*waves, np.cos(3.0 * phase)]).astype(np.float64)
+    fitted = np.linalg.lstsq(columns, values, rcond=None)[0]
+    return float(fitted[2] - fitted[1])
