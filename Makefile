@@ -38,12 +38,12 @@ evidence: .venv/installed-bench
 
 # What interruptions and hostile input cost (docs/evidence.md): hours; goes on where it was stopped.
 integrity: .venv/installed
-	$(RUN) python -m benchmarks.acquisition live kill flips disk
+	$(RUN) python -m benchmarks.acquisition kill flips disk
 	$(RUN) python -m benchmarks.kills
 	$(RUN) python -m benchmarks.torn_files --apart
-	$(RUN) python -m benchmarks.fit_honesty
+	$(RUN) python -m benchmarks.answers lights
 	$(RUN) python -m benchmarks.hostile
-	$(RUN) python -m benchmarks.fuzz --inputs 100000
+	$(RUN) python -m benchmarks.fuzz
 
 # Conceal, solve, open, score, and write results/challenge/SET/scores/proof.md; goes on where it was interrupted.
 # A set is made once: SET=another makes another, with a seed of its own.

@@ -13,9 +13,7 @@ def main() -> None:
     known = (
         "engine",
         "estimators",
-        "long_record",
         "workflow",
-        "acquisition_speed",
         "many_fits",
     )
     there = [name for name in known if (here / f"{name}.py").exists()]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import random
 import shutil
 import signal
 import subprocess
@@ -23,9 +22,8 @@ from pendpipe.acquisition.raw import read_raw
 from pendpipe.acquisition.recorder import acquire_simulated
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.recording import GOOD, read_plain
+from pendpipe.recording import GOOD
 
-FLIPS: Final = 500
 ROOT: Final = Path(__file__).resolve().parents[1]
 SIGNAL: Final = """
 pendulum = {frequency_hz = 3.0, quality_factor_viscous = 60.0, release_angle_rad = 0.3}
@@ -160,50 +158,6 @@ def changed_library(folder: Path) -> Path:
     return library
 
 
-def live_table(folder: Path, duration_s: float = 20.0) -> str:
-    """Record, unplug, change the library, run again; and kill at seven tenths, run again."""
-    lines = [
-        "| line | what happened | exit status | seconds recorded | raw files | recording |",
-        "|---|---|---|---|---|---|",
-    ]
-    for link in ("pty", "socket"):
-        place = folder / link
-        place.mkdir()
-        lines += [f"| {link} | {row} |" for row in _live_rows(place, link, duration_s)]
-    return "\n".join(lines)
-
-
-def _live_rows(folder: Path, link: str, duration_s: float) -> Iterator[str]:
-    """What happened on one line, a row each."""
-    with served_device(folder, link) as port:
-        campaign = LiveCampaign(folder, port, duration_s, "turning-points")
-        status = campaign.run().returncode
-    before = campaign.recording.read_bytes(), campaign.raw_files
-    yield _row("recorded", status, campaign, "made")
-    library = changed_library(folder)
-    for what, arguments in {
-        "unplugged, library changed": (),
-        "unplugged, everything forced": ("--forceall",),
-    }.items():
-        status = campaign.run(*arguments, library=library).returncode
-        same = (campaign.recording.read_bytes(), campaign.raw_files) == before
-        yield _row(what, status, campaign, "the same bytes" if same else "**changed**")
-    shutil.rmtree(campaign.results)
-    killed_s = 0.7 * duration_s
-    with served_device(folder, link) as port:
-        campaign.connect(port, duration_s)
-        campaign.kill_at(killed_s)
-        raw = campaign.raw_files
-        status = campaign.run().returncode
-    verdict = "what was kept is used" if campaign.raw_files == raw else "**recorded anew**"
-    yield _row(f"killed at {killed_s:g} of {duration_s:g} s, run again", status, campaign, verdict)
-
-
-def _row(what: str, status: int, campaign: LiveCampaign, verdict: str) -> str:
-    length_s = read_plain(campaign.recording).time_s[-1]
-    return f"{what} | {status} | {length_s:.2f} | {len(campaign.raw_files)} | {verdict}"
-
-
 def slow(time_s: FloatArray) -> FloatArray:
     return np.asarray(5.0 * np.sin(0.02 * time_s))
 
@@ -245,10 +199,7 @@ def flip(whole: bytes, bit: int) -> Flip:
     before, after = decode_recording(whole), decode_recording(bytes(damaged))
     raw_before, raw_after = read_raw(whole), read_raw(bytes(damaged))
     good = after.usable if after.quality is None else after.usable & (after.quality == GOOD)
-    # Times count from the first scan that is there: the first frame of all may be lost.
-    first = sum(-(-h.bytes_missing // 2) for h in raw_after.holes if not h.at_byte)
-    rate_hz = 1.0 / before.interval_s
-    index = np.rint(after.time_s[good] * rate_hz).astype(np.int64) + first
+    index = np.rint(after.time_s[good] / before.interval_s).astype(np.int64)
     inside = index < len(before)
     false = int(np.sum(before.values[index[inside]] != after.values[good][inside]))
     false += int(np.sum(~inside))
@@ -258,22 +209,3 @@ def flip(whole: bytes, bit: int) -> Flip:
         len(before) - int(np.sum(good)),
         false,
     )
-
-
-def flip_table(_folder: Path) -> str:
-    """One flipped bit at random places of raw files."""
-    lines = [
-        "| device | flips | frames | opened and noticed | frames lost, most | scans lost, most | "
-        "false samples |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for kind in ("di154", "di149", "di245", "di2108"):
-        whole = recorded_bytes(kind)
-        instants = random.Random(7)
-        flips = [flip(whole, instants.randrange(8 * len(whole))) for _ in range(FLIPS)]
-        lines.append(
-            f"| {kind} | {len(flips)} | {len(read_raw(whole).arrival_s)} | "
-            f"{sum(one.noticed for one in flips)} | {max(one.frames_lost for one in flips)} | "
-            f"{max(one.scans_lost for one in flips)} | {sum(one.false_samples for one in flips)} |"
-        )
-    return "\n".join(lines)

@@ -275,6 +275,12 @@ def ask(row: Mapping[str, str], limit_s: float) -> dict[str, Any]:
 # ---------------------------------------------------------------- the table
 
 
+def table() -> list[dict[str, str]]:
+    """The table of facts."""
+    with TABLE.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream, delimiter="\t", quoting=csv.QUOTE_NONE))
+
+
 def items(cell: str) -> list[str]:
     """Of a cell of the table of facts."""
     return [each.strip() for each in cell.split(";") if each.strip()]
@@ -386,8 +392,7 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=200.0, help="CPU seconds a command")
     parser.add_argument("--journal", type=Path, default=ROOT / ".evidence/known_physics.jsonl")
     arguments = parser.parse_args()
-    with TABLE.open(encoding="utf-8", newline="") as stream:
-        rows = list(csv.DictReader(stream, delimiter="\t", quoting=csv.QUOTE_NONE))
+    rows = table()
     wanted = arguments.only or [""]
     rows = [row for row in rows if any(each in row["record"] for each in wanted)]
     code, known = code_digest(), {}

@@ -141,9 +141,9 @@ class Configuration(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """Parse the schema's manual as Markdown."""
-        from pendpipe.commands.config import manual
+        from pendpipe.commands.small import configuration_manual
 
-        return self.parse_text_to_nodes(manual())
+        return self.parse_text_to_nodes(configuration_manual())
 
 
 class Catalogue(SphinxDirective):
@@ -151,9 +151,9 @@ class Catalogue(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """Parse the catalogue's manual as Markdown."""
-        from pendpipe.commands.effects import manual
+        from pendpipe.commands.small import catalogue_manual
 
-        return self.parse_text_to_nodes(manual().partition("\n")[2])
+        return self.parse_text_to_nodes(catalogue_manual().partition("\n")[2])
 
 
 def setup(app: Any) -> dict[str, bool]:

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
-from pendpipe.errors import InputError, refuse_if
+from pendpipe.errors import refuse_if
+from pendpipe.options import check, documented
 from pendpipe.recording import Recording
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ column ``time_s`` and one of `_COLUMNS`."""
 _COLUMNS: Final = ("angle_rad", "angle_deg", "volts", "displacement_m")
 
 
+@documented
 def read(
     path: str | Path,
     *,
@@ -55,19 +57,15 @@ def read(
     ----------
     path
         CSV in most dialects, WinDaq, MATLAB, Excel, ...
-    channel, column
-        What to read, by name or by number from 1; ``"time:reading"`` names both columns,
-        ``"x,y"`` a position seen from the pivot.
-    unit
-        Unit of the readings (``"deg"``, ``"mV"``), or of both columns (``"ms:deg"``).
-    sample_rate
-        Samples a second, in Hz, instead of the time column.
-    decimal, delimiter
-        The decimal sign; what separates the columns.
-    volts_per_radian
-        The sensor's constant, V/rad.
-    start, stop
-        The part to read, in s on the file's clock.
+    {channel}
+    {column}
+    {unit}
+    {sample_rate}
+    {decimal}
+    {delimiter}
+    {volts_per_radian}
+    {start}
+    {stop}
 
     Raises
     ------
@@ -100,6 +98,7 @@ def read(
     )
 
 
+@documented
 def acquire(
     port: str,
     *,
@@ -117,10 +116,11 @@ def acquire(
     port
         A device file, a COM port, ``socket://HOST:PORT`` or ``rfc2217://HOST:PORT``;
         ``"simulated:di2108"`` needs none.
-    duration_s, rate_hz, channel
-        Length, scans a second, and the channel as printed on the box.
-    model
-        The instrument; it is asked when not given.
+    {duration_s}
+    {rate_hz}
+    channel
+        As printed on the box.
+    {model}
     signal
         What a simulated instrument reads: times in s to volts. By default a decaying pendulum.
     **options
@@ -213,12 +213,13 @@ def turning_points(recording: Source) -> TurningPoints:
     return measure_recording(_motion(recording), _place(recording))[0]
 
 
+@documented
 def fit(
     recording: Source | TurningPoints | ArrayLike | DataFrame,
     angle_rad: ArrayLike | None = None,
     *,
-    method: Method | None = None,
-    restoring: Restoring | None = None,
+    method: Method | Literal["auto"] | None = None,
+    restoring: Restoring | Literal["auto"] | None = None,
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
     volts_per_radian: float | None = None,
@@ -245,28 +246,17 @@ def fit(
         Amplitudes alone (a ruler's, or speeds at a gate), and turning points, are fitted by Eq. 14.
     angle_rad
         The angles at these times, rad.
-    method
-        ``"waveform"`` or ``"turning-points"`` to have only that one.
-    restoring
-        ``"linear"`` or ``"sine"``, the restoring torque; by default see above.
-    baseline
-        ``"eq8"``, or ``"viscous"`` for Eq. 3 (a = c = 0).
-    fixed
-        Parameters to hold, by name: ``{"a": 0.0}``.
-    volts_per_radian
-        The sensor's constant, where the readings are volts and do not carry it.
+    {method}
+    {restoring}
+    {baseline}
+    {fixed}
+    {volts_per_radian}
     points
         Turning points measured before (`turning_points`): they name the decay.
-    clock_ppm
-        What the clock may be off by, in parts per million; it enters the errors.
-    scale_percent
-        What the scale of the readings may be off by (V/rad, a camera's); it enters those of a, c
-        and the amplitude.
-    length_m
-        Length of the pendulum whose displacement is read as L sin x (with ``restoring="sine"``);
-        amplitudes in m, and speeds in m/s, become angles by it.
-    period
-        Period of small swings, s, where amplitudes alone are given, which show none.
+    {clock_ppm}
+    {scale_percent}
+    {length_m}
+    {period}
     name
         What to call the recording in messages; by default its path.
 
@@ -296,9 +286,10 @@ def fit(
     Copy: T0 = (1.1454714 ± 0.0000028) s; Q = 162.27 ± 0.20 at 73.4 mrad; 62 % of the loss ...
     Next: pendpipe page FILE makes a sheet to hand out; --figure draws it, --json is for programs
     """
-    _check_choice("method", method, ("waveform", "turning-points"))
-    _check_choice("restoring", restoring, ("linear", "sine"))
-    _check_choice("baseline", baseline, ("eq8", "viscous"))
+    check(method=method, restoring=restoring, baseline=baseline)
+    check(clock_ppm=clock_ppm, scale_percent=scale_percent)
+    method = None if method == "auto" else method
+    restoring = None if restoring == "auto" else restoring
     from dataclasses import replace
 
     from pendpipe.analysis.fit import fit_recording, fit_turning_points
@@ -347,14 +338,8 @@ def fit(
         length_m=length_m,
         place=place,
     )
-    for given, most, word, widened in (
-        (clock_ppm, 1e6, "clock_ppm", with_clock),
-        (scale_percent, 100.0, "scale_percent", with_scale),
-    ):
-        if given is not None:
-            known = 0.0 <= given < most
-            refuse_if(not known, word, f"{given!r} is no such part", "give a number from 0 on")
-            result = widened(result, given)
+    result = result if clock_ppm is None else with_clock(result, clock_ppm)
+    result = result if scale_percent is None else with_scale(result, scale_percent)
     if points.unit != result["amplitude"].unit:
         # Of its rate, or of a position, the angle was fitted.
         points, _ = as_angles(points, position=points.unit == "m")
@@ -378,12 +363,13 @@ def _given_period(period: float | Estimate | None) -> Estimate | None:
     return given
 
 
+@documented
 def diagnose(
     recording: Source | Sequence[Source] | Mapping[str, Source],
     *,
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
-    restoring: Restoring | None = None,
+    restoring: Restoring | Literal["auto"] | None = None,
     level: float = 0.01,
     seed: int = 0,
     volts_per_radian: float | None = None,
@@ -403,27 +389,17 @@ def diagnose(
         A recording, or the path of its file; or several of one pendulum (a list, or a mapping
         of their names), which are then one measurement: physics shared, start and noise each
         its own (docs/several.md).
-    baseline
-        The null model: ``"eq8"``, or ``"viscous"`` for Eq. 3.
-    fixed
-        Parameters to hold, by name, so that a prediction is compared with the recording.
-    restoring
-        ``"linear"`` (a torsion wheel, a mass on a spring) or ``"sine"``; by default as for `fit`.
-    level
-        Significance level: how often a recording that lacks nothing may be reported.
-    seed
-        Seed of the draws that count independent trials.
-    volts_per_radian
-        The sensor's constant, where the readings are volts and do not carry it.
+    {baseline}
+    {fixed}
+    {restoring}
+    {level}
+    {seed}
+    {volts_per_radian}
     name
         What to call the recording in messages; by default its path.
-    own
-        Of several recordings: what each has of its own (``"a"``, ``"b"``, ``"c"``,
-        ``"frequency"``).
-    same_sensor
-        Of several recordings: whether they share the sensor's errors as well.
-    together
-        That several recordings are of one pendulum.
+    {own}
+    {same_sensor}
+    {together}
 
     Returns
     -------
@@ -443,11 +419,8 @@ def diagnose(
     >>> answer.verdict, answer.effects[0].identifier, answer.effects[0].presumed
     ('consistent', 'circular-error', True)
     """
-    torque = None if restoring in (None, "auto") else restoring
-    _check_choice("restoring", torque, ("linear", "sine"))
-    _check_choice("baseline", baseline, ("eq8", "viscous"))
-    refuse_if(not 0.0 < level < 1.0, "level", f"{level!r} is no probability", "give 0.01")
-    refuse_if(seed < 0, "seed", f"{seed} is negative", "give 0 or more")
+    check(restoring=restoring, baseline=baseline, level=level, seed=seed)
+    torque = None if restoring == "auto" else restoring
     if not isinstance(recording, Recording | str | Path):
         from pendpipe.diagnosis.several import diagnose_several
         from pendpipe.files import distinct_names
@@ -488,6 +461,7 @@ def diagnose(
     )
 
 
+@documented
 def simulate(model: str | Path | Mapping[str, Any], *, seed: int | None = None) -> Recording:
     """Simulate a recording from a described pendulum and measurement chain.
 
@@ -495,8 +469,7 @@ def simulate(model: str | Path | Mapping[str, Any], *, seed: int | None = None) 
     ----------
     model
         A TOML file like ``config/model.toml``, or its content as a mapping.
-    seed
-        Seed of the noise, instead of the model's.
+    {seed}
 
     Examples
     --------
@@ -511,23 +484,12 @@ def simulate(model: str | Path | Mapping[str, Any], *, seed: int | None = None) 
     """
     from pendpipe.simulation import model as models
 
-    refuse_if(seed is not None and seed < 0, "seed", f"{seed} is negative", "give 0 or more")
+    check(seed=seed)
     described = models.read_model(model)
     if seed is not None:
         described = described.model_copy(update={"seed": seed})
     place = "model" if isinstance(model, Mapping) else str(model)
     return models.simulate(described, f"simulated: {Path(place).name}", place=place)
-
-
-def _check_choice(name: str, value: str | None, choices: Sequence[str]) -> None:
-    """Refuse an option that is none of its values."""
-    from difflib import get_close_matches
-
-    if value is None or value in choices:
-        return
-    near = get_close_matches(str(value), choices, n=1)
-    remedy = f"did you mean {near[0]!r}?" if near else f"give {' or '.join(map(repr, choices))}"
-    raise InputError(name, f"{value!r} is not a valid choice", remedy)
 
 
 def _source(recording: Any, angle_rad: ArrayLike | None = None) -> Source:

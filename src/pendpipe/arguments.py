@@ -1,169 +1,51 @@
-"""The arguments that several commands share, and what is read and printed by them."""
+"""What the commands share: their arguments declared and checked, what is read and printed."""
 
 from __future__ import annotations
 
 import argparse
 import hashlib
-import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
 
 from pendpipe.errors import InputError
 from pendpipe.files import check_output, is_stream, json_text, read_json, writing
+from pendpipe.options import ALTERNATIVES, Flags
 from pendpipe.version import __version__
 
 if TYPE_CHECKING:
     from pendpipe.configuration.load import Campaign
-    from pendpipe.estimate import Estimate
     from pendpipe.formats import ReadOptions
     from pendpipe.recording import Recording
 
-Flags = dict[str, dict[str, Any]]
-"""Arguments by their names, each with its options; see `declare`."""
 Arguments: TypeAlias = argparse.Namespace
-"""What one call gave for them."""
-ALTERNATIVES: Final = "alternatives"
-INPUT: Final[dict[str, Any]] = {"file": "input"}
-OUTPUT: Final[dict[str, Any]] = {"file": "output"}
-OUTPUTS: Final[dict[str, Any]] = {"file": "outputs"}
-"""What an argument names: a file that is read; one that is written, and looked at before any work;
-a folder, or a file, that the command looks at itself. The last two give a command ``--force``."""
+"""What one call gave for a command's arguments."""
+
+
+class Command(NamedTuple):
+    """A command: what ``--help`` says of it, its arguments, and what does it."""
+
+    description: str
+    arguments: Flags
+    run: Callable[[Arguments], int | None]
+    add_arguments: Callable[[argparse.ArgumentParser], None] | None = None
+    """Of a command that another package adds: it declares its arguments by itself."""
+
+    def declare(self, parser: argparse.ArgumentParser) -> None:
+        """Declare its arguments."""
+        if self.add_arguments:
+            self.add_arguments(parser)
+        else:
+            declare(parser, self.arguments)
+
+
 _FORCE: Final = {
     "action": "store_true",
     "help": "replace files that pendpipe did not make (never an input, nor a raw file)",
 }
-
-
-def under(heading: str, arguments: Flags) -> Flags:
-    """Put arguments under a heading of the help."""
-    return {name: options | {"heading": heading} for name, options in arguments.items()}
-
-
-_OVERRIDES: Final[Flags] = {
-    "--channel": {"metavar": "CHANNEL", "help": "number (from 1) or name, see inspect"},
-    "--column": {
-        "metavar": "COLUMN",
-        "help": "number (from 1) or name; X,Y for a position; TIME:COLUMN",
-    },
-    "--unit": {"metavar": "UNIT", "help": "rad, deg, V, mm, counts, ...; or ms:deg"},
-    "--sample-rate": {"metavar": "HZ", "type": float, "help": "samples a second"},
-    "--decimal": {"metavar": "SIGN", "help": "decimal sign, '.' or ','"},
-    "--delimiter": {"metavar": "SIGN", "help": "sign between cells, or tab, space"},
-    "--volts-per-radian": {
-        "metavar": "V",
-        "type": float,
-        "help": "the sensor's constant, V/rad",
-    },
-    "--start": {
-        "metavar": "S",
-        "type": float,
-        "dest": "start_s",
-        "help": "first time to read, seconds",
-    },
-    "--stop": {
-        "metavar": "S",
-        "type": float,
-        "dest": "stop_s",
-        "help": "last time to read, seconds",
-    },
-}
-"""Overrides of a reader's guesses, one a field of `pendpipe.formats.ReadOptions`."""
-_READING: Final = under("where a guess is wrong", _OVERRIDES)
-_A_RECORDING: Final = "a recording in any supported format; - is standard input"
-FILE: Final[Flags] = {"file": {"metavar": "FILE", "help": _A_RECORDING} | INPUT} | _READING
-FILES: Final[Flags] = {
-    "files": {"metavar": "FILE", "nargs": "+", "help": _A_RECORDING} | INPUT
-} | _READING
-"""The argument of a command that reads a recording, or several, with the overrides."""
-
-SHARED: Final[Flags] = {
-    "--json": {"action": "store_true", "help": "print one JSON object"},
-    "--calibration": {
-        "type": Path,
-        "metavar": "JSON",
-        "help": "the sensor's, from pendpipe calibrate",
-    }
-    | INPUT,
-    "--turning-points": {
-        "type": Path,
-        "metavar": "CSV",
-        "help": "of an earlier stage, with their cuts",
-    }
-    | INPUT,
-    "--baseline": {
-        "choices": ("eq8", "viscous"),
-        "default": "eq8",
-        "help": "eq8: Eq. 8 (default); viscous: Eq. 3, a = c = 0",
-    },
-    "--fix": {
-        "action": "append",
-        "default": [],
-        "metavar": "NAME=VALUE",
-        "help": "hold a parameter, as for a prediction (a, b, c, frequency, amplitude, offset,"
-        " quality_factor_hysteretic, quality_factor_viscous); repeatable",
-    },
-    "--campaign": {"type": Path, "metavar": "CONFIG", "help": "a campaign's configuration"} | INPUT,
-    "--comparison": {
-        "type": Path,
-        "metavar": "FILE",
-        "help": "comparison.json, from pendpipe compare",
-    }
-    | INPUT,
-    "--record": {"metavar": "NAME", "help": "the campaign's name for this record"},
-    "--refused": {
-        "type": Path,
-        "metavar": "FILE",
-        "help": "write here why the record can't be used, and end with 0, instead of ending with 2",
-    }
-    | OUTPUT,
-}
-"""Arguments of more than one command."""
-
-
-def shared(*names: str, **more: Any) -> Flags:
-    """Look up arguments that other commands have as well."""
-    return {name: SHARED[name] | more for name in names}
-
-
-def number_within(low: float, high: float = math.inf) -> Callable[[str], float]:
-    """Make a type of argparse: a number between two limits, themselves left out."""
-
-    def read(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            raise argparse.ArgumentTypeError(f"'{text}' is no number") from None
-        if not low < value < high:
-            limits = f"lie between {low:g} and {high:g}" if high < math.inf else "be positive"
-            raise argparse.ArgumentTypeError(f"it must {limits} (it is {text})")
-        return value
-
-    return read
-
-
-def measured_number(text: str) -> Estimate:
-    """Read a number with its error, as a type of argparse: 0.600(1)."""
-    from pendpipe.estimate import measured
-
-    try:
-        return measured(text)
-    except ValueError as problem:
-        raise argparse.ArgumentTypeError(str(problem)) from None
-
-
-def natural(text: str) -> int:
-    """Be a type of argparse: a whole number that is not negative."""
-    try:
-        value = int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"'{text:.40}' is no whole number") from None
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"it must not be negative (it is {text:.40})")
-    return value
 
 
 def declare(parser: argparse.ArgumentParser, arguments: Flags) -> None:

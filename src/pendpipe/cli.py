@@ -1,8 +1,9 @@
 """The command line: it picks a command and turns user errors into one line and a status.
 
-Every command is a module of `pendpipe.commands`, or of `pendpipe.stages` where it is a stage of a
+A command is a module of `pendpipe.commands`, or of `pendpipe.stages` where it is a stage of a
 campaign and no more, with the table ``ARGUMENTS`` (see `pendpipe.arguments.declare`) and the
-function ``run(arguments)``, which returns the exit status where it is not 0.
+function ``run(arguments)``, which returns the exit status where it is not 0; or, where it takes a
+few lines, a function of `pendpipe.commands.small`.
 Only the module of the command that was asked for is imported, since a job's cost is its imports.
 Other packages add commands by entry points of the group ``pendpipe.commands``; one that has
 commands of its own declares them by a function ``add_arguments(parser)`` instead.
@@ -42,6 +43,10 @@ COMMANDS: Final = {
     "stage": "one stage of a chunk of a campaign's records, as a job of the workflow",
 }
 """The commands with the line that ``--help`` shows for each."""
+SMALL: Final = frozenset(
+    ("inspect", "convert", "simulate", "init", "campaign", "config", "effects", "completion")
+)
+"""Those in one file, `pendpipe.commands.small`."""
 STAGES: Final = {
     "separate": "the hysteretic and the viscous part of a campaign's losses",
     "compare": "a campaign's losses beside Eq. 16",
@@ -88,14 +93,25 @@ def _descriptions() -> dict[str, str]:
     )
 
 
-def module_of(name: str) -> Any:
-    """The module of a command; None where there is no such command."""
-    if name in COMMANDS:
-        return importlib.import_module(f"pendpipe.commands.{name.replace('-', '_')}")
-    if name in STAGES:
-        return importlib.import_module(f"pendpipe.stages.{name.replace('-', '_')}")
+def command_of(name: str) -> Any:
+    """Find a command; None where there is none of the name."""
+    from pendpipe.arguments import Command
+
+    if name in SMALL:
+        from pendpipe.commands import small
+
+        return small.COMMANDS[name]
+    if name in COMMANDS or name in STAGES:
+        file = name.replace("-", "_")
+        module = (
+            importlib.import_module(f"pendpipe.commands.{file}")
+            if name in COMMANDS
+            else importlib.import_module(f"pendpipe.stages.{file}")
+        )
+        return Command(module.__doc__ or "", module.ARGUMENTS, module.run)
     if (found := _added().get(name)) is not None:
-        return found.load()
+        module = found.load()
+        return Command(module.__doc__ or "", {}, module.run, module.add_arguments)
     if name in IN_A_CLONE:
         raise InputError(
             name, "this command is not installed", f"in a clone of pendpipe: {IN_A_CLONE[name]}"
@@ -105,22 +121,16 @@ def module_of(name: str) -> Any:
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
     """Parse the words of one call; argparse ends the program with 2 on bad usage."""
-    module = module_of(argv[0]) if argv and not argv[0].startswith("-") else None
-    if module is not None:
+    command = command_of(argv[0]) if argv and not argv[0].startswith("-") else None
+    if command is not None:
         parser = _Parser(
             prog=f"pendpipe {argv[0]}",
-            description=module.__doc__,
+            description=command.description,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        declared = getattr(module, "ARGUMENTS", {})
-        if declared:
-            from pendpipe.arguments import declare
-
-            declare(parser, declared)
-        else:
-            module.add_arguments(parser)
+        command.declare(parser)
         arguments = parser.parse_args(argv[1:])
-        arguments.run, arguments.declared = module.run, declared
+        arguments.run, arguments.declared = command.run, command.arguments
         return arguments
     # Looking for added commands takes longer than all the rest.
     descriptions = COMMANDS if list(argv) == ["--version"] else _descriptions()

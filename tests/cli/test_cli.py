@@ -2,27 +2,40 @@
 
 from __future__ import annotations
 
-import importlib
 import subprocess
 import sys
+from collections.abc import Callable
+from inspect import signature
 from pathlib import Path
 
 import pytest
 
+import pendpipe as pp
 from pendpipe import cli
+from pendpipe.options import OPTIONS
 
 
 @pytest.mark.parametrize("name", cli.COMMANDS | cli.STAGES)
-def test_every_command_has_its_module_and_its_help(
-    name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_every_command_says_what_it_does(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         cli.main([name, "--help"])
     assert ended.value.code == 0
-    shown = capsys.readouterr().out
-    home = "commands" if name in cli.COMMANDS else "stages"
-    module = importlib.import_module(f"pendpipe.{home}.{name.replace('-', '_')}")
-    assert (module.__doc__ or "").splitlines()[0] in shown
+    assert cli.command_of(name).description.splitlines()[0] in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("verb", [pp.read, pp.acquire, pp.fit, pp.diagnose, pp.simulate])
+def test_a_keyword_and_its_option_have_the_same_words(verb: Callable[..., object]) -> None:
+    said = " ".join((verb.__doc__ or "").split()).lower()
+    assert "{" not in said.partition("examples")[0]
+    shared = {
+        option.keyword or flag.lstrip("-").replace("-", "_"): option.help
+        for flag, option in OPTIONS.items()
+    }
+    # A box's channel is its number, a model to simulate is a file, points are measured ones.
+    others = {(pp.acquire, "channel"), (pp.simulate, "model"), (pp.fit, "points")}
+    for keyword in signature(verb).parameters.keys() & shared.keys():
+        if (verb, keyword) not in others:
+            assert f"{keyword} {' '.join(shared[keyword].split())}.".lower() in said
 
 
 def test_a_mistyped_command_gets_the_nearest_one(capsys: pytest.CaptureFixture[str]) -> None:

@@ -73,9 +73,9 @@ def test_a_seed_below_zero_or_of_words_is_refused(
         with pytest.raises(SystemExit, match="2"):
             main(["diagnose", file, "--seed", seed])
         assert "--seed" in one_line(capsys)
-    with pytest.raises(InputError, match="seed: -1 is negative"):
+    with pytest.raises(InputError, match="seed: it must not be negative"):
         pp.diagnose(file, seed=-1)
-    with pytest.raises(InputError, match="seed: -1 is negative"):
+    with pytest.raises(InputError, match="seed: it must not be negative"):
         pp.simulate({}, seed=-1)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pendpipe.commands.effects import manual
+from pendpipe.commands.small import catalogue_manual as manual
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OFFSET, OMEGA, START, TIME, A, B, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier

@@ -14,7 +14,7 @@ from pendpipe.formats import read
 
 from .dialects import Sample, draw
 
-SEED, FILES = 20261122, 400
+SEED, FILES = 20261122, 150
 
 
 def outcome(path: Path, sample: Sample) -> tuple[str, str]:

@@ -60,28 +60,32 @@ def test_the_worked_bytes_of_a_header() -> None:
         closed=1_700_000_001,
         events=[Event(1, 9, "hit")],
     )
-    assert data[0:2] == b"\x02\x00"
-    assert data[4:8] == b"\x6e\x24\x84\x04"  # 110, 36, 1156
-    assert data[8:12] == b"\x08\x00\x00\x00"  # data bytes
-    assert data[12:16] == b"\x14\x00\x00\x00"  # five numbers of events
-    assert data[16:18] == b"\x07\x00"  # "Angle\0" and "\0"
-    assert data[28:36] == bytes.fromhex("fc a9 f1 d2 4d 62 70 3f")  # as in the vendor's SAMPLE.WDQ
-    assert data[36:44] == struct.pack("<ii", 1_700_000_000, 1_700_000_001)
-    assert data[44:48] == b"\x01\x00\x00\x00"
+    expected = {
+        0: b"\x02\x00",
+        4: b"\x6e\x24\x84\x04",  # 110, 36, 1156
+        8: b"\x08\x00\x00\x00",  # data bytes
+        12: b"\x14\x00\x00\x00",  # five numbers of events
+        16: b"\x07\x00",  # "Angle\0" and "\0"
+        28: bytes.fromhex("fc a9 f1 d2 4d 62 70 3f"),  # as in the vendor's SAMPLE.WDQ
+        36: struct.pack("<ii", 1_700_000_000, 1_700_000_001),
+        44: b"\x01\x00\x00\x00",
+        68: bytes(range(32)),
+        100: b"\x02\x00",  # HiRes, not packed
+        118: bytes.fromhex("00 00 00 00 00 00 54 3f"),  # 10/8192
+        134: b"Volt\0\0",
+        142: b"\x01\x10",  # channel 1, 10 000 mV, gain 1
+        154: struct.pack("<dd", 5 / 8192, -1.5),
+        170: b"degre\0",
+        178: b"\x04\x00",  # channel 4, 5000 mV, gain 1
+        1154: b"\x01\x80",
+        1156: bytes.fromhex("01 00 fe ff ff 7f 00 80"),
+        # Start; the pointer counts samples (scan 1 of two channels); its stamp; its comment.
+        1164: struct.pack("<iiiiI", 0, 0, 2, 9, 0x8000_0007),
+        1184: b"Angle\0\0hit\0",
+    }
+    assert {at: data[at : at + len(part)] for at, part in expected.items()} == expected
+    assert len(data) == 1184 + len(expected[1184])
     assert data[65] >> 6 == 0
-    assert data[68:100] == bytes(range(32))
-    assert data[100:102] == b"\x02\x00"  # HiRes, not packed
-    assert data[118:126] == bytes.fromhex("00 00 00 00 00 00 54 3f")  # 10/8192
-    assert data[134:140] == b"Volt\0\0"
-    assert (data[142], data[143]) == (1, 0x10)  # channel 1, 10 000 mV, gain 1
-    assert data[154:170] == struct.pack("<dd", 5 / 8192, -1.5)
-    assert data[170:176] == b"degre\0"
-    assert (data[178], data[179]) == (4, 0x00)  # 5000 mV, gain 1
-    assert data[1154:1156] == b"\x01\x80"
-    assert data[1156:1164] == bytes.fromhex("01 00 fe ff ff 7f 00 80")
-    # Start; the pointer counts samples (scan 1 of two channels); its stamp; its comment.
-    assert data[1164:1184] == struct.pack("<iiiiI", 0, 0, 2, 9, 0x8000_0007)
-    assert data[1184:] == b"Angle\0\0hit\0"
 
 
 @pytest.mark.parametrize(

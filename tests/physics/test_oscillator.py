@@ -103,12 +103,6 @@ def test_frequency_shifts_at_the_smallest_q_met() -> None:
     assert exact / float(hysteretic_frequency_shift(10.0)) - 1.0 == pytest.approx(0.0015, abs=1e-4)
 
 
-def test_hysteretic_decrement_is_a_fifth_of_a_percent_below_q_at_10() -> None:
-    measured = hysteretic_decrement_quality(10.0)
-    assert measured == pytest.approx(np.pi / (4.0 * np.arctanh(np.pi / 40.0)), rel=1e-14)
-    assert 1.0 - measured / 10.0 == pytest.approx(np.pi**2 / 4800.0, rel=0.01)
-
-
 @given(quality=st.floats(5.0, 1e5))
 @settings(deadline=None)
 def test_shifts_are_the_leading_order_of_the_exact_ratios(quality: float) -> None:

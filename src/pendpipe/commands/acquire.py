@@ -18,21 +18,18 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Final
 
-from pendpipe.arguments import (
+from pendpipe.arguments import Arguments, load, tell_written
+from pendpipe.errors import InputError, refuse_if
+from pendpipe.files import check_output, check_writable, is_stream
+from pendpipe.options import (
     ALTERNATIVES,
     INPUT,
     OUTPUTS,
-    Arguments,
+    POSITIVE,
     Flags,
-    load,
-    natural,
-    number_within,
-    shared,
-    tell_written,
+    flags,
     under,
 )
-from pendpipe.errors import InputError, refuse_if
-from pendpipe.files import check_output, check_writable, is_stream
 
 _SOURCES: Final[Flags] = {
     "--port": {"help": "serial port of a real instrument: /dev/ttyUSB0, COM3"},
@@ -46,21 +43,11 @@ _SOURCES: Final[Flags] = {
 }
 _OWN: Final[Flags] = {
     "--list": {"action": "store_true", "help": "list ports; with --port, identify its device"},
-    "--model": {"help": "the instrument on --port: di154rs, di2108, ..."},
     "--channel": {"type": int, "help": "as printed on the box (1)"},
-    "--rate": {"type": float, "default": 60.0, "metavar": "HZ", "help": "scans a second (60)"},
-    "--duration": {"type": float, "default": 60.0, "metavar": "S", "help": "length (60)"},
     "--samples": {
-        "type": number_within(0),
+        "type": POSITIVE,
         "metavar": "N",
         "help": "length, instead of --duration",
-    },
-    "--range-volts": {"type": float, "metavar": "V", "help": "the signal stays within +-V"},
-    "--reconnect": {
-        "type": float,
-        "default": 30.0,
-        "metavar": "S",
-        "help": "how long a device that was unplugged is waited for (30)",
     },
     "--out": {"metavar": "FILE", "help": "the recording; FILE.wdh for WinDaq"} | OUTPUTS,
     "--raw": {
@@ -79,13 +66,6 @@ _OWN: Final[Flags] = {
         "action": "store_true",
         "help": "show what is recorded on a page of this machine; its address is printed",
     },
-    "--volts-per-radian": {"type": float, "help": "sensor constant, for the metadata"},
-    "--seed": {"type": natural, "default": 0, "help": "of the simulated noise (0)"},
-    "--clock-scale": {
-        "type": number_within(0),
-        "default": 1.0,
-        "help": "simulated seconds in a real one (1)",
-    },
     "--signal": {
         "metavar": "TOML",
         "help": "with --serve: what it reads, as for pendpipe simulate",
@@ -93,14 +73,19 @@ _OWN: Final[Flags] = {
     | INPUT,
     "--link": {"choices": ("pty", "socket"), "help": "with --serve: on which line"},
 }
-_OF_A_STAGE: Final[Flags] = shared("--campaign", "--record", "--refused") | {
+_OF_A_STAGE: Final[Flags] = flags("--campaign", "--record", "--refused") | {
     "--caliper": {
         "action": "store_true",
         "help": "the campaign's caliper run instead of a record",
     }
 }
 ARGUMENTS: Final = (
-    under(ALTERNATIVES, _SOURCES) | _OWN | under("as a stage of a campaign", _OF_A_STAGE)
+    under(ALTERNATIVES, _SOURCES)
+    | _OWN
+    | flags("--model", "--rate", "--duration", "--range-volts", "--reconnect", "--clock-scale")
+    | flags("--volts-per-radian")
+    | flags("--seed", default=0, help="of the simulated noise (0)")
+    | under("as a stage of a campaign", _OF_A_STAGE)
 )
 
 

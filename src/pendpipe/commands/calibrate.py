@@ -14,25 +14,17 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe import manifest
-from pendpipe.arguments import (
-    INPUT,
-    OUTPUT,
-    SHARED,
-    Arguments,
-    Flags,
-    print_answer,
-    shared,
-    under,
-)
+from pendpipe.arguments import Arguments, print_answer
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import is_stream, read_json, write_json
+from pendpipe.options import INPUT, OUTPUT, Flags, flags, under
 from pendpipe.recording import Recording, read_plain
 from pendpipe.stages.refusal import run_stage
 
 _OWN: Final[Flags] = {
     "file": {"metavar": "FILE", "type": Path, "help": "table of volts against angles"} | INPUT,
     "--out": {"type": Path, "metavar": "JSON", "help": "write the result here"} | OUTPUT,
-    "--json": SHARED["--json"],
+    **flags("--json"),
     "--arm-m": {"type": float, "metavar": "M", "help": "arm of the displacements, metres"},
     "--arm-sd-m": {"type": float, "default": 0.0, "metavar": "M", "help": "its standard deviation"},
     "--displacement-sd-m": {
@@ -41,12 +33,11 @@ _OWN: Final[Flags] = {
         "metavar": "M",
         "help": "standard deviation of a displacement (the caliper's)",
     },
-    "--delimiter": {"help": "between the cells; guessed from the header"},
-    "--decimal": {"choices": ".,", "help": "decimal mark; guessed from the delimiter"},
+    **flags("--delimiter", help="between the cells; guessed from the header"),
+    **flags("--decimal", choices=".,", help="decimal mark; guessed from the delimiter"),
 }
-_OF_A_RECORD: Final = shared("--record", "--refused") | {
+_OF_A_RECORD: Final = flags("--record", "--refused", "--volts-per-radian") | {
     "--sensor": {"type": Path, "metavar": "JSON", "help": "the campaign's calibration"} | INPUT,
-    "--volts-per-radian": {"type": float, "metavar": "V/RAD", "help": "a known constant"},
 }
 ARGUMENTS: Final = _OWN | under("with --record", _OF_A_RECORD)
 

@@ -16,19 +16,7 @@ from typing import Any, Final
 
 from pendpipe.analysis.fit.by_points import parse_fixed
 from pendpipe.analysis.turning_points import read_turning_points
-from pendpipe.arguments import (
-    FILES,
-    OUTPUTS,
-    Arguments,
-    Flags,
-    natural,
-    number_within,
-    print_answer,
-    print_json,
-    read_motion,
-    shared,
-    tell,
-)
+from pendpipe.arguments import Arguments, print_answer, print_json, read_motion, tell
 from pendpipe.diagnosis.result import FILE_NAME, Diagnosis, not_analysable
 from pendpipe.diagnosis.run import diagnose_decay, diagnose_recording
 from pendpipe.dynamics.eq8 import Restoring
@@ -36,6 +24,7 @@ from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
 from pendpipe.files import check_output, distinct_names, make_folder, write_json, write_whole
 from pendpipe.manifest import check, job
+from pendpipe.options import FILES, OUTPUTS, Flags, flags
 from pendpipe.process import keep_memory
 from pendpipe.quantities import listed
 from pendpipe.recording import Recording
@@ -53,20 +42,6 @@ _EMPTY: Final = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 520 60">
 _OWN: Final[Flags] = {
     "--out": {"type": Path, "metavar": "DIR", "help": "write diagnosis.json and the figures there"}
     | OUTPUTS,
-    "--verbose": {"action": "store_true", "help": "all that was found, and harmless notes"},
-    "-v": {"dest": "verbose", "action": "store_true", "help": "the same"},
-    "--level": {
-        "type": number_within(0, 1),
-        "default": 0.01,
-        "metavar": "P",
-        "help": "false-alarm probability for a recording that lacks nothing (%(default)s)",
-    },
-    "--seed": {
-        "type": natural,
-        "default": 0,
-        "metavar": "N",
-        "help": "of the random draws",
-    },
     "--fail-on": {
         "choices": ("missing-physics",),
         "help": f"end with status {FOUND} on that verdict",
@@ -82,32 +57,15 @@ _OWN: Final[Flags] = {
         "const": "none",
         "help": "as --figures none",
     },
-    "--restoring": {
-        "choices": ("auto", "linear", "sine"),
-        "default": "auto",
-        "help": "linear: a torsion wheel or a spring; sine: a pendulum; auto: as pendpipe fit",
-    },
-    "--together": {
-        "action": "store_true",
-        "help": "several FILEs are recordings of one pendulum",
-    },
-    "--own": {
-        "action": "append",
-        "default": [],
-        "metavar": "NAME",
-        "help": "of several recordings: what each has of its own (a, b, c, frequency); repeatable",
-    },
-    "--same-sensor": {
-        "action": "store_true",
-        "help": "of several recordings: the sensor's errors are shared as well",
-    },
 }
 ARGUMENTS: Final = (
     FILES
     | _OWN
-    | shared("--json", "--baseline", "--fix", "--turning-points", "--record", "--refused")
+    | flags("--level", "--restoring", "--together", "--own", "--same-sensor", "--verbose", "-v")
+    | flags("--json", "--baseline", "--fix", "--turning-points", "--record", "--refused")
+    | flags("--seed", default=0)
     # With several FILEs one for all, or one for each.
-    | shared("--calibration", nargs="+", default=[])
+    | flags("--calibration", nargs="+", default=[])
 )
 
 

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from pendpipe import manifest
-from pendpipe.arguments import SHARED, Arguments, print_answer
+from pendpipe.arguments import Arguments, print_answer
 from pendpipe.errors import InputError, refuse_if
+from pendpipe.options import flags
 
 TEMPORARY: Final = re.compile(r"\.(.+)\.[0-9a-f]{8}")
 """The name of a file that `pendpipe.files.replaced` had not finished."""
@@ -36,7 +37,7 @@ ARGUMENTS: Final = {
         "metavar": "DIR",
         "help": "a folder of results (%(default)s)",
     },
-    "--json": SHARED["--json"],
+    **flags("--json"),
     "--fail-on": {"choices": ("findings",), "help": "end with status 3 if anything is wrong"},
 }
 

@@ -7,11 +7,12 @@ each of figures 3 to 10 is written all the same, with the reason in its place.
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import OUTPUTS, Arguments, shared, tell
+from pendpipe.arguments import Arguments, tell
 from pendpipe.files import write_json
 from pendpipe.manifest import job
+from pendpipe.options import OUTPUTS, flags
 
-ARGUMENTS: Final = shared("--campaign", "--comparison", required=True) | {
+ARGUMENTS: Final = flags("--campaign", "--comparison", required=True) | {
     "--out": {
         "required": True,
         "type": Path,

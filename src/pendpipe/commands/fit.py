@@ -21,24 +21,11 @@ from pendpipe.analysis.fit.by_points import parse_fixed
 from pendpipe.analysis.fit.printed import gravity_line, lines
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.turning_points import is_turning_points, read_turning_points
-from pendpipe.arguments import (
-    ALTERNATIVES,
-    FILES,
-    OUTPUT,
-    Arguments,
-    Flags,
-    measured_number,
-    natural,
-    number_within,
-    print_answer,
-    print_json,
-    read_motion,
-    shared,
-    tell,
-)
+from pendpipe.arguments import Arguments, print_answer, print_json, read_motion, tell
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import over
 from pendpipe.files import is_stream, read_json, write_json
+from pendpipe.options import ALTERNATIVES, FILES, OUTPUT, POSITIVE, Flags, flags, under
 from pendpipe.report.class_table import Fitted, form_of, printed, together, write_fits
 
 _OWN: Final[Flags] = {
@@ -53,62 +40,25 @@ _OWN: Final[Flags] = {
         "help": "draw decay, residual, and Q against amplitude (.svg, .png, .pdf)",
     }
     | OUTPUT,
-    "--length": {
-        "type": measured_number,
-        "metavar": "M",
-        "help": "length of a simple pendulum, m, as 0.600 or 0.600(1): prints g",
-    },
-    "--period": {
-        "type": measured_number,
-        "metavar": "S",
-        "heading": ALTERNATIVES,
-        "help": "period of small swings, s, as 1.42 or 1.42(1), where amplitudes alone are given",
-    },
-    "--frequency": {
-        "type": measured_number,
-        "metavar": "HZ",
-        "heading": ALTERNATIVES,
-        "help": "its inverse, Hz",
-    },
-    "--clock-ppm": {
-        "type": number_within(0),
-        "metavar": "PPM",
-        "help": "what the clock may be off by, parts per million: it enters the errors",
-    },
-    "--scale-percent": {
-        "type": number_within(0, 100),
-        "metavar": "P",
-        "help": "what V/rad, or a camera's scale, may be off by, in percent: in the errors of"
-        " a, c and the amplitude; by default that of --calibration",
-    },
     "--gravity": {
-        "type": number_within(0),
+        "type": POSITIVE,
         "metavar": "G",
         "help": "g in m/s^2: prints the equivalent length",
-    },
-    "--method": {"choices": ("auto", "waveform", "turning-points"), "default": "auto"},
-    "--restoring": {
-        "choices": ("auto", "linear", "sine"),
-        "default": "auto",
-        "help": "the restoring torque: omega^2 x, omega^2 sin x, or what the recording asks for",
     },
     "--accept": {
         "action": "store_true",
         "help": "print a law that contradicts the decay, status 0",
     },
     "--wide": {"action": "store_true", "help": "of several FILEs: a, b, c in columns"},
-    "-v": {
-        "dest": "verbose",
-        "action": "store_true",
-        "help": "tell how it was read, and harmless notes",
-    },
-    "--seed": {"type": natural, "metavar": "N", "help": "recorded only"},
 }
 ARGUMENTS: Final = (
     FILES
     | _OWN
-    | shared("--json", "--baseline", "--fix", "--turning-points", "--calibration")
-    | shared("--record", "--refused")
+    | under(ALTERNATIVES, flags("--period", "--frequency"))
+    | flags("--length", "--clock-ppm", "--scale-percent", "--method", "--restoring", "--verbose")
+    | flags("-v", "--json", "--baseline", "--fix", "--turning-points", "--calibration")
+    | flags("--record", "--refused")
+    | flags("--seed", help="recorded only")
 )
 
 
@@ -175,8 +125,8 @@ def _fit(arguments: Arguments, say: Callable[[str], None] = tell) -> FitResult:
     result = api.fit(
         arguments.file if is_turning_points(arguments.file) else recording,
         points=points,
-        method=None if arguments.method == "auto" else arguments.method,
-        restoring=None if arguments.restoring == "auto" else arguments.restoring,
+        method=arguments.method,
+        restoring=arguments.restoring,
         baseline=arguments.baseline,
         fixed=fixed,
         length_m=arguments.length.value if arguments.length else None,

@@ -9,8 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from pendpipe.arguments import FILES, OUTPUT, Arguments, read_motion, shared, tell
+from pendpipe.arguments import Arguments, read_motion, tell
 from pendpipe.errors import InputError, refuse_if
+from pendpipe.options import FILES, OUTPUT, flags
 
 ARGUMENTS: Final = (
     FILES
@@ -22,7 +23,7 @@ ARGUMENTS: Final = (
         | OUTPUT,
         "--no-diagnosis": {"action": "store_true", "help": "the fit alone, in a second"},
     }
-    | shared("--calibration")
+    | flags("--calibration")
 )
 
 

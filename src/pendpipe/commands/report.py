@@ -8,11 +8,12 @@ campaign's numbers go to standard output too, beside the paper's and the simulat
 from pathlib import Path
 from typing import Final
 
-from pendpipe.arguments import INPUT, OUTPUT, Arguments, shared, tell
+from pendpipe.arguments import Arguments, tell
+from pendpipe.options import INPUT, OUTPUT, flags
 
 ARGUMENTS: Final = {
-    **shared("--campaign", required=True),
-    **shared("--comparison"),
+    **flags("--campaign", required=True),
+    **flags("--comparison"),
     "--summary": {
         "type": Path,
         "metavar": "FILE",

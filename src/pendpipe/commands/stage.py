@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Final
 
 from pendpipe import manifest
-from pendpipe.arguments import Arguments, Flags, load, shared, tell
+from pendpipe.arguments import Arguments, load, tell
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.errors import refuse_if
 from pendpipe.files import make_folder
+from pendpipe.options import Flags, flags
 from pendpipe.stages.chunks import (
     STAGES,
     Stage,
@@ -31,7 +32,7 @@ _OWN: Final[Flags] = {
     "--chunk": {"required": True, "metavar": "NAME", "help": "which records"},
     "--out": {"required": True, "type": Path, "metavar": "JSON", "help": "what was done"},
 }
-ARGUMENTS: Final = _OWN | shared("--campaign", required=True)
+ARGUMENTS: Final = _OWN | flags("--campaign", required=True)
 
 
 def run(arguments: Arguments) -> int:

@@ -10,22 +10,15 @@ from typing import Final
 
 from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.analysis.turning_points import write_turning_points
-from pendpipe.arguments import (
-    FILE,
-    OUTPUT,
-    Arguments,
-    read_motion,
-    shared,
-    tell,
-    tell_written,
-)
+from pendpipe.arguments import Arguments, read_motion, tell, tell_written
+from pendpipe.options import FILE, OUTPUT, flags
 from pendpipe.quantities import after_number
 from pendpipe.stages.refusal import run_stage
 
 ARGUMENTS: Final = (
     FILE
     | {"--out": {"type": Path, "required": True, "metavar": "CSV", "help": "the table"} | OUTPUT}
-    | shared("--calibration", "--record", "--refused")
+    | flags("--calibration", "--record", "--refused")
 )
 
 

@@ -477,4 +477,5 @@ def tree_of_version_4(data: bytes) -> dict[str, Any]:
     try:
         return dict(loadmat(io.BytesIO(data)))  # type: ignore[arg-type]
     except Exception as fault:
-        raise NotThisFormatError(f"it is no file of MATLAB 4 ({fault})") from None
+        # scipy's message may hold a name of a damaged file: any bytes, of any length.
+        raise NotThisFormatError(f"it is no file of MATLAB 4 ({str(fault)[:60]!a})") from None

@@ -75,7 +75,9 @@ def _in_rows(lines: list[str]) -> list[str]:
     """Part a list that stands in one line."""
     if len(lines) >= 5:
         return lines
-    whole = re.sub(r"^(\w+\s*=\s*)?[\[{]\s*(?=[(\[{])", "", "\n".join(lines).lstrip())
+    text = "\n".join(lines).lstrip()
+    whole, opened = re.subn(r"^(\w+\s*=\s*)?[\[{]\s*(?=[(\[{])", "", text)
+    whole = re.sub(r"(?<=[)\]}])\s*[\]}][;\s]*$", "", whole) if opened else whole
     return re.sub(r"(?<=[)\]}])\s*,\s*(?=[(\[{])", "\n", whole).split("\n")
 
 

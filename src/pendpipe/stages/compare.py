@@ -8,7 +8,7 @@ import numpy as np
 
 from pendpipe.analysis.compare import amplitude_misfit, tail_fits
 from pendpipe.analysis.turning_points import read_turning_points
-from pendpipe.arguments import INPUT, OUTPUT, Arguments, load, shared
+from pendpipe.arguments import Arguments, load
 from pendpipe.campaign.fit import InertiaSds, inertia_sds, joint_values
 from pendpipe.campaign.values import Line, Values, campaign_values
 from pendpipe.configuration.jobs import digest
@@ -16,6 +16,7 @@ from pendpipe.configuration.load import Campaign
 from pendpipe.estimate import Estimate
 from pendpipe.files import read_json, write_json
 from pendpipe.manifest import job
+from pendpipe.options import INPUT, OUTPUT, flags
 from pendpipe.physics import inertia_from_frequency
 from pendpipe.provenance import code_version
 from pendpipe.stages.results import (
@@ -32,7 +33,7 @@ from pendpipe.stages.results import (
 from pendpipe.stages.separate import is_line
 from pendpipe.version import __version__
 
-ARGUMENTS: Final = shared("--campaign", required=True) | {
+ARGUMENTS: Final = flags("--campaign", required=True) | {
     "--separation": {"type": Path, "required": True, "help": "the stage before's JSON"} | INPUT,
     "--out": {"type": Path, "required": True, "help": "the comparison, JSON"} | OUTPUT,
     "--summary": {"type": Path, "required": True, "help": "campaign.json"} | OUTPUT,
@@ -240,8 +241,8 @@ def _campaign_numbers(found: Values | None) -> dict[str, Any]:
             }
             for branch, fitted in found.exponents.items()
         },
-        "theory_factor": _shared(found.theory_factor),
-        "history_coefficient": _shared(found.history_coefficient),
+        "theory_factor": _flags(found.theory_factor),
+        "history_coefficient": _flags(found.history_coefficient),
         "checks": found.checks(),
         "budget": [
             {"source": name, "relative_sd": sd} for name, sd in found.theory_factor.budget.items()
@@ -250,7 +251,7 @@ def _campaign_numbers(found: Values | None) -> dict[str, Any]:
     }
 
 
-def _shared(number: Line) -> dict[str, Any]:
+def _flags(number: Line) -> dict[str, Any]:
     return {
         **number.estimate.as_json(),
         "sd_own": number.sd_own,

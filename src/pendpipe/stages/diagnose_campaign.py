@@ -9,10 +9,11 @@ goes to standard output as one paragraph.
 from pathlib import Path
 from typing import Any, Final
 
-from pendpipe.arguments import OUTPUT, SHARED, Arguments, load, print_answer, shared
+from pendpipe.arguments import Arguments, load, print_answer
 from pendpipe.configuration.load import Campaign
 from pendpipe.files import write_json
 from pendpipe.manifest import job
+from pendpipe.options import OUTPUT, flags
 from pendpipe.provenance import code_version
 from pendpipe.stages.results import campaign_data, enough, read_results, record_files, twins
 from pendpipe.version import __version__
@@ -22,7 +23,7 @@ FILE_NAME = "campaign_diagnosis.json"
 
 ARGUMENTS: Final = (
     {"folder": {"type": Path, "metavar": "DIR", "help": "the campaign's results"}}
-    | shared("--campaign", default=Path("config/config.yaml"))
+    | flags("--campaign", default=Path("config/config.yaml"))
     | {
         "--out": {
             "type": Path,
@@ -30,7 +31,7 @@ ARGUMENTS: Final = (
             "help": f"the answer; DIR/{FILE_NAME} by default",
         }
         | OUTPUT,
-        "--json": SHARED["--json"],
+        **flags("--json"),
         "--fail-on": {
             "choices": ("missing-physics",),
             "help": "end with status 3 on that verdict",

@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pendpipe.analysis.fit.result import FitResult
-from pendpipe.arguments import OUTPUT, Arguments, load, shared
+from pendpipe.arguments import Arguments, load
 from pendpipe.configuration.load import Campaign
 from pendpipe.errors import refuse_if
 from pendpipe.estimate import Estimate
 from pendpipe.files import MADE_BY, MARK, read_json, write_whole
 from pendpipe.manifest import job
+from pendpipe.options import OUTPUT, flags
 from pendpipe.stages.results import RecordResult, read_results, record_files
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ COLUMNS: Final = (*_WORDS[:4], *_NUMBERS, *_WORDS[4:])
 """T0_s is the period of small swings, Q that at `amplitude`, in `unit` (rad or m); a is in
 1/(unit s), b in 1/s, c in unit/s. Empty: there is no such number."""
 
-ARGUMENTS: Final = shared("--campaign", required=True) | {
+ARGUMENTS: Final = flags("--campaign", required=True) | {
     "--out": {
         "type": Path,
         "nargs": "+",

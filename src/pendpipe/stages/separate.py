@@ -6,15 +6,16 @@ from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.arguments import OUTPUT, Arguments, load, shared
+from pendpipe.arguments import Arguments, load
 from pendpipe.campaign.values import WORST_LINE, Values, campaign_values
 from pendpipe.configuration.load import Campaign
 from pendpipe.estimate import Z95, Estimate
 from pendpipe.files import write_json
 from pendpipe.manifest import job
+from pendpipe.options import OUTPUT, flags
 from pendpipe.stages.results import RecordResult, campaign_data, read_results, record_files
 
-ARGUMENTS: Final = shared("--campaign", required=True) | {
+ARGUMENTS: Final = flags("--campaign", required=True) | {
     "--out": {"type": Path, "required": True, "help": "the separation, JSON"} | OUTPUT
 }
 

@@ -1,0 +1,428 @@
+"""The commands of a few lines each: files in other forms, catalogues, the run of a campaign.
+
+What stands above a function declares its arguments; its docstring is what ``--help`` says.
+"""
+
+import argparse
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib import resources
+from inspect import getdoc
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from pendpipe.arguments import (
+    Arguments,
+    Command,
+    announce,
+    declare,
+    print_answer,
+    read_options,
+    tell_written,
+)
+from pendpipe.errors import InputError, refuse_if
+from pendpipe.options import ALTERNATIVES, FILE, INPUT, OUTPUT, Flags, flags
+from pendpipe.project import CONFIGURATION, PROJECT, SNAKEFILE
+
+if TYPE_CHECKING:
+    from pendpipe.formats import Inspection
+
+COMMANDS: Final[dict[str, Command]] = {}
+"""By their names."""
+_Run = Callable[[Arguments], int | None]
+
+
+def command(arguments: Flags) -> Callable[[_Run], _Run]:
+    """Enter a function as the command of its name, with its docstring as description."""
+
+    def enter(run: _Run) -> _Run:
+        COMMANDS[run.__name__] = Command(getdoc(run) or "", arguments, run)
+        return run
+
+    return enter
+
+
+@command(
+    FILE
+    | flags("--json")
+    | {"--why": {"action": "store_true", "help": "print how the file was understood"}}
+)
+def inspect(arguments: Arguments) -> None:
+    """Print what a recording holds: format, channels, rate, gaps, markers, clipping, step."""
+    from pendpipe.formats import inspect as inspect_file
+
+    found = inspect_file(arguments.file, read_options(arguments))
+    lines = [arguments.file, *("  " + line for line in found.why)]
+    text = lines if arguments.why else _lines(arguments.file, found)
+    print_answer(arguments, found.as_json(), "\n".join(text))
+
+
+def _lines(file: str, found: "Inspection") -> list[str]:
+    """Print it in words, a fact a line; what is uncertain first."""
+    from pendpipe.quantities import after_number
+
+    even = "evenly spaced" if found.uniform else "not evenly spaced (median interval)"
+    read = [
+        ("read", f"{found.chosen}, in{after_number(found.unit) or ' no known unit'}"),
+        ("hangs at", f"{found.level:.6g}{after_number(found.unit)}"),
+    ]
+    facts = [
+        ("format", found.format),
+        *([("kind", f"{found.kind}: no free decay")] if found.kind != "motion" else []),
+        *(
+            (
+                f"channel {number}",
+                name + f" [{unit}]" * bool(unit) + f" (--column {place})" * (place != number),
+            )
+            for number, ((name, unit), place) in enumerate(
+                zip(found.channels, found.columns, strict=True), start=1
+            )
+        ),
+        *(read if found.chosen else []),
+        ("samples", f"{found.samples} at {found.sample_rate_hz:.6g} Hz, {even}"),
+        ("span", f"{found.duration_s:.6g} s"),
+        (
+            "step",
+            f"{found.resolution:.6g}{after_number(found.unit)}"
+            if found.resolution
+            else "none found",
+        ),
+        ("clipped", f"{found.clipped_samples} sample(s)"),
+        *(("gap", f"{gap.missing_s:.6g} s after sample {gap.after_sample}") for gap in found.gaps),
+        *(
+            ("marker", f"{mark.time_s:.6g} s (sample {mark.sample}) {mark.comment}")
+            for mark in found.markers
+        ),
+        *(("note", warning) for warning in found.warnings),
+    ]
+    guesses = [f"a guess: {guess}" for guess in found.weak_guesses]
+    return [*guesses, file, *(f"  {name:<12}{text}".rstrip() for name, text in facts)]
+
+
+@command(
+    FILE
+    | {
+        "out": {
+            "metavar": "OUT",
+            "type": Path,
+            "help": "OUT.csv: the plain form (- writes it to standard output); OUT.wdh: WinDaq",
+        }
+        | OUTPUT
+    }
+)
+def convert(arguments: Arguments) -> None:
+    """Write any supported recording in the plain CSV form, or as a WinDaq file (.wdh)."""
+    from pendpipe.formats import read
+    from pendpipe.formats.writing import check_name, write
+
+    check_name(arguments.out)
+    recording = read(arguments.file, read_options(arguments))
+    announce(arguments, recording)
+    for note in write(arguments.out, recording):
+        print(f"{arguments.out}: {note}", file=sys.stderr)
+    tell_written(arguments.out, f"{len(recording)} samples, {recording.quantity}")
+
+
+@command(
+    {
+        "model": {"metavar": "MODEL.toml", "help": "what to simulate"} | INPUT,
+        "out": {"metavar": "OUT.csv", "type": Path, "help": "the recording, plain form"} | OUTPUT,
+    }
+    | flags("--seed", help="seed of the noise, instead of the model's")
+)
+def simulate(arguments: Arguments) -> None:
+    """Make a recording from a described pendulum and measurement chain.
+
+    MODEL.toml has the sections pendulum, sampling and, where wanted, sensor, converter and
+    [[effects]] (what is left out of Eq. 8: see docs/effects.md); config/model.toml is an example
+    with every key.
+    """
+    from pendpipe import api
+    from pendpipe.recording import write_plain
+
+    recording = api.simulate(arguments.model, seed=arguments.seed)
+    write_plain(arguments.out, recording)
+    tell_written(arguments.out, f"{len(recording)} samples in {recording.unit}")
+
+
+@command({"--list": {"action": "store_true", "help": "one line an effect"}} | flags("--json"))
+def effects(arguments: Arguments) -> None:
+    """Print the catalogue of effects that may have been left out.
+
+    With --list, one line an effect: identifier, kind, name.
+    """
+    from pendpipe.effects.catalogue import CATALOGUE
+
+    entries = [
+        {"id": each.identifier, "name": each.name, "kind": each.kind, "equation": each.equation}
+        for each in CATALOGUE
+    ]
+    listed = "\n".join(f"{each.identifier:<27} {each.kind:<12} {each.name}" for each in CATALOGUE)
+    print_answer(
+        arguments,
+        {"schema_version": 1, "effects": entries},
+        listed if arguments.list else catalogue_manual().removesuffix("\n"),
+    )
+
+
+_HEADINGS: Final = {
+    "dynamics": "## Dynamics: the motion itself",
+    "measurement": "## Measurement: the motion is as the baseline has it, the reading is not",
+}
+
+
+def catalogue_manual() -> str:
+    """Return the catalogue as Markdown, made from the effects' own declarations."""
+    from pendpipe.effects.catalogue import CATALOGUE
+    from pendpipe.templates import render
+
+    return render(
+        "pendpipe.effects",
+        "manual.md",
+        effects=CATALOGUE,
+        headings=_HEADINGS,
+        text=getdoc,
+        number=lambda value: "" if value is None or math.isinf(value) else f"{value:g}",
+    )
+
+
+@command(
+    {
+        "file": {"nargs": "?", "default": str(CONFIGURATION), "help": "configuration to check"},
+        "--schema": {
+            "heading": ALTERNATIVES,
+            "action": "store_true",
+            "help": "print the JSON schema",
+        },
+        "--manual": {
+            "heading": ALTERNATIVES,
+            "action": "store_true",
+            "help": "print the tables of the manual",
+        },
+    }
+)
+def config(arguments: Arguments) -> None:
+    """Check a campaign's configuration, or print its schema or the manual's tables."""
+    from pendpipe.configuration.load import load_campaign, read_configuration
+
+    if arguments.schema:
+        print(schema(), end="")
+    elif arguments.manual:
+        print(configuration_manual())
+    else:
+        campaign = load_campaign(read_configuration(arguments.file), arguments.file)
+        print(f"{arguments.file}: in order, {len(campaign.records)} records")
+
+
+BEGIN: Final = "<!-- made by `pendpipe config --manual`: begin -->"
+END: Final = "<!-- end -->"
+
+
+def schema() -> str:
+    """The JSON schema of a configuration, as the file in ``workflow/schemas`` holds it."""
+    from pendpipe.configuration.models import Configuration
+
+    content = Configuration.model_json_schema()
+    content["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    return json.dumps(content, indent=1, sort_keys=True) + "\n"
+
+
+def configuration_manual() -> str:
+    """The tables of ``config/README.md``: every key, its kind, default and meaning."""
+    from pendpipe.configuration.models import Configuration
+    from pendpipe.templates import render
+
+    content = Configuration.model_json_schema()
+    models = {"top level": content}
+    models |= {f"{name}: {each['description']}": each for name, each in content["$defs"].items()}
+    return render(
+        "pendpipe.configuration",
+        "manual.md",
+        begin=BEGIN,
+        end=END,
+        models=models,
+    )
+
+
+@command(
+    {
+        "folder": {
+            "nargs": "?",
+            "type": Path,
+            "default": Path(),
+            "metavar": "DIR",
+            "help": "the folder of the campaign; by default this one",
+        },
+        "files": {"nargs": "*", "type": Path, "metavar": "FILE", "help": "recordings of your own"},
+    }
+)
+def init(arguments: Arguments) -> None:
+    """Begin a campaign of your own recordings in a folder.
+
+    DIR gets config/config.yaml and config/records.tsv, the table of the records: a row for each
+    FILE, which stays where it is. Without any it gets two recordings as examples. `pendpipe
+    campaign` then runs at once. No file is ever replaced.
+    """
+    from pendpipe.files import write_whole
+
+    folder: Path = arguments.folder
+    files = _beginning(folder, arguments.files)
+    there = [str(folder / name) for name in files if (folder / name).exists()]
+    refuse_if(
+        there,
+        ", ".join(there),
+        "there already" if len(there) > 1 else "it is there already",
+        "nothing was written: name another folder, or move them away",
+    )
+    for name, content in files.items():
+        write_whole(folder / name, content)
+        print(folder / name)
+    where = "" if folder == Path() else f"cd {folder} && "
+    print(f"Now: {where}pendpipe campaign    (more of your own: config/records.tsv, a row each)")
+
+
+def _beginning(folder: Path, own: list[Path]) -> dict[str, bytes]:
+    """What a campaign begins with, by its path in the folder."""
+    templates = resources.files("pendpipe.configuration") / "templates"
+    examples = () if own else sorted((PROJECT / "examples").glob("*.csv"))
+    table = (templates / "records.tsv").read_text(encoding="utf-8")
+    if own:
+        head = table[: table.index("\nstring\t")]
+        table = "\n".join([head, *_rows(folder, own)]) + "\n"
+    return {
+        CONFIGURATION.as_posix(): (templates / "config.yaml").read_bytes(),
+        "config/records.tsv": table.encode(),
+        **{f"recordings/{path.name}": path.read_bytes() for path in examples},
+    }
+
+
+def _rows(folder: Path, own: list[Path]) -> list[str]:
+    """A row of the table for each recording, named after its file."""
+    from pendpipe.configuration.load import LONGEST_NAME
+
+    rows: dict[str, str] = {}
+    for path in own:
+        refuse_if(not path.is_file(), path, "there is no such file", "check the path")
+        plain = re.sub(r"[^A-Za-z0-9._-]+", "-", path.stem).strip("-._")[:LONGEST_NAME] or "record"
+        name = next(
+            each
+            for each in (plain, *(f"{plain}-{number}" for number in range(2, len(own) + 2)))
+            if each.lower() not in rows
+        )
+        rows[name.lower()] = f"{name}\t{Path(os.path.relpath(path, folder)).as_posix()}"
+    return list(rows.values())
+
+
+@command(
+    {
+        "--config": {
+            "type": Path,
+            "default": CONFIGURATION,
+            "metavar": "CONFIG",
+            "help": "another configuration, laid over config/config.yaml where there is one",
+        },
+        "--record": {
+            "action": "append",
+            "default": [],
+            "metavar": "NAME",
+            "help": "run this record's own stages alone; repeatable",
+        },
+        "--cores": {"type": int, "metavar": "N", "help": "jobs at once; by default a core each"},
+        "--profile": {
+            "default": "default",
+            "metavar": "NAME",
+            "help": "where the jobs run: a profile of pendpipe, or a folder of your own",
+        },
+        "-n": {"dest": "dry_run", "action": "store_true", "help": "print what would run"},
+        "snakemake": {"nargs": "...", "metavar": "-- ...", "help": "options of Snakemake"},
+    }
+)
+def campaign(arguments: Arguments) -> int:
+    """Run a campaign: every recording of a table through all stages, by Snakemake.
+
+    It runs in the folder with config/config.yaml, which pendpipe init writes. What is done and has
+    not changed is not done again. All options of Snakemake can follow:
+
+    pendpipe campaign -n                        what would run
+    pendpipe campaign --record air-01           that record's own stages
+    pendpipe campaign -- --forcerun fit         the fits again, and what follows from them
+    """
+    from pendpipe.configuration.load import load_campaign
+
+    given: Path = arguments.config
+    refuse_if(
+        not given.is_file(),
+        given,
+        "there is no such configuration",
+        "pendpipe init writes one" if given == CONFIGURATION else "check the path",
+    )
+    campaign = load_campaign(_merged(given), given)
+    for name in arguments.record:
+        campaign.record(name)
+    command = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE)]
+    command += ["--workflow-profile", str(_profile(arguments.profile))]
+    command += ["--cores", str(arguments.cores or "all")]
+    command += ["--dry-run"] if arguments.dry_run else []
+    command += [word for word in arguments.snakemake if word != "--"]
+    # What may be several words comes last: what follows would be one more of them.
+    command += ["--configfile", str(given)] if given != CONFIGURATION else []
+    command += ["--config", f"only={json.dumps(arguments.record)}"] if arguments.record else []
+    with subprocess.Popen(command) as snakemake:
+        try:
+            return snakemake.wait()
+        except KeyboardInterrupt:
+            # Snakemake was interrupted as well, and ends its jobs first.
+            snakemake.wait()
+            raise
+
+
+def _merged(given: Path) -> dict[str, Any]:
+    """Lay a configuration over the folder's own, as Snakemake does."""
+    from pendpipe.configuration.load import read_configuration
+
+    if given == CONFIGURATION or not CONFIGURATION.is_file():
+        return read_configuration(given)
+    from snakemake.utils import update_config
+
+    content = read_configuration(CONFIGURATION)
+    update_config(content, read_configuration(given))
+    return content
+
+
+def _profile(name: str) -> Path:
+    for folder in (Path(name), PROJECT / "profiles" / name):
+        if (folder / "config.yaml").is_file():
+            return folder
+    known = ", ".join(sorted(path.name for path in (PROJECT / "profiles").iterdir()))
+    raise InputError(
+        f"--profile {name}", "there is no such profile", f"known are {known}; or name a folder"
+    )
+
+
+@command({"shell": {"choices": ("bash", "zsh", "tcsh"), "help": "the shell to print it for"}})
+def completion(arguments: Arguments) -> None:
+    """Print what makes a shell complete commands, options and files.
+
+    Its place is ~/.local/share/bash-completion/completions/pendpipe for bash, a file _pendpipe in a
+    folder of fpath for zsh, and a file that ~/.tcshrc sources for tcsh.
+    """
+    import shtab
+
+    from pendpipe.cli import COMMANDS, STAGES, command_of
+
+    parser = argparse.ArgumentParser(prog="pendpipe")
+    commands = parser.add_subparsers()
+    for name, line in (COMMANDS | STAGES).items():
+        one = commands.add_parser(name, help=line)
+        declared = command_of(name).arguments
+        declare(one, declared)
+        for action in one._actions:
+            names = {action.dest, *action.option_strings}
+            if any("file" in declared[key] for key in names if key in declared):
+                action.complete = shtab.FILE  # type: ignore[attr-defined]
+    print(shtab.complete(parser, shell=arguments.shell))

@@ -1,0 +1,350 @@
+"""What is chosen of a file: columns, runs, spans and units, by the reader and by its user."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pendpipe.cli import main
+from pendpipe.errors import InputError
+from pendpipe.formats import ReadOptions, inspect, read
+from pendpipe.formats.text import column_of_clock_times
+
+from .cases import ANGLE, DEGREES, RATE, TIME, each, read_as, same, text, with_lines
+from .decays import Floats, swing
+
+HEAD = "t (s),theta (rad)\n"
+PLAIN = text(TIME, ANGLE, head=HEAD)
+
+
+# --- columns and runs ------------------------------------------------------------------------
+
+
+def test_each_guess_gives_way_to_its_option(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text(TIME, ANGLE, 3 * ANGLE, 2 * TIME, head="t,theta,phi,clock\n"))
+    for options, values, second_s in (
+        (ReadOptions(column="phi"), 3 * ANGLE, 0.02),
+        (ReadOptions(channel="1"), ANGLE, 0.02),
+        (ReadOptions(column="4:2"), ANGLE, 0.04),
+        (ReadOptions(unit="ms:rad"), ANGLE, 2e-5),
+        (ReadOptions(sample_rate=200), ANGLE, 0.005),
+    ):
+        recording = read(path, options)
+        np.testing.assert_allclose(recording.values, values, atol=1e-6)
+        assert recording.time_s[1] == pytest.approx(second_s)
+    part = read(path, ReadOptions(start_s=1.0, stop_s=2.0))
+    assert (part.time_s[0], part.time_s[-1]) == (1.0, 2.0)
+    assert read(path, ReadOptions(volts_per_radian=3.85)).metadata["volts_per_radian"] == "3.85"
+    for options, said in (
+        (ReadOptions(column="psi"), "there is no column 'psi'; choose from: t, theta"),
+        (ReadOptions(start_s=100.0), "there is no sample between"),
+    ):
+        with pytest.raises(InputError, match=said):
+            read(path, options)
+
+
+def test_runs_side_by_side_do_not_mix_and_are_offered_by_name(tmp_path: Path) -> None:
+    second = [f"{t + 0.5:.4f};{2 * x:.6f}" if t < 12.0 else ";" for t, x in zip(TIME, ANGLE)]  # noqa: B905
+    content = "t1;theta1;t2;theta2\n" + each("{:.4f};{:.6f};{}\n", TIME, ANGLE, second)
+    recording = read_as(tmp_path, content)
+    same(recording)
+    assert any("--column: theta2" in note for note in recording.notes)
+    for options in (
+        ReadOptions(column="theta2"),
+        ReadOptions(channel="theta2"),
+        ReadOptions(column="4"),
+    ):
+        other = read(tmp_path / "a.txt", options)
+        same(other, 2 * ANGLE[:600])
+        assert other.time_s[0] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("order", ["one below the other", "in turn"])
+def test_a_long_table_is_read_by_the_quantity_that_it_names(tmp_path: Path, order: str) -> None:
+    angles, rates = (
+        each(f"{{:.4f}},{name},{{:.6f}}\n", TIME, values).splitlines(keepends=True)
+        for name, values in (("theta", ANGLE), ("omega", RATE))
+    )
+    turns = [line for pair in zip(angles, rates, strict=True) for line in pair]
+    lines = [*angles, *rates] if order == "one below the other" else turns
+    same(read_as(tmp_path, "time,variable,value\n" + "".join(lines)))
+    assert inspect(tmp_path / "a.txt").chosen == "theta"
+    same(read(tmp_path / "a.txt", ReadOptions(column="omega")), RATE)
+
+
+def test_trackers_masses_are_named_and_chosen(tmp_path: Path) -> None:
+    other = 0.2 * RATE
+    columns = (TIME, ANGLE, 0.1 * ANGLE, other, 0.1 * other)
+    recording = read_as(
+        tmp_path, text(*columns, head=",Right Mass,,Left Mass,\nt,x,y,x,y\n"), "a.csv"
+    )
+    same(recording)
+    note = next(note for note in recording.notes if "is taken from" in note)
+    assert "'x of Right Mass'" in note
+    assert "x of Left Mass" in note
+    for key in ("Left Mass", "x of left mass", "x (2)", "4"):
+        chosen = read(tmp_path / "a.csv", ReadOptions(column=key))
+        same(chosen, other)
+        assert chosen.unit == recording.unit
+
+
+@pytest.mark.parametrize(("share", "chosen"), [(0.35, "ch1"), (0.31, "ch2")])
+def test_of_equal_columns_the_first_that_swings_a_third_as_far(
+    tmp_path: Path, share: float, chosen: str
+) -> None:
+    read_as(tmp_path, text(TIME, share * ANGLE, ANGLE, head="t_s,ch1,ch2\n"))
+    assert inspect(tmp_path / "a.txt").chosen == chosen
+
+
+@pytest.mark.parametrize("head", ["", "t (s),ax (mg),ay (mg)\n"])
+def test_the_pull_along_the_rod_gives_way_to_the_swing(tmp_path: Path, head: str) -> None:
+    time, phase = TIME[:700], 2 * np.pi * 0.745 * TIME[:700]
+    along = 900 * np.exp(-0.1 * time) * np.cos(2 * phase)
+    across = 300 * np.exp(-0.05 * time) * np.cos(phase)
+    recording = read_as(tmp_path, text(time, along, across, head=head))
+    found = recording.values / np.abs(recording.values).max()
+    np.testing.assert_allclose(found, across / across.max(), atol=1e-3)
+    assert any("twice the frequency" in note for note in recording.notes)
+
+
+@pytest.mark.parametrize(("level", "said"), [(9.81, True), (0.0, False), (-9.81, True)])
+def test_a_pull_along_the_string_swings_twice_in_a_period(
+    tmp_path: Path, level: float, said: bool
+) -> None:
+    time, angle = swing(1500, 30.0)
+    pull = level + 0.5 * np.gradient(angle, time) ** 2
+    notes = read_as(tmp_path, text(time, pull, head="Time (s),Acceleration y (m/s^2)\n")).notes
+    assert any("twice in a period" in note for note in notes) is said
+
+
+def test_inspect_prints_the_number_that_column_takes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "a.csv").write_text(text(TIME, ANGLE, 900 + 80 * ANGLE, head="t,theta,foo\n"))
+    assert main(["inspect", str(tmp_path / "a.csv"), "--column", "foo"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert "  channel 2   foo (--column 3)" in told
+    level = float(next(line for line in told if "hangs at" in line).split()[-1])
+    assert level == pytest.approx(900.0, abs=1.0)
+    assert any(line.endswith("foo, in no known unit") for line in told)
+
+
+# --- values ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("level", [np.pi, 5.46, -1.2])
+def test_a_pendulum_may_hang_anywhere(tmp_path: Path, level: float) -> None:
+    values = read_as(tmp_path, text(TIME, ANGLE + level, head=HEAD)).values
+    np.testing.assert_allclose(values - values.mean(), ANGLE - ANGLE.mean(), atol=1e-5)
+
+
+def test_a_swing_beside_the_pictures_corner_is_about_its_own_circle(tmp_path: Path) -> None:
+    angle = 0.3 * ANGLE
+    x, y = np.rint(206 + 536 * np.sin(angle)), np.rint(113 + 536 * np.cos(angle))
+    recording = read_as(tmp_path, text(TIME, x, y, digits=3, head="t,x,y\n"))
+    assert recording.unit == "rad"
+    np.testing.assert_allclose(recording.values, angle, atol=0.01)
+    assert not any("(0, 0)" in note for note in recording.notes)
+
+
+def test_rows_of_a_hand_draw_no_circle(tmp_path: Path) -> None:
+    x, y, hand = 400 + 300 * np.sin(ANGLE), 100 + 300 * np.cos(ANGLE), np.linspace(0.0, 1.0, 20)
+    x[:20], y[:20] = 900 - 700 * hand, 700 * hand
+    recording = read_as(tmp_path, text(TIME, x, y, digits=3, head="t,x,y\n"))
+    assert recording.unit == "rad"
+    np.testing.assert_allclose(recording.values[20:], ANGLE[20:], atol=1e-3)
+
+
+def test_clipped_readings_are_said(tmp_path: Path) -> None:
+    for values, said in ((np.clip(ANGLE, -0.3, 0.3), True), (ANGLE, False)):
+        notes = read_as(tmp_path, text(TIME, values, head="t,theta\n")).notes
+        assert any("range" in note for note in notes) is said
+
+
+def test_counts_of_an_encoder_within_one_tick_are_merged(tmp_path: Path) -> None:
+    count = np.rint(swing(samples=40_000, rate=4000.0)[1] / 0.002).astype(int)
+    moved = np.flatnonzero(np.diff(count)) + 1
+    stamps = np.floor(moved / 4000.0 / 0.002) * 0.002
+    recording = read_as(tmp_path, text(stamps, 0.002 * count[moved], digits=3, head="t,theta\n"))
+    assert np.all(np.diff(recording.time_s) > 0)
+    assert len(recording) == len(np.unique(stamps))
+    assert recording.resolution == pytest.approx(0.002)
+
+
+# --- times -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("cells", "seconds"),
+    [
+        (["38:05.6", "39:00.7"], [2285.6, 2340.7]),
+        (["38:05,6", "39:00,7"], [2285.6, 2340.7]),
+        (["12.50.01", "12.50.02"], [46201.0, 46202.0]),
+        (["12.50", "12.51", "12.52"], None),
+    ],
+)
+def test_a_spreadsheets_minutes_and_seconds_are_no_hours(
+    cells: list[str], seconds: list[float] | None
+) -> None:
+    """It shows them as mm:ss.0, whatever the hour; 12.50 is a number."""
+    found = column_of_clock_times(cells)
+    assert (found is None) if seconds is None else (found == pytest.approx(seconds))
+
+
+def test_rounded_stamps_are_evened_out(tmp_path: Path) -> None:
+    """At 125 Hz, printed to hundredths of a second, every fifth stamp repeats."""
+    time, angle = swing(rate=125.0)
+    recording = read_as(tmp_path, "t,theta\n" + each("{:.2f},{:.6f}\n", time, angle))
+    same(recording, angle, time, within_s=0.006)
+    assert np.ptp(np.diff(recording.time_s)) < 1e-9
+    stamps = "time,angle_deg\n" + each("5/1/2025 12:00:{:02.0f},{:.4f}\n", TIME // 1, DEGREES)
+    (note,) = (note for note in read_as(tmp_path, stamps).notes if "rounded" in note)
+    assert "the rate is known to 0." in note
+
+
+def test_a_clock_that_rounds_is_no_gap(tmp_path: Path) -> None:
+    time = np.rint(1e3 * np.arange(1000) * 0.0503) / 1e3
+    (tmp_path / "a.csv").write_text(text(time, ANGLE, digits=3, head=HEAD))
+    assert inspect(tmp_path / "a.csv").gaps == ()
+
+
+def test_of_a_clock_that_steps_back_either_part_can_be_read(tmp_path: Path) -> None:
+    stamps = np.where(TIME < 12.0, TIME, TIME - 0.11)
+    ticks, path = 1e-3 * np.cumsum(20.0 + np.arange(len(TIME)) % 2), tmp_path / "a.csv"
+    with pytest.raises(InputError) as fault:
+        read_as(tmp_path, text(stamps, ANGLE, ticks, head="t (s),theta (rad),Step\n"), "a.csv")
+    assert "--column 'Step:READING'" in str(fault.value)
+    stop = float(str(fault.value).split("(--stop ")[1].split(")")[0])
+    assert stop == pytest.approx(TIME[599], abs=1e-6)
+    same(read(path, ReadOptions(stop_s=stop)), ANGLE[:600])
+    later = read(path, ReadOptions(start_s=stop))
+    np.testing.assert_allclose(later.values, ANGLE[-len(later) :], atol=1e-5)
+    assert len(later) == pytest.approx(395, abs=2)
+
+
+ORDER = np.arange(len(TIME))
+ORDER[0:930:7], ORDER[3:933:7] = ORDER[3:933:7].copy(), ORDER[0:930:7].copy()
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [
+        TIME[ORDER],
+        np.concatenate((TIME[:500], TIME[200:700] + 0.011)),
+        np.where(TIME < 12.0, TIME, TIME - 1.1 * TIME[1]),
+    ],
+    ids=["rows out of order", "two clocks", "back by little more than a row"],
+)
+def test_a_time_that_falls_is_refused(tmp_path: Path, stamps: Floats) -> None:
+    with pytest.raises(InputError, match="the time falls"):
+        read_as(tmp_path, text(stamps, ANGLE, head=HEAD))
+
+
+# --- damage ----------------------------------------------------------------------------------
+
+SPOILT = text(TIME, ANGLE, digits=4, head=HEAD)
+
+
+def spoil(row: int, line: str) -> Callable[[str], str]:
+    return lambda content: with_lines(content, {row: line})
+
+
+def spoil_two_in_a_hundred(line: str) -> Callable[[str], str]:
+    return lambda content: with_lines(
+        content, {row: line.format(f"{TIME[row - 1]:.4f}") for row in range(50, 1000, 50)}
+    )
+
+
+@pytest.mark.parametrize(
+    ("number", "row"),
+    [
+        (7, "0.12,oops"),
+        (7, "oops,0.4"),
+        (7, "nan,0.4"),
+        (1, "oops,0.4"),
+        (2, "restarted here"),
+        (400, "7.98,0.3\0\0"),
+        (400, "7.980.3"),
+        (400, "7.98,0.38.00,0.4"),
+        (1000, "19.98,abc"),
+    ],
+)
+def test_a_damaged_row_is_left_out_and_counted(tmp_path: Path, number: int, row: str) -> None:
+    """What a serial line has garbled; more than one row in a hundred is no accident."""
+    recording = read_as(tmp_path, spoil(number, row)(SPOILT))
+    np.testing.assert_allclose(recording.time_s, np.delete(TIME, number - 1))
+    np.testing.assert_allclose(recording.values, np.delete(ANGLE, number - 1), atol=1e-4)
+    assert any("1 " in note and "left out" in note for note in recording.notes)
+
+
+def test_a_garbled_cell_is_damage_where_text_stands_between_rows(tmp_path: Path) -> None:
+    content = spoil(100, "1980,1x.5")("ms,angle (deg)\n" + text(1e3 * TIME, DEGREES, digits=2))
+    lines = content.splitlines()
+    notes = read_as(tmp_path, "\n".join([*lines[:50], "WARN: buffer 80 %", *lines[50:]])).notes
+    assert any("1 damaged row(s) left out (line 102" in note for note in notes)
+
+
+@pytest.mark.parametrize("cut", [2, 4, 9])
+def test_the_last_row_of_a_cut_file_is_no_sample(tmp_path: Path, cut: int) -> None:
+    recording = read_as(tmp_path, PLAIN[:-cut])
+    assert len(recording) == len(TIME) - 1
+    assert any("cut short" in note for note in recording.notes)
+    assert len(read_as(tmp_path, PLAIN[:-1])) == len(TIME)
+
+
+def test_a_row_torn_among_decimal_commas_is_no_row(tmp_path: Path) -> None:
+    """``20,0`` of ``20,0,3812`` is neither 20 and 0 nor 20.0: left out and counted."""
+    pressure = 1013.0 + np.random.default_rng(1).random(len(TIME))
+    rows = each("{:.0f},{:.3f},{:.4f}\n", 1e3 * TIME, pressure, ANGLE).replace(".", ",")
+    torn = with_lines("ms,pressure,angle\n" + rows, {301: "6000,1013,25", 501: "10000,1013"})
+    recording = read_as(tmp_path, torn)
+    np.testing.assert_allclose(recording.values, np.delete(ANGLE, [300, 500]), atol=1e-4)
+    assert any("2 damaged row(s)" in note for note in recording.notes)
+
+
+def test_a_zero_before_every_number_is_whole_or_its_own_column(tmp_path: Path) -> None:
+    """``12,0,37856`` is two numbers or three: refused with both, and settled by --decimal."""
+    size = 0.38 + 0.08 * np.cos(0.3 * np.arange(400))
+    content = each("{},{:.5f}\n", range(0, 8000, 20), size).replace(".", ",")
+    with pytest.raises(InputError, match=r"'0 \| 0 \| 46000' or '0 \| 0.46000'; give --decimal"):
+        read_as(tmp_path, content)
+    for decimal, values in ((",", size), (".", 1e5 * size)):
+        found = read(tmp_path / "a.txt", ReadOptions(decimal=decimal)).values
+        np.testing.assert_allclose(found, values, atol=2e-5 * values.max())
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (spoil(7, "0.12,inf")(SPOILT), "line 8: 1 reading(s) that are infinite"),
+        (spoil_two_in_a_hundred("nan,0.4")(SPOILT), "line 51: the time is missing or NaN"),
+        (spoil_two_in_a_hundred("{},oops")(SPOILT), "line 51: 'oops' is no number"),
+        (text(np.where(TIME < 0.11, TIME, TIME - 0.05), ANGLE, digits=4), "the time falls (0.1 is"),
+        (HEAD, "no block of rows with numbers"),
+        ("", "the file is empty"),
+        ("hello\nworld\n", "no reader knows this file: no block of rows"),
+        (text(ANGLE, head="theta\n"), "no time column and no sample rate"),
+        (text(TIME, head="t\n"), "no column looks like the motion"),
+        (text(50.0 * TIME, ANGLE, head="frame,theta (rad)\n"), "'frame' only counts"),
+        (text(1e300 * TIME, ANGLE, head=HEAD).replace(".000000", ""), "the times span"),
+        (HEAD + each("{},{}\n", TIME, 1e-300 * ANGLE), "the readings span"),
+        (
+            text(TIME, ANGLE, head="time_s,temperature\n"),
+            "angle_rad, volts, displacement_m, reading is needed",
+        ),
+        ("<table>" + "<" * 900_000, ""),
+        ("1" * 900_000, ""),
+        ("(1" * 400_000, ""),
+        ("1 ± 1,5" * 120_000, ""),
+    ],
+)
+def test_a_fault_is_one_line_with_its_place(tmp_path: Path, content: str, said: str) -> None:
+    """Also of signs without end, from each of which a pattern might run on for hours."""
+    with pytest.raises(InputError) as caught:
+        read_as(tmp_path, content)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
