@@ -1,34 +1,41 @@
 """What each stage read and wrote: length and hash, kept beside the results.
 
-A stage that ends leaves ``manifest/<stage>.json`` in its folder (a record's, or the
-campaign's), a file for each stage since fit and diagnosis run at once. A job hashes every
-result that it reads and compares it with the manifest of the stage that wrote it: a
-damaged file is set aside under another name, and Snakemake makes it again.
+A stage that ends leaves ``manifest/<stage>.json`` in its folder: that of a record, or of the
+campaign, which are looked through alike. A job hashes every result that it reads and compares it
+with the manifest of the stage that wrote it: a damaged file is set aside under another name, and
+Snakemake makes it again.
 
 Planning must notice a file whose old time was put back, without hashing thousands of
 files. No program can set a file's time of change (``st_ctime``): a file of the right
 length that has not changed since its manifest was written is sound.
 
-Snakemake compares a rule's parameters with those of its last run. One of `histories` is
-such a parameter: it lists every damage of a stage's results, and keeps those that were repaired,
-so that each damage runs the stage once.
+Snakemake compares a rule's parameters with those of its last run. The history of a stage's damages
+is such a parameter (`Findings.repaired`): planning adds what it finds, and the job writes the same
+into the manifest, so that each damage runs the stage once. A record's job finds the same damages
+again. Snakemake deletes what it knows of the campaign's own stages before their jobs; they inherit
+what planning found (`hand_on`).
 """
 
+import hashlib
+import json
 import os
+import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from pendpipe.errors import DamagedError, InputError
-from pendpipe.files import digest, is_file, read_json, sha256, write_json, writing
+from pendpipe.files import is_file, json_text, sha256, write_whole, writing
 from pendpipe.version import __version__
 
 FOLDER: Final = "manifest"
 SET_ASIDE: Final = ".damaged-"
 """Stands in the name of a damaged file, before the first digits of its hash."""
+RUN: Final = "PENDPIPE_RUN"
+"""Variable of the environment by which the jobs of a run inherit what its planning knows."""
 
 
 class Sum(NamedTuple):
@@ -48,11 +55,29 @@ class Damage(NamedTuple):
 
     @property
     def mark(self) -> str:
-        """Name the damage in a manifest's history."""
+        """Name the damage in a history."""
         return f"{self.path.name}:{self.found}"
 
+    def __str__(self) -> str:
+        return f"{self.path}: {self.problem}; a run sets it aside and makes it again"
 
-@dataclass
+    def set_aside(self) -> str:
+        """Give the file another name beside its own, and say which."""
+        if not self.path.exists():
+            return "its stage runs again"
+        kept = self.path.with_name(f"{self.path.name}{SET_ASIDE}{self.found}")
+        try:
+            self.path.replace(kept)
+        except OSError as fault:
+            raise InputError(
+                self.path,
+                f"{self.problem}, and it can't be renamed ({fault.strerror})",
+                "make the folder writable",
+            ) from None
+        return f"set aside as {kept.name}"
+
+
+@dataclass(frozen=True)
 class Manifest:
     """What one stage read and wrote.
 
@@ -63,15 +88,13 @@ class Manifest:
     stage
         Its name.
     outputs
-        The files that Snakemake knows, by name.
-    extras
-        Others: a figure of a record, ``refused.json``.
+        The files that it wrote, by name.
     inputs
         Results of other stages that were read, by name, with their hashes.
     sources
         Files of the user, by name alone.
     repaired
-        Marks of the damages that made the stage run again.
+        The damages that made the stage run again.
     key
         Digest of what the stage of a record was done with; empty while it is not done.
     own_damage
@@ -80,11 +103,10 @@ class Manifest:
 
     home: Path
     stage: str
-    outputs: dict[str, Sum] = field(default_factory=dict)
-    extras: dict[str, Sum] = field(default_factory=dict)
-    inputs: dict[str, str] = field(default_factory=dict)
-    sources: dict[str, Sum] = field(default_factory=dict)
-    repaired: tuple[str, ...] = ()
+    outputs: Mapping[str, Sum] = field(default_factory=dict)
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    sources: Mapping[str, Sum] = field(default_factory=dict)
+    repaired: str = ""
     key: str = ""
     own_damage: Damage | None = None
 
@@ -96,91 +118,73 @@ class Manifest:
     def write(self) -> None:
         """Write it; two runs of the same campaign write the same bytes."""
         head = {"schema_version": 1, "stage": self.stage, "version": __version__}
-        content = head | self.content()
-        write_json(self.path, content | {"check": digest(content)})
+        write_checked(self.path, head | self.content())
 
     def content(self) -> dict[str, Any]:
         """What it lists."""
-        return {
-            **{
-                name: {key: entry._asdict() for key, entry in getattr(self, name).items()}
-                for name in ("outputs", "extras", "sources")
-            },
-            "inputs": self.inputs,
-            "repaired": list(self.repaired),
-            "key": self.key,
+        sums = {
+            name: {key: made._asdict() for key, made in getattr(self, name).items()}
+            for name in _SUMS
         }
+        return {**sums, "inputs": dict(self.inputs), "repaired": self.repaired, "key": self.key}
 
-    def damages(self, *, hash_all: bool = False, missing: bool = False) -> list[Damage]:
+    def damages(self, *, hash_all: bool = False) -> list[Damage]:
         """Compare the results with what was written.
 
-        A missing output is none unless `missing`: Snakemake sees those of the campaign's own
-        stages by itself. Only files whose length or time of change differs are hashed, unless
-        `hash_all`.
+        Only files whose length or time of change differs are hashed, unless `hash_all`.
         """
         if self.own_damage:
             return [self.own_damage]
-        home, listed = str(self.home), self.outputs | self.extras
-        try:
-            since = None if hash_all else _written_ns(self.path)
-        except OSError:
-            return [Damage(self.path, "it is missing", "missing")] if listed else []
-        found = []
-        for name, made in listed.items():
-            if since is None or not _unchanged(f"{home}/{name}", made, since):
-                damage = _compare(self.home / name, made)
-                lost = damage is not None and damage.found == "missing"
-                if damage is not None and (missing or name in self.extras or not lost):
-                    found.append(damage)
-        return found
+        since = None if hash_all else _written_ns(self.path)
+        # (As text: a Path takes longer, and files are many.)
+        home = str(self.home)
+        compared = (
+            _compare(self.home / name, made)
+            for name, made in self.outputs.items()
+            if not _unchanged(f"{home}/{name}", made, since)
+        )
+        return [damage for damage in compared if damage is not None]
+
+
+_SUMS: Final = ("outputs", "sources")
 
 
 def read_manifest(home: Path, stage: str) -> Manifest:
     """Read a stage's manifest; an empty one where there is none, or it was altered."""
-    manifest = Manifest(home, stage)
-    if not manifest.path.is_file():
-        return manifest
+    content, torn = read_checked(Manifest(home, stage).path)
+    if not content:
+        return Manifest(home, stage, own_damage=next(iter(torn), None))
+    return of_content(home, stage, content)
+
+
+_CHECK: Final = b',\n "check": "'
+
+
+def write_checked(path: Path, content: Mapping[str, Any]) -> None:
+    """Write JSON that ends with the hash of all that stands before."""
+    text = json_text(content).removesuffix("\n}").encode()
+    write_whole(path, text + _CHECK + hashlib.sha256(text).hexdigest().encode() + b'"\n}\n')
+
+
+def read_checked(path: Path) -> tuple[dict[str, Any], list[Damage]]:
+    """Read it, and what is wrong with it; empty where it is missing or damaged."""
     try:
-        content = read_json(manifest.path)
-        if content.pop("check") != digest(content):
-            raise ValueError
-        return of_content(home, stage, content)
-    except (InputError, AttributeError, KeyError, TypeError, ValueError):
-        found = sha256(manifest.path)[:8]
-        damage = Damage(manifest.path, "this manifest is torn or altered", found)
-        return Manifest(home, stage, own_damage=damage)
+        written = path.read_bytes()
+    except OSError:
+        return {}, []
+    text, _, check = written.partition(_CHECK)
+    if check != hashlib.sha256(text).hexdigest().encode() + b'"\n}\n':
+        found = hashlib.sha256(written).hexdigest()[:8]
+        return {}, [Damage(path, "this list of results is torn or altered", found)]
+    return dict(json.loads(text + b"}")), []
 
 
-def of_content(home: Path, stage: str, content: dict[str, Any]) -> Manifest:
+def of_content(home: Path, stage: str, content: Mapping[str, Any]) -> Manifest:
     """Make a manifest of what was written of it (`Manifest.content`)."""
-    files: dict[str, Any] = {
-        name: {key: Sum(**entry) for key, entry in content[name].items()}
-        for name in ("outputs", "extras", "sources")
-    }
-    return Manifest(
-        home,
-        stage,
-        **files,
-        inputs=dict(content["inputs"]),
-        repaired=tuple(content["repaired"]),
-        key=str(content.get("key", "")),
-        own_damage=None,
-    )
-
-
-def noticed(damage: Damage) -> str:
-    """The line about a damaged file when a run is planned."""
-    return f"{damage.path}: {damage.problem}; a run sets it aside and makes it again"
-
-
-def recorded(paths: Iterable[Path]) -> dict[str, str]:
-    """The hashes of results as their stages recorded them; of a file in no manifest, its own."""
-    index, hashes = Index(), {}
-    for path in paths:
-        found = index.find(path)
-        if found is not None or path.is_file():
-            hashes[path.name] = sha256(path) if found is None else found[1].sha256
-    return hashes
+    rest: dict[str, Any] = {name: content[name] for name in ("inputs", "repaired", "key")}
+    for name in _SUMS:
+        rest[name] = {key: Sum(**made) for key, made in content[name].items()}
+    return Manifest(home, stage, **rest)
 
 
 def manifests(home: Path) -> Iterator[Manifest]:
@@ -188,80 +192,54 @@ def manifests(home: Path) -> Iterator[Manifest]:
     yield from (read_manifest(home, path.stem) for path in sorted((home / FOLDER).glob("*.json")))
 
 
-def histories(home: Path) -> tuple[dict[str, str], list[str]]:
-    """Look for damage in a folder of results when a run is planned; nothing is touched.
-
-    Returns
-    -------
-    histories
-        For each stage its damages, repaired or not: a parameter of its rule.
-    lines
-        A line for each damaged file.
-    """
-    found, lines = {}, []
-    for manifest in manifests(home):
-        damages = manifest.damages()
-        found[manifest.stage] = " ".join((*manifest.repaired, *(one.mark for one in damages)))
-        lines += [noticed(damage) for damage in damages]
-    return found, lines
-
-
-def set_aside_damaged(home: Path, *, missing: bool = False) -> list[str]:
-    """Before the jobs run: set aside what is damaged in a folder of results.
+class Findings(NamedTuple):
+    """What is wrong with the results of a job when a run is planned.
 
     Parameters
     ----------
-    home
-        The folder.
-    missing
-        Whether a missing output is damage, as in a record's folder.
-
-    Returns
-    -------
-    list of str
-        A line for each damaged file.
+    damages
+        What is not as it was written.
+    repaired
+        These damages and those that were repaired before: a parameter of the rule.
     """
-    lines = []
-    for manifest in manifests(home):
-        found = manifest.damages(missing=missing)
-        lines += [f"{damage.path}: {damage.problem}; {set_aside(damage)}" for damage in found]
-        if found:
-            damaged = {damage.path for damage in found}
-            manifest.outputs = {
-                name: made for name, made in manifest.outputs.items() if home / name not in damaged
-            }
-            manifest.extras, manifest.key = {}, ""
-            manifest.repaired += tuple(damage.mark for damage in found)
-            manifest.write()
-        else:
-            # All is sound: files whose time of change is younger need no second hash.
-            with suppress(OSError):
-                os.utime(manifest.path)
-    return lines
+
+    damages: tuple[Damage, ...] = ()
+    repaired: str = ""
 
 
-def set_aside(damage: Damage) -> str:
-    """Give a damaged file another name beside its own, and say which."""
-    if damage.found == "missing":
-        return "its stage runs again"
-    kept = damage.path.with_name(f"{damage.path.name}{SET_ASIDE}{damage.found}")
-    try:
-        damage.path.replace(kept)
-    except OSError as fault:
-        raise InputError(
-            damage.path,
-            f"{damage.problem}, and it can't be renamed ({fault.strerror})",
-            "make the folder writable",
-        ) from None
-    return f"set aside as {kept.name}"
+def look_through(listed: Iterable[Manifest]) -> Findings:
+    """Look for damage in what manifests list; nothing is touched."""
+    pairs = [(one, one.damages()) for one in listed]
+    found = tuple(damage for _, damages in pairs for damage in damages)
+    return Findings(found, joined(_history(one, damages) for one, damages in pairs))
 
 
-@dataclass
-class Job:
-    """What a running stage will leave in its manifest."""
+def _history(one: Manifest, damages: Iterable[Damage]) -> str:
+    return joined([one.repaired, *(damage.mark for damage in damages)])
 
-    outputs: list[Path] = field(default_factory=list)
-    extras: list[Path] = field(default_factory=list)
+
+def joined(histories: Iterable[str]) -> str:
+    """Join the histories of several manifests to one parameter."""
+    return " ".join(filter(None, histories))
+
+
+def hand_on(*, anew: Iterable[str], repaired: Mapping[str, str]) -> None:
+    """Let the jobs of a run inherit what its planning knows, on a cluster too.
+
+    Parameters
+    ----------
+    anew
+        Stages of records whose results are made again even if they are done.
+    repaired
+        `Findings.repaired` by the path of a manifest.
+    """
+    os.environ[RUN] = json.dumps({"anew": list(anew), "repaired": dict(repaired)})
+
+
+def handed_on() -> dict[str, Any]:
+    """Return what this job inherits."""
+    inherited: dict[str, Any] = json.loads(os.environ.get(RUN) or "{}")
+    return {"anew": [], "repaired": {}} | inherited
 
 
 @contextmanager
@@ -272,7 +250,7 @@ def job(
     inputs: Iterable[Path] = (),
     sources: Iterable[Path] = (),
     outputs: Sequence[Path] = (),
-) -> Iterator[Job]:
+) -> Iterator[list[Path]]:
     """Run a stage between a check of what it reads and a record of what it wrote.
 
     Parameters
@@ -287,33 +265,52 @@ def job(
         What is written; somewhere else than in `home` it is no result of the campaign, and
         nothing is recorded.
 
+    Yields
+    ------
+    list of Path
+        The outputs, to which the stage may add.
+
     Raises
     ------
     DamagedError
         If an input is not what its stage wrote, or was made from other files than those
         that are there now.
     """
-    inputs, sources = tuple(inputs), tuple(sources)
-    checked = check(inputs)
+    inputs, sources, written = tuple(inputs), tuple(sources), list(outputs)
     if outputs and not outputs[0].absolute().is_relative_to(home.absolute()):
+        check(inputs)
         with writing(inputs=(*inputs, *sources)):
-            yield Job()
+            yield written
         return
-    repaired = read_manifest(home, stage).repaired
+    history = set_aside_damaged(old := read_manifest(home, stage))
+    checked = check(inputs)
     # Until the stage has ended its old results are nobody's.
-    Manifest(home, stage, repaired=repaired).write()
-    running = Job(list(outputs))
+    begun = disown(replace(old, repaired=history))
     with writing(inputs=(*inputs, *sources)):
-        yield running
-    Manifest(
-        home,
-        stage,
-        outputs={_name(path, home): sum_of(path) for path in running.outputs if path.is_file()},
-        extras={_name(path, home): sum_of(path) for path in running.extras if path.is_file()},
+        yield written
+    replace(
+        begun,
+        outputs={_name(path, home): sum_of(path) for path in written if path.is_file()},
         inputs={_name(path, home): made for path, made in checked.items()},
         sources={path.name: made for path in sources if (made := _sum_of_source(path))},
-        repaired=repaired,
     ).write()
+
+
+def set_aside_damaged(old: Manifest) -> str:
+    """Set the damaged results of a stage aside before it runs; return its `Manifest.repaired`."""
+    damages = old.damages()
+    for damage in damages:
+        if damage.path.exists():
+            line = f"{damage.path}: {damage.problem}; {damage.set_aside()}"
+            print(f"pendpipe: {line}", file=sys.stderr)
+    return str(handed_on()["repaired"].get(str(old.path), _history(old, damages)))
+
+
+def disown(old: Manifest) -> Manifest:
+    """Write that a stage has not ended: its results are nobody's."""
+    begun = Manifest(old.home, old.stage, repaired=old.repaired)
+    begun.write()
+    return begun
 
 
 def check(paths: Iterable[Path]) -> dict[Path, str]:
@@ -335,10 +332,20 @@ def check(paths: Iterable[Path]) -> dict[Path, str]:
         if damage is not None:
             raise DamagedError(
                 path,
-                f"{damage.problem}, {set_aside(damage)}",
+                f"{damage.problem}, {damage.set_aside()}",
                 f"run snakemake again: stage {owner.stage} makes it anew",
             )
         hashes[path] = made.sha256
+    return hashes
+
+
+def recorded(paths: Iterable[Path]) -> dict[str, str]:
+    """The hashes of results as their stages recorded them; of a file in no manifest, its own."""
+    index, hashes = Index(), {}
+    for path in paths:
+        found = index.find(path)
+        if found is not None or path.is_file():
+            hashes[path.name] = sha256(path) if found is None else found[1].sha256
     return hashes
 
 
@@ -349,7 +356,7 @@ class Index(dict[Path, dict[str, tuple[Manifest, Sum]]]):
         self[home] = {
             name: (manifest, made)
             for manifest in manifests(home)
-            for name, made in (manifest.outputs | manifest.extras).items()
+            for name, made in manifest.outputs.items()
         }
         return self[home]
 
@@ -389,49 +396,55 @@ def source_sha256(manifest: Manifest, source: Path) -> str | None:
     if not is_file(source):
         return None
     made = manifest.sources.get(source.name)
-    since = _written_ns(manifest.path) if made is not None else None
-    kept = made is not None and since is not None and _unchanged(source, made, since)
+    if made is not None and _unchanged(source, made, _written_ns(manifest.path)):
+        return made.sha256
     try:
-        return made.sha256 if made is not None and kept else sha256(source)
+        return sha256(source)
     except OSError:  # its own job says why it can't be read
         return None
 
 
-def changed_ns(path: Path) -> int:
+def changed_ns(path: str | Path) -> int:
     """When a file was changed, which nobody can put back; 0 where there is none."""
+    status = _status(path)
+    return 0 if status is None else _changed_ns(status)
+
+
+def _status(path: str | Path) -> os.stat_result | None:
     try:
-        status = os.stat(path)  # noqa: PTH116 (a Path takes longer, and files are many)
+        return os.stat(path)  # noqa: PTH116 (a Path takes longer, and files are many)
     except OSError:
-        return 0
+        return None
+
+
+def _changed_ns(status: os.stat_result) -> int:
     # On Windows st_ctime is the time of creation, and st_mtime all there is.
     return max(status.st_ctime_ns, status.st_mtime_ns)
 
 
 def _written_ns(path: Path) -> int | None:
-    """When a manifest was written; None where its time is no measure, since it lies ahead of us.
+    """When a manifest was written; None where it is gone, or its time is no measure.
 
-    A clock that was set back, or a touched file. What has changed since may bear any time.
+    That lies ahead of us: a clock was set back, or the file was touched. What has changed since
+    may bear any time.
     """
-    status = path.stat()
-    # On Windows st_ctime is the time of creation.
-    changed_ns = status.st_mtime_ns if os.name == "nt" else status.st_ctime_ns
-    since = min(status.st_mtime_ns, changed_ns)
-    return since if since <= time.time_ns() else None
+    status = _status(path)
+    if status is None:
+        return None
+    ours = (status.st_mtime_ns,) if os.name == "nt" else (status.st_mtime_ns, status.st_ctime_ns)
+    return since if (since := min(ours)) <= time.time_ns() else None
+
+
+def _unchanged(path: str | Path, made: Sum, since_ns: int | None) -> bool:
+    """Whether a file has its length, and nobody has changed it since a moment."""
+    status = None if since_ns is None else _status(path)
+    if status is None or since_ns is None:
+        return False
+    return status.st_size == made.length and _changed_ns(status) < since_ns
 
 
 def _name(path: Path, home: Path) -> str:
     return Path(os.path.relpath(path.absolute(), home.absolute())).as_posix()
-
-
-def _unchanged(path: str | Path, made: Sum, since_ns: int) -> bool:
-    """Whether a file has its length, and nobody has changed it since a moment."""
-    try:
-        status = os.stat(path)  # noqa: PTH116 (a Path takes longer, and files are many)
-    except OSError:
-        return False
-    # On Windows st_ctime is the time of creation, and st_mtime all there is.
-    changed_ns = max(status.st_ctime_ns, status.st_mtime_ns)
-    return status.st_size == made.length and changed_ns < since_ns
 
 
 def _compare(path: Path, made: Sum) -> Damage | None:

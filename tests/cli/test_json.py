@@ -31,9 +31,9 @@ def test_a_commands_answer_is_one_json_object(
     table.write_text("angle_rad,volts\n" + "\n".join(rows) + "\n", encoding="utf-8")
     results = tmp_path / "results"
     results.mkdir()
-    with manifest.job(results, "separate") as running:
+    with manifest.job(results, "separate") as written:
         (results / "separation.json").write_text("{}", encoding="utf-8")
-        running.outputs.append(results / "separation.json")
+        written.append(results / "separation.json")
     words = [word.format(folder=results, table=table) for word in command]
     assert cli.main([*words, "--json"]) == 0
     assert key in json.loads(capsys.readouterr().out)

@@ -17,12 +17,12 @@ from pendpipe.files import read_json
 def home(tmp_path: Path) -> Path:
     """A record whose stage `acquire` wrote a recording, and `fit` a fit made from it."""
     recording, fit = tmp_path / "recording.csv", tmp_path / "fit.json"
-    with manifest.job(tmp_path, "acquire") as running:
+    with manifest.job(tmp_path, "acquire") as written:
         recording.write_text("time_s,volts\n0.0,1.0\n0.1,2.0\n")
-        running.outputs.append(recording)
-    with manifest.job(tmp_path, "fit", inputs=[recording]) as running:
+        written.append(recording)
+    with manifest.job(tmp_path, "fit", inputs=[recording]) as written:
         fit.write_text('{"a": 1}\n')
-        running.outputs.append(fit)
+        written.append(fit)
     return tmp_path
 
 
@@ -46,11 +46,17 @@ def altered(content: bytes) -> bytes:
 
 
 def noticed(home: Path) -> list[str]:
-    return manifest.histories(home)[1]
+    return list(map(str, manifest.look_through(manifest.manifests(home)).damages))
 
 
 def history(home: Path) -> str:
-    return manifest.histories(home)[0]["fit"]
+    return manifest.look_through([manifest.read_manifest(home, "fit")]).repaired
+
+
+def run_fit(home: Path) -> None:
+    with manifest.job(home, "fit", inputs=[home / "recording.csv"]) as written:
+        (home / "fit.json").write_text('{"a": 1}\n')
+        written.append(home / "fit.json")
 
 
 DAMAGES = pytest.mark.parametrize(
@@ -105,7 +111,7 @@ def test_a_clock_that_was_set_back_hides_no_damage(
 ) -> None:
     """Then the time of a change says nothing, and everything is hashed."""
     (home / "fit.json").write_text('{"a": 2}\n')
-    monkeypatch.setattr(manifest, "_unchanged", lambda *_: True)
+    monkeypatch.setattr(manifest, "_changed_ns", lambda _: 0)
     assert noticed(home) == []
     monkeypatch.setattr("pendpipe.manifest.time.time_ns", lambda: 0)
     (line,) = noticed(home)
@@ -118,24 +124,41 @@ def test_a_damage_changes_the_rules_parameter_once(home: Path) -> None:
     with_its_old_time(home / "fit.json", emptied)
     planned = history(home)
     assert planned == "fit.json:e3b0c442"
-    manifest.set_aside_damaged(home)
-    assert history(home) == planned
-    with manifest.job(home, "fit", inputs=[home / "recording.csv"]) as running:
-        (home / "fit.json").write_text('{"a": 1}\n')
-        running.outputs.append(home / "fit.json")
+    run_fit(home)
     assert history(home) == planned
     assert noticed(home) == []
     with_its_old_time(home / "fit.json", emptied)
     assert history(home) == f"{planned} {planned}"
 
 
-@pytest.mark.parametrize("change", [cut, emptied, altered])
-def test_a_damaged_manifest_is_damage_too(home: Path, change: Callable[[bytes], bytes]) -> None:
-    with_its_old_time(home / "manifest/fit.json", change)
-    assert history(home) != ""
-    (line,) = manifest.set_aside_damaged(home)
-    assert "this manifest is torn or altered" in line
-    assert noticed(home) == []
+def test_a_damage_that_snakemake_deletes_before_the_job_runs_it_once(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The job inherits what planning found, and no start of the same run adds to it."""
+    with_its_old_time(home / "fit.json", emptied)
+    planned = history(home)
+    path = manifest.read_manifest(home, "fit").path
+    monkeypatch.setenv(manifest.RUN, "")
+    manifest.hand_on(anew=[], repaired={str(path): planned})
+    for _ in range(2):
+        (home / "fit.json").unlink()
+        run_fit(home)
+        assert (history(home), noticed(home)) == (planned, [])
+
+
+def test_a_change_of_any_byte_of_a_manifest_is_damage_and_runs_the_stage_once(
+    home: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = home / "manifest/fit.json"
+    whole = path.read_bytes()
+    flipped = [whole[:n] + bytes([whole[n] ^ 1]) + whole[n + 1 :] for n in range(len(whole))]
+    for content in (b"", whole[:-1], *flipped):
+        path.write_bytes(content)
+        assert len(noticed(home)) == 1, content
+    planned = history(home)
+    run_fit(home)
+    assert "this list of results is torn or altered; set aside" in capsys.readouterr().err
+    assert (history(home), noticed(home)) == (planned, [])
 
 
 def test_a_manifest_states_its_form_its_stage_and_who_wrote_it(home: Path) -> None:
@@ -152,9 +175,9 @@ def test_a_sound_copy_of_the_results_is_sound(home: Path) -> None:
 
 
 def test_a_result_made_from_another_recording_is_not_read(home: Path) -> None:
-    with manifest.job(home, "acquire") as running:
+    with manifest.job(home, "acquire") as written:
         (home / "recording.csv").write_text("time_s,volts\n0.0,3.0\n")
-        running.outputs.append(home / "recording.csv")
+        written.append(home / "recording.csv")
     with pytest.raises(DamagedError, match=r"made from another recording\.csv"):
         manifest.check([home / "fit.json"])
 

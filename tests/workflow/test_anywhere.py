@@ -94,14 +94,18 @@ rule all:
     counted = jobs(call(begun, "snakemake", "-n", "--quiet", "rules"))
     assert counted["pendpipe_fit"] == 1
     assert counted["pendpipe_report"] == 1
-    fits = "results/chunks/fit-all.json"
-    done = call(begun, "snakemake", "--cores", "2", fits)
-    assert done.returncode == 0, done.stdout + done.stderr
-    fit = begun / "results/rod/fit.json"
-    made = fit.stat().st_ino
-    assert not jobs(call(begun, "snakemake", "-n", fits))
-    done = call(begun, "snakemake", "--cores", "2", fits, "--forcerun", "pendpipe_fit")
-    assert done.returncode == 0, done.stdout + done.stderr
+    targets = ("results/chunks/fit-all.json", "results/records.csv")
+    jobs(call(begun, "snakemake", "--cores", "2", *targets))
+    fit, table = begun / "results/rod/fit.json", begun / "results/records.csv"
+    made, before = fit.stat().st_ino, (fit.read_bytes(), table.read_bytes())
+    for path in (fit, table):
+        path.write_bytes(path.read_bytes()[:-5])
+    done = call(begun, "snakemake", "--cores", "2", *targets)
+    assert set(jobs(done)) == {"pendpipe_fit", "pendpipe_records", "total"}
+    assert (fit.read_bytes(), table.read_bytes()) == before, "without the hooks of a workflow"
+    assert len(list(fit.parent.glob("fit.json.damaged-*"))) == 1
+    assert not jobs(call(begun, "snakemake", "-n", *targets))
+    jobs(call(begun, "snakemake", "--cores", "2", targets[0], "--forcerun", "pendpipe_fit"))
     assert fit.stat().st_ino != made, "made again, under the name that the rule has here"
 
 

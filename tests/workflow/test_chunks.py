@@ -21,7 +21,7 @@ from pendpipe import manifest
 from pendpipe.cli import main
 from pendpipe.configuration.load import Campaign, Record, load_campaign, read_configuration
 from pendpipe.files import sha256
-from pendpipe.stages.chunks import ANEW, STAGES, chunks_of, plan, split, write_chunk
+from pendpipe.stages.chunks import STAGES, chunks_of, plan, split
 
 RECORDS = ("one", "two", "three", "four", "five")
 ORDER = ("acquire", "calibrate", "turning-points", "fit")
@@ -121,7 +121,8 @@ def test_a_changed_setting_is_done_anew(campaign: Campaign) -> None:
 def test_a_forced_stage_is_done_anew(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     run(*ORDER)
     before = written(fits())
-    monkeypatch.setenv(ANEW, "fit")
+    monkeypatch.setenv(manifest.RUN, "")
+    manifest.hand_on(anew=["fit"], repaired={})
     run("fit")
     assert not set(written(fits()).values()) & set(before.values())
 
@@ -178,57 +179,75 @@ def in_the_future(path: Path) -> None:
     altered(path)
 
 
-@pytest.mark.parametrize("change", [Path.unlink, cut, altered, in_the_future])
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [
+        (Path.unlink, "fit.json"),
+        (cut, "fit.json"),
+        (altered, "fit.json"),
+        (in_the_future, "fit.json"),
+        (altered, "manifest/fit.json"),
+        (cut, "manifest/fit.json"),
+    ],
+)
 def test_a_plan_notices_what_a_job_then_makes_again(
-    campaign: Campaign, change: Callable[[Path], None]
+    campaign: Campaign,
+    change: Callable[[Path], None],
+    name: str,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     run(*ORDER)
     fit, records = STAGES["fit"], chunks_of(campaign)["all"]
-    sound = plan(campaign, fit, "all", records)
-    assert (sound.repaired, sound.lines, sound.damaged) == ("", (), ())
+    sound = plan(campaign, fit, "all", records).found
+    assert (sound.repaired, sound.damages) == ("", ())
     before, others = sha256(fits()["two"]), written(fits())
-    change(fits()["two"])
-    found = plan(campaign, fit, "all", records)
-    (line,) = found.lines
-    assert "two/fit.json" in line
-    assert found.damaged == (Path("results/two"),)
+    change(Path("results/two", name))
+    found = plan(campaign, fit, "all", records).found
+    (damage,) = found.damages
+    assert damage.path == Path("results/two", name)
     assert found.repaired != sound.repaired, "a changed parameter runs the job"
-    manifest.set_aside_damaged(Path("results/two"), missing=True)
     run("fit")
+    assert ("; set aside as " in capsys.readouterr().err) == (damage.found != "missing")
     assert sha256(fits()["two"]) == before
-    after = plan(campaign, fit, "all", records)
-    assert (after.lines, after.repaired) == ((), found.repaired), "and runs it once"
-    assert {n: i for n, i in written(fits()).items() if n != "two"} == {
-        n: i for n, i in others.items() if n != "two"
-    }
+    after = plan(campaign, fit, "all", records).found
+    assert (after.damages, after.repaired) == ((), found.repaired), "and runs it once"
+    now = written(fits())
+    assert [record for record in RECORDS if now[record] != others[record]] == ["two"]
 
 
-def test_a_plan_notices_a_torn_manifest_of_a_record(campaign: Campaign) -> None:
+def test_a_refusal_that_is_over_is_no_damage(campaign: Campaign) -> None:
+    """A stage refused a record, and its file was changed: acquire takes the refusal back."""
+    two = Path("two.csv")
+    whole, fit = two.read_text(encoding="utf-8"), STAGES["fit"]
+    two.write_text("".join(whole.splitlines(keepends=True)[:40]), encoding="utf-8")
     run(*ORDER)
-    fit, records = STAGES["fit"], chunks_of(campaign)["all"]
-    altered(Path("results/two/manifest/fit.json"))
-    found = plan(campaign, fit, "all", records)
-    (line,) = found.lines
-    assert "two/manifest/fit.json: this manifest is torn or altered" in line
-    (line,) = manifest.set_aside_damaged(Path("results/two"), missing=True)
-    assert "set aside" in line
-    run("fit")
-    after = plan(campaign, fit, "all", records)
-    assert (after.lines, after.repaired) == ((), found.repaired), "and runs it once"
+    refused = json.loads(Path("results/two/refused.json").read_text(encoding="utf-8"))
+    assert refused["stage"] != "acquire"
+    two.write_text(whole, encoding="utf-8")
+    before = plan(campaign, fit, "all", chunks_of(campaign)["all"])
+    run(*ORDER)
+    after = plan(campaign, fit, "all", chunks_of(campaign)["all"])
+    assert (before.found, after.found) == (manifest.Findings(), manifest.Findings())
 
 
-def test_what_a_chunk_says_when_it_is_torn_is_made_again(campaign: Campaign) -> None:
+def test_what_a_chunk_says_when_it_is_torn_is_made_again(
+    campaign: Campaign, monkeypatch: pytest.MonkeyPatch
+) -> None:
     run("acquire")
     acquire, records = STAGES["acquire"], chunks_of(campaign)["all"]
     path = acquire.path(campaign, "all")
     whole = path.read_bytes()
-    sound = plan(campaign, acquire, "all", records)
+    sound = plan(campaign, acquire, "all", records).found
     path.write_bytes(whole[:100])
-    found = plan(campaign, acquire, "all", records)
-    assert "acquire-all.json: it is torn" in found.lines[0]
-    assert found.repaired != sound.repaired, "a changed parameter runs the job"
-    write_chunk(campaign, acquire, records, path)
-    assert path.read_bytes() == whole
+    torn = plan(campaign, acquire, "all", records)
+    (damage,) = torn.found.damages
+    assert damage.path == path
+    assert torn.found.repaired != sound.repaired, "a changed parameter runs the job"
+    monkeypatch.setenv(manifest.RUN, "")
+    manifest.hand_on(anew=[], repaired={str(path): torn.own})
+    run("acquire")
+    after = plan(campaign, acquire, "all", records).found
+    assert (after.damages, after.repaired) == ((), torn.found.repaired), "and runs it once"
 
 
 def test_records_of_an_instrument_have_a_chunk_each(campaign: Campaign) -> None:

@@ -23,15 +23,15 @@ def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     record = tmp_path / "results/air-01"
     record.mkdir(parents=True)
     recording, fit = record / "recording.csv", record / "fit.json"
-    with manifest.job(record, "acquire") as running:
+    with manifest.job(record, "acquire") as written:
         recording.write_text("time_s,volts\n0.0,1.0\n")
-        running.outputs.append(recording)
-    with manifest.job(record, "fit", inputs=[recording]) as running:
+        written.append(recording)
+    with manifest.job(record, "fit", inputs=[recording]) as written:
         write_json(fit, {"a": 1, "provenance": {"input_sha256": sha256(recording)}})
-        running.outputs.append(fit)
-    with manifest.job(record.parent, "separate", inputs=[fit]) as running:
+        written.append(fit)
+    with manifest.job(record.parent, "separate", inputs=[fit]) as written:
         write_json(record.parent / "separation.json", {"k": 3940})
-        running.outputs.append(record.parent / "separation.json")
+        written.append(record.parent / "separation.json")
     return record.parent
 
 
@@ -49,9 +49,9 @@ def put(name: str, content: str = "x") -> Callable[[Path], object]:
 
 
 def other_recording(results: Path) -> None:
-    with manifest.job(results / "air-01", "acquire") as running:
+    with manifest.job(results / "air-01", "acquire") as written:
         (results / "air-01/recording.csv").write_text("time_s,volts\n0.0,2.0\n")
-        running.outputs.append(results / "air-01/recording.csv")
+        written.append(results / "air-01/recording.csv")
 
 
 def killed_stage(results: Path) -> None:
@@ -100,22 +100,22 @@ def test_each_thing_that_is_wrong_is_named(
 def other_campaign(results: Path) -> None:
     """Results of another campaign in a folder of these, as config/recordings.yaml has them."""
     record = results / "recordings/steel"
-    with manifest.job(record, "fit") as running:
+    with manifest.job(record, "fit") as written:
         for name in ("fit.json", "diagnosis/diagnosis.json"):
             write_json(record / name, {})
-            running.outputs.append(record / name)
-    with manifest.job(record.parent, "compare") as running:
+            written.append(record / name)
+    with manifest.job(record.parent, "compare") as written:
         write_json(record.parent / "comparison.json", {})
-        running.outputs.append(record.parent / "comparison.json")
+        written.append(record.parent / "comparison.json")
     put("recordings/steel/logs/fit.log")(results)
     put("recordings/steel/raw/README.md")(results)
     put("recordings/report-of-mine/notes.txt")(results)
 
 
 def record_named_raw(results: Path) -> None:
-    with manifest.job(results / "raw", "fit") as running:
+    with manifest.job(results / "raw", "fit") as written:
         write_json(results / "raw/fit.json", {})
-        running.outputs.append(results / "raw/fit.json")
+        written.append(results / "raw/fit.json")
 
 
 @pytest.mark.parametrize("change", [other_campaign, record_named_raw, put("my notes/plan.txt")])
@@ -155,9 +155,9 @@ def test_the_diagnosis_of_a_pendulum_is_a_result_as_all_others(results: Path) ->
     for content in ("", '{"torn": ', '{"schema_version": 1}'):
         put("pendulums/steel/diagnosis.json", content)(results)
         assert ("altered", "diagnosis.json") in kinds(results)
-        history, (line,) = manifest.histories(out)
-        assert "diagnosis.json" in history["diagnose-pendulum"]
-        assert "makes it again" in line
+        found = manifest.look_through(manifest.manifests(out))
+        assert "diagnosis.json" in found.repaired
+        assert "makes it again" in str(found.damages[0])
 
 
 def test_a_hidden_file_of_the_user_is_not_taken_for_an_unfinished_result(results: Path) -> None:

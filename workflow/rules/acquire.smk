@@ -10,8 +10,8 @@ rule acquire:
         runtime=doubled(30),
         configuration=CONFIGURATION,
     params:
-        settings=planned("acquire", "settings"),
-        repaired=planned("acquire", "repaired"),
+        settings=planned("acquire"),
+        repaired=repaired("acquire"),
         code=code_version("pendpipe.commands.acquire"),
     message:
         "acquire, chunk {wildcards.chunk}"

@@ -17,7 +17,8 @@ rule caliper:
         arm=option("arm-m", CALIPER and CALIPER.arm_m),
         error=option("displacement-sd-m", CALIPER and CALIPER.displacement_sd_m),
         depends=jobs.caliper(CAMPAIGN),
-        repaired=repaired("calibration", "caliper", "sensor"),
+        caliper=repaired("caliper", "calibration"),
+        sensor=repaired("sensor", "calibration"),
         code=code_version("pendpipe.stages.acquire")
         + code_version("pendpipe.commands.calibrate"),
     message:
@@ -42,8 +43,8 @@ rule calibrate:
         runtime=doubled(10),
         configuration=CONFIGURATION,
     params:
-        settings=planned("calibrate", "settings"),
-        repaired=planned("calibrate", "repaired"),
+        settings=planned("calibrate"),
+        repaired=repaired("calibrate"),
         code=code_version("pendpipe.commands.calibrate"),
     message:
         "calibrate, chunk {wildcards.chunk}"

@@ -2,6 +2,7 @@
 import os
 import re
 import shlex
+from functools import cache
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
@@ -59,21 +60,6 @@ STAGES = [
 ]
 
 
-def hand_on_forced():
-    """Let jobs know which stages are forced: there, what is done is done again.
-
-    Jobs inherit the variable, on a cluster too. Snakemake says what is forced after it has read
-    the rules. Another workflow may give them names of its own (`use rule * from ... as`).
-    """
-    if workflow.is_main_process:
-        asked = workflow.dag_settings
-        os.environ[chunks.ANEW] = " ".join(
-            name
-            for name, rule in RULE_NAMES.items()
-            if asked.forceall or rule in asked.forcerun
-        )
-
-
 RULE_NAMES = {
     name: workflow.modifier.modify_rulename(name.replace("-", "_"))
     for name in chunks.STAGES
@@ -86,35 +72,63 @@ PLANS = {
     for stage in STAGES
     for chunk, records in CHUNKS.items()
 }
-OWN = ("", "calibration", *(f"pendulums/{name}" for name in PENDULUMS))
-FOUND = {folder: checked(manifest.histories, Path(RESULTS, folder)) for folder in OWN}
+# The campaign's own stages, by the file of their manifest.
+FOUND = {
+    str(each.path): checked(manifest.look_through, [each])
+    for folder in ("", "calibration", *(f"pendulums/{name}" for name in PENDULUMS))
+    for each in manifest.manifests(Path(RESULTS, folder))
+}
 
 
-def damage_lines():
-    """A line for each result that is not as its stage wrote it."""
-    return [line for plan in PLANS.values() for line in plan.lines] + [
-        line for _, lines in FOUND.values() for line in lines
-    ]
+@cache
+def hand_on():
+    """Let the jobs inherit what is forced, and the damages that they can't find themselves.
+
+    Snakemake says what is forced after it has read the rules. Another workflow may give them names
+    of its own (`use rule * from ... as`).
+    """
+    if workflow.is_main_process:
+        asked = workflow.dag_settings
+        forced = [
+            name
+            for name, rule in RULE_NAMES.items()
+            if asked.forceall or rule in asked.forcerun
+        ]
+        own = {path: found.repaired for path, found in FOUND.items()}
+        torn = {
+            str(chunks.STAGES[name].path(CAMPAIGN, chunk)): plan.own
+            for (name, chunk), plan in PLANS.items()
+            if plan.own
+        }
+        manifest.hand_on(anew=forced, repaired=own | torn)
 
 
-def set_aside_damaged():
-    """Rename what is damaged, and return a line for each file."""
-    records = {home for plan in PLANS.values() for home in plan.damaged}
-    lines = [
-        line
-        for home in sorted(records)
-        for line in checked(lambda: manifest.set_aside_damaged(home, missing=True))
-    ]
-    own = (checked(manifest.set_aside_damaged, Path(RESULTS, folder)) for folder in OWN)
-    return lines + [line for found in own for line in found]
+def damages():
+    """The results that are not as their stages wrote them."""
+    found = (*(plan.found for plan in PLANS.values()), *FOUND.values())
+    return [damage for each in found for damage in each.damages]
 
 
-def planned(name, of):
-    """What the plan of a job knows, as a parameter of its stage."""
+def planned(name):
+    """What the configuration says of the records of a job."""
 
     def of_job(wildcards):
-        hand_on_forced()
-        return getattr(PLANS[name, wildcards.chunk], of)
+        hand_on()
+        return PLANS[name, wildcards.chunk].settings
+
+    return of_job
+
+
+def repaired(name, folder=None):
+    """The damages that made a job run again: a new one is a changed parameter."""
+
+    def of_job(wildcards):
+        hand_on()
+        if folder is None:
+            return PLANS[name, wildcards.chunk].found.repaired
+        home = Path(RESULTS, folder.format(**wildcards))
+        found = FOUND.get(str(manifest.Manifest(home, name).path), manifest.Findings())
+        return found.repaired
 
     return of_job
 
@@ -123,16 +137,6 @@ def chunk_of(name, only=None):
     """What the jobs of a stage leave: that of the same chunk, or of all (or of `only`)."""
     path = f"{RESULTS}/chunks/{name}-{{chunk}}.json"
     return path if only is None else expand(path, chunk=only)
-
-
-def repaired(folder, *stages):
-    """The damages that made a job's stages run again: a new one is a changed parameter."""
-
-    def of_job(wildcards):
-        histories, _ = FOUND[folder.format(**wildcards)]
-        return " ".join(filter(None, map(histories.get, stages)))
-
-    return of_job
 
 
 wildcard_constraints:

@@ -15,7 +15,7 @@ rule compare:
         configuration=CONFIGURATION,
     params:
         depends=jobs.theory(CAMPAIGN),
-        repaired=repaired("", "compare"),
+        repaired=repaired("compare", ""),
         code=code_version("pendpipe.stages.compare"),
     message:
         "the losses beside Eq. 16"

@@ -16,8 +16,8 @@ rule diagnose:
         runtime=doubled(240),
         configuration=CONFIGURATION,
     params:
-        settings=planned("diagnose", "settings"),
-        repaired=planned("diagnose", "repaired"),
+        settings=planned("diagnose"),
+        repaired=repaired("diagnose"),
         code=code_version("pendpipe.commands.diagnose"),
     message:
         "what physics is missing, chunk {wildcards.chunk}"

@@ -15,7 +15,7 @@ rule diagnose_campaign:
         folder=subpath(output[0], parent=True),
         depends=jobs.theory(CAMPAIGN),
         level=CAMPAIGN.configuration.diagnose.level,
-        repaired=repaired("", "diagnose-campaign"),
+        repaired=repaired("diagnose-campaign", ""),
         code=code_version("pendpipe.stages.diagnose_campaign"),
     message:
         "what all records together say is missing"

@@ -19,7 +19,7 @@ rule diagnose_pendulum:
         baseline=CAMPAIGN.configuration.diagnose.baseline,
         level=CAMPAIGN.configuration.diagnose.level,
         seed=CAMPAIGN.configuration.seed,
-        repaired=repaired("pendulums/{pendulum}", "diagnose-pendulum"),
+        repaired=repaired("diagnose-pendulum", "pendulums/{pendulum}"),
         code=code_version("pendpipe.commands.diagnose"),
     message:
         "{wildcards.pendulum}: what its recordings say together"

@@ -22,7 +22,7 @@ rule figures:
         configuration=CONFIGURATION,
     params:
         folder=subpath(output.drawn, parent=True),
-        repaired=repaired("", "figures"),
+        repaired=repaired("figures", ""),
         code=code_version("pendpipe.commands.figures"),
     message:
         "figures 3 to 10"

@@ -14,8 +14,8 @@ rule fit:
         runtime=doubled(30),
         configuration=CONFIGURATION,
     params:
-        settings=planned("fit", "settings"),
-        repaired=planned("fit", "repaired"),
+        settings=planned("fit"),
+        repaired=repaired("fit"),
         code=code_version("pendpipe.commands.fit"),
     message:
         "fit a, b, c, chunk {wildcards.chunk}"

@@ -15,7 +15,7 @@ rule records:
         configuration=CONFIGURATION,
     params:
         depends=jobs.theory(CAMPAIGN),
-        repaired=repaired("", "records"),
+        repaired=repaired("records", ""),
         code=code_version("pendpipe.stages.records"),
     message:
         "a table of the records"

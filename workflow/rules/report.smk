@@ -20,7 +20,7 @@ rule report:
         runtime=doubled(20),
         configuration=CONFIGURATION,
     params:
-        repaired=repaired("", "report"),
+        repaired=repaired("report", ""),
         code=code_version("pendpipe.commands.report"),
     message:
         "the page about the campaign"

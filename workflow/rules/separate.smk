@@ -13,7 +13,7 @@ rule separate:
         configuration=CONFIGURATION,
     params:
         depends=jobs.theory(CAMPAIGN),
-        repaired=repaired("", "separate"),
+        repaired=repaired("separate", ""),
         code=code_version("pendpipe.stages.separate"),
     message:
         "hysteretic and viscous losses"

@@ -13,8 +13,8 @@ rule turning_points:
         runtime=doubled(20),
         configuration=CONFIGURATION,
     params:
-        settings=planned("turning-points", "settings"),
-        repaired=planned("turning-points", "repaired"),
+        settings=planned("turning-points"),
+        repaired=repaired("turning-points"),
         code=code_version("pendpipe.commands.turning_points"),
     message:
         "turning points, chunk {wildcards.chunk}"

@@ -98,18 +98,13 @@ def run(arguments: Arguments) -> int:
         make_folder(arguments.out)
     if arguments.record is None:
         return _diagnose(arguments, fixed)
-    check([arguments.refused] if arguments.refused is not None else [])
     read = (Path(arguments.file), arguments.calibration, arguments.turning_points)
     inputs = [path for path in read if path is not None]
-    with job(arguments.out.parent, "diagnose", inputs=inputs) as running:
+    with job(arguments.out.parent, "diagnose", inputs=inputs) as written:
+        check([arguments.refused] if arguments.refused is not None else [])
         status = _diagnose(arguments, fixed)
-        # What Snakemake declares it deletes after a kill, and sees missing by itself.
-        declared = {FILE_NAME, *(f"{name}.svg" for name in OF_EVERY_DIAGNOSIS)}
-        for path in sorted(arguments.out.iterdir()):
-            if path.name in declared:
-                running.outputs.append(path)
-            elif path.suffix in (".svg", ".png"):
-                running.extras.append(path)
+        made = sorted(arguments.out.iterdir())
+        written += [p for p in made if p.name == FILE_NAME or p.suffix in (".svg", ".png")]
     return status
 
 

@@ -96,11 +96,7 @@ def examine(results: Path) -> list[Finding]:
     homes = _homes(results)
     stages = [stage for home in homes for stage in manifest.manifests(home)]
     found += [finding for stage in stages for finding in _of_manifest(stage)]
-    listed = {
-        (stage.home / name).resolve()
-        for stage in stages
-        for name in (*stage.outputs, *stage.extras)
-    }
+    listed = {(stage.home / name).resolve() for stage in stages for name in stage.outputs}
     found += _of_files(results, homes, listed)
     refuse_if(
         not (homes or found),
@@ -125,11 +121,10 @@ def _of_manifest(stage: manifest.Manifest) -> Iterator[Finding]:
     """Results that are not what their stage wrote, from other files, or never finished."""
     damages, index = stage.damages(hash_all=True), manifest.Index()
     for damage in damages:
-        yield Finding("altered", str(damage.path), damage.problem, _RUN)
+        kind = "incomplete" if damage.found == "missing" else "altered"
+        yield Finding(kind, str(damage.path), damage.problem, _RUN)
     for path in (stage.home / name for name in stage.outputs):
-        if not path.is_file():
-            yield Finding("incomplete", str(path), "it is missing", _RUN)
-        elif stale := index.made_from_others(path, stage):
+        if path.is_file() and (stale := index.made_from_others(path, stage)):
             yield Finding("stale", str(path), stale.problem, _RUN)
     if not stage.outputs and not damages:
         yield Finding(

@@ -43,7 +43,7 @@ def run(arguments: Arguments) -> None:
     together = folder / "campaign_diagnosis.json"
     inputs += [arguments.comparison, *([together] if together.is_file() else [])]
     listed = arguments.out / "drawn.json"
-    with job(folder, "figures", inputs=inputs, outputs=[listed]) as running:
+    with job(folder, "figures", inputs=inputs, outputs=[listed]) as written:
         drawn = draw_all(comparison, folder, arguments.out, processes=arguments.processes)
         for name, reason in drawn.left_out.items():
             tell(f"pendpipe: {name} is not drawn: {reason}")
@@ -52,5 +52,5 @@ def run(arguments: Arguments) -> None:
             for file in drawn.files
         ]
         write_json(listed, {"schema_version": 1, "files": names, "left_out": dict(drawn.left_out)})
-        running.extras += drawn.files
+        written += drawn.files
     tell(f"{arguments.out}: {len(drawn.files)} files drawn")

@@ -49,11 +49,11 @@ def run(arguments: Arguments) -> None:
     summary = arguments.summary or compared.with_name("campaign.json")
     figures = arguments.figures or out.parent / "figures"
     inputs = [compared, summary, *page_files(comparison, folder, figures)]
-    with job(folder, "report", inputs=inputs, outputs=[out]) as running:
+    with job(folder, "report", inputs=inputs, outputs=[out]) as written:
 
         def own_page(record: str, page: str) -> None:
             write_whole(folder / record / OWN_PAGE, page)
-            running.extras.append(folder / record / OWN_PAGE)
+            written.append(folder / record / OWN_PAGE)
 
         page = render(
             configuration,

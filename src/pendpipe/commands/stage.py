@@ -8,21 +8,21 @@ made from, now recorded or kept from before, is said to the user as well.
 
 import traceback
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from pendpipe import manifest
 from pendpipe.arguments import Arguments, load, tell
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.errors import refuse_if
 from pendpipe.files import make_folder
+from pendpipe.manifest import handed_on, read_manifest
 from pendpipe.options import Flags, flags
 from pendpipe.stages.chunks import (
     STAGES,
     Stage,
     call,
     chunks_of,
-    forced,
     key,
     write_chunk,
 )
@@ -53,8 +53,8 @@ def _of_record(campaign: Campaign, stage: Stage, record: Record, configuration: 
     """Do the stage for one record unless it is done; return the command's status."""
     home = campaign.folder / record.record
     wanted = key(campaign, stage, record)
-    done = manifest.read_manifest(home, stage.name)
-    if done.key == wanted and stage.name not in forced() and not done.damages(missing=True):
+    done = read_manifest(home, stage.name)
+    if done.key == wanted and stage.name not in handed_on()["anew"] and not done.damages():
         return 0
     log = home / "logs" / f"{stage.name.replace('-', '_')}.log"
     status = _logged(log, call(campaign, stage, record, configuration))
@@ -67,9 +67,7 @@ def _of_record(campaign: Campaign, stage: Stage, record: Record, configuration: 
             tell(line)
         elif line.startswith(f"{record.record}: "):
             print(line)
-    made = manifest.read_manifest(home, stage.name)
-    made.key = wanted
-    made.write()
+    replace(read_manifest(home, stage.name), key=wanted).write()
     return 0
 
 

@@ -16,19 +16,27 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-from pendpipe import manifest
 from pendpipe.configuration import jobs
 from pendpipe.configuration.load import Campaign, Record
-from pendpipe.errors import InputError
-from pendpipe.files import read_json, sha256, write_json
+from pendpipe.manifest import (
+    Findings,
+    Manifest,
+    changed_ns,
+    handed_on,
+    joined,
+    look_through,
+    of_content,
+    read_checked,
+    read_manifest,
+    recorded,
+    write_checked,
+)
 from pendpipe.provenance import code_version
 from pendpipe.version import __version__
 
 FOLDER: Final = "chunks"
-ANEW: Final = "PENDPIPE_ANEW"
-"""Variable that names the stages whose results are made again even if they are done."""
 WHOLE: Final = "all"
 """Name of the chunk that was not split."""
 ALONE: Final = "record."
@@ -169,9 +177,7 @@ def _sensor(campaign: Campaign) -> Path | None:
     return campaign.folder / "calibration" / "sensor.json"
 
 
-def settings(
-    campaign: Campaign, stage: Stage, record: Record, made: manifest.Manifest | None = None
-) -> str:
+def settings(campaign: Campaign, stage: Stage, record: Record, made: Manifest | None = None) -> str:
     """What the configuration says of one record's stage: a part of its key."""
     if stage.name == "acquire":
         return jobs.acquisition(campaign, record, made)
@@ -183,7 +189,7 @@ def key(campaign: Campaign, stage: Stage, record: Record) -> str:
     home = campaign.folder / record.record
     sensor = _sensor(campaign) if stage.name == "calibrate" else None
     files = [home / name for name in stage.inputs] + ([sensor] if sensor else [])
-    read = manifest.recorded(files)
+    read = recorded(files)
     return jobs.digest([settings(campaign, stage, record), _code(stage.module), read])
 
 
@@ -193,41 +199,29 @@ _code = cache(code_version)
 
 def write_chunk(campaign: Campaign, stage: Stage, records: Sequence[Record], out: Path) -> None:
     """Write the manifests of a chunk's records into one file."""
-    content = {
-        record.record: manifest.read_manifest(campaign.folder / record.record, stage.name).content()
-        for record in records
-    }
-    write_json(
-        out,
-        {
-            "schema_version": 1,
-            "stage": stage.name,
-            "version": __version__,
-            "records": content,
-        },
-    )
+    made = (read_manifest(campaign.folder / record.record, stage.name) for record in records)
+    content = {one.home.name: one.content() for one in made}
+    head = {"schema_version": 1, "stage": stage.name, "version": __version__}
+    repaired = handed_on()["repaired"].get(str(out), "")
+    write_checked(out, head | {"repaired": repaired, "records": content})
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What a plan knows of the job of a chunk: parameters of its rule, and what is wrong.
+class Plan(NamedTuple):
+    """What a plan knows of the job of a chunk.
 
     Parameters
     ----------
     settings
-        Digest of what the configuration says of its records.
-    repaired
-        The damages, repaired or not, that made the stage run again (`pendpipe.manifest`).
-    damaged
-        The folders with results that are not as they were written.
-    lines
-        A line for each of these results.
+        Digest of what the configuration says of its records: a parameter of the rule.
+    found
+        What is wrong with their results, and with the chunk's own file.
+    own
+        The history of damages of the chunk's own file, which its job writes into the next.
     """
 
     settings: str
-    repaired: str
-    damaged: tuple[Path, ...]
-    lines: tuple[str, ...]
+    found: Findings
+    own: str
 
 
 def plan(campaign: Campaign, stage: Stage, chunk: str, records: Iterable[Record]) -> Plan:
@@ -235,49 +229,29 @@ def plan(campaign: Campaign, stage: Stage, chunk: str, records: Iterable[Record]
 
     One `stat` a file: it is hashed only where length or time of change speak.
     """
-    said: list[str] = []
-    repaired: list[str] = []
-    lines: list[str] = []
-    damaged: list[Path] = []
     path = stage.path(campaign, chunk)
-    made = _read_chunk(path)
-    if made is None and path.is_file():
-        torn = manifest.Damage(path, "it is torn or altered", sha256(path)[:8])
-        repaired.append(torn.mark)
-        lines.append(f"{path}: {torn.problem}; a run makes it again")
-    written = 0 if made is None else manifest.changed_ns(path)
-    nothing = manifest.Manifest(Path(), stage.name)
-    for record in records:
-        # (As text: a Path takes longer, and records are many.)
-        home = f"{campaign.configuration.results}/{record.record}"
-        content = None if made is None else made.get(record.record)
-        if content is None and not os.path.isdir(home):  # noqa: PTH112
-            said.append(settings(campaign, stage, record, nothing))
-            continue
-        if content is not None:
-            one = manifest.of_content(Path(home), stage.name, content)
-            if manifest.changed_ns(one.path) >= written:  # it was altered, or a later job is cut
-                one = manifest.read_manifest(one.home, stage.name)
-        else:
-            one = manifest.read_manifest(Path(home), stage.name)
-        said.append(settings(campaign, stage, record, one))
-        found = [] if content is None else one.damages(missing=True)
-        if found:
-            damaged.append(one.home)
-        lines += [manifest.noticed(damage) for damage in found]
-        marks = (*one.repaired, *(damage.mark for damage in found))
-        repaired += [f"{record.record}/{mark}" for mark in marks]
-    return Plan(jobs.digest(said), " ".join(repaired), tuple(damaged), tuple(lines))
+    content, torn = read_checked(path)
+    listed = content.get("records", {})
+    written = changed_ns(path)
+    made = [_manifest(campaign, stage, record, listed, written) for record in records]
+    said = [settings(campaign, stage, *each) for each in zip(records, made, strict=True)]
+    own = joined([content.get("repaired", ""), *(each.mark for each in torn)])
+    damages, repaired = look_through(made)
+    found = Findings((*torn, *damages), joined([own, repaired]))
+    return Plan(jobs.digest(said), found, own)
 
 
-def _read_chunk(path: Path) -> dict[str, Any] | None:
-    """Read what a chunk's job left; None where it is missing or torn: the job then runs."""
-    try:
-        return dict(read_json(path)["records"])
-    except (InputError, KeyError, TypeError, ValueError):
-        return None
-
-
-def forced() -> set[str]:
-    """The stages that are to be done again."""
-    return set(os.environ.get(ANEW, "").split())
+def _manifest(
+    campaign: Campaign, stage: Stage, record: Record, listed: dict[str, Any], written_ns: int
+) -> Manifest:
+    """What a record's stage wrote, as its chunk says unless that is older."""
+    # (As text: a Path takes longer, and records are many.)
+    home = f"{campaign.configuration.results}/{record.record}"
+    content = listed.get(record.record)
+    if content is None and not os.path.isdir(home):  # noqa: PTH112
+        return Manifest(Path(home), stage.name)
+    one = None if content is None else of_content(Path(home), stage.name, content)
+    # It was altered, or a later job is cut.
+    if one is None or changed_ns(one.path) >= written_ns:
+        return read_manifest(Path(home), stage.name)
+    return one

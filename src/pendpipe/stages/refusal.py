@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from pendpipe.errors import DamagedError, InputError, UnwritableError
 from pendpipe.files import read_json, without_folders, write_json, write_whole
-from pendpipe.manifest import check, job
+from pendpipe.manifest import check, disown, job, read_manifest
 
 ORDER: Final = ("acquire", "calibrate", "turning-points", "fit", "diagnose")
 """The stages that run once a record, in the order of the data."""
@@ -56,14 +56,13 @@ def run_stage(
     if record is None:
         _work_or_refuse(stage, str(outputs[0]), work, outputs, refused, ())
         return
-    if refused is not None:
-        check([refused])
     home = outputs[0].parent
     given = [path for path in inputs if path is not None]
-    with job(home, stage, inputs=given, sources=sources, outputs=outputs) as running:
+    with job(home, stage, inputs=given, sources=sources, outputs=outputs) as written:
+        check([refused] if refused is not None else [])
         _work_or_refuse(stage, record, work, outputs, refused, sources)
         if refused is not None and refused.exists() and reason_of(refused, before=stage) is None:
-            running.extras.append(refused)
+            written.append(refused)
 
 
 def _work_or_refuse(
@@ -82,7 +81,11 @@ def _work_or_refuse(
         _write_stubs(outputs, earlier)
         print(f"pendpipe: {record} was refused before: {earlier}", file=sys.stderr)
         return
-    refused.unlink(missing_ok=True)
+    if refused.exists():
+        later = read_manifest(refused.parent, read_json(refused)["stage"])
+        if later.outputs:
+            disown(later)
+        refused.unlink()
     try:
         work()
     except (DamagedError, UnwritableError):
