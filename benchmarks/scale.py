@@ -1,18 +1,20 @@
 """What a campaign of many records costs: planning, CPU a record, memory, page.
 
     python -m benchmarks.scale                              10, 100, 1,000; 10,000 are planned
-    python -m benchmarks.scale --run 10 100 --plan 10000    fewer
-    python -m benchmarks.scale --profile slurm --run 10 100 --plan --diagnose
-                                                            on a Slurm of one node (tests/slurm)
+    python -m benchmarks.scale --run --diagnose             the plans of 10,000 alone
+    python -m benchmarks.scale --profile slurm              on a Slurm of one node (tests/slurm)
 
 Records are files of 2,048 readings. CPU seconds count, since others may use the machine; on a
-cluster those of the jobs are not seen, and the clock stands for them. The table is written
-into docs/scale.md.
+cluster those of the jobs are not seen, and the clock stands for them. The second plan is that after
+one more record; where a number of records is planned only, what its stages would have left is
+pretended. The table is written into docs/scale.md after each row, with the rows of earlier calls
+that are kept in ``.evidence`` for as long as the code is the same: a stopped run goes on.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import platform
 import re
@@ -22,10 +24,18 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
+
+from benchmarks import journal
+from pendpipe.configuration.load import load_campaign, read_configuration
+from pendpipe.files import write_json
+from pendpipe.manifest import job, read_manifest
+from pendpipe.stages.chunks import STAGES, chunks_of, write_chunk
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 PAGE: Final = ROOT / "docs" / "scale.md"
@@ -53,23 +63,19 @@ def one_node() -> Iterator[None]:
             subprocess.run([script, "down", place], check=True)
 
 
+GUARDS: Final = (
+    *("pendpipe.manifest", "pendpipe.commands.stage", "pendpipe.commands.campaign"),
+    *("workflow/rules/*.smk", "workflow/Snakefile"),
+)
+"""What plans and runs: other code has other costs."""
+
+
 class Cost(NamedTuple):
     """Of one call: seconds of the clock and of the processors, and the largest process."""
 
     clock_s: float
     cpu_s: float
     memory_mb: float
-
-
-class Row(NamedTuple):
-    """A line of the table."""
-
-    records: int
-    diagnosed: bool
-    first_plan: Cost
-    run: Cost | None
-    next_plan: Cost | None
-    page_mb: float | None
 
 
 def write_campaign(folder: Path, records: int, *, diagnosed: bool) -> None:
@@ -116,45 +122,67 @@ def cost(folder: Path, *words: str) -> Cost:
     return Cost(time.perf_counter() - began, float(cpu), float(memory))
 
 
-def measure(records: int, *, diagnosed: bool, to_end: bool, profile: str) -> Row:
-    """Plan, run and plan again a campaign of so many records."""
+def pretend(folder: Path) -> None:
+    """Leave what the records' stages would: results of a word, manifests, and chunks."""
+    configuration = folder / "config/config.yaml"
+    with contextlib.chdir(folder):
+        campaign = load_campaign(read_configuration(configuration), configuration)
+        chunks = chunks_of(campaign)
+        for (chunk, records), stage in product(chunks.items(), STAGES.values()):
+            for record in records:
+                home = campaign.folder / record.record
+                files = {"outputs": [home / stage.output]}
+                files["sources"] = [record.file] if record.file and not stage.inputs else []
+                with job(home, stage.name, inputs=[home / n for n in stage.inputs], **files):
+                    write_json(home / stage.output, {})
+                replace(read_manifest(home, stage.name), key="pretended").write()
+            write_chunk(campaign, stage, records, stage.path(campaign, chunk))
+    cost(folder, "--", "--touch", "--until", "fit", "diagnose")
+
+
+def measure(records: int, *, diagnosed: bool, to_end: bool, profile: str) -> list[str]:
+    """Plan a campaign of so many records, run it, plan it with one more; return a row."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         write_campaign(folder, records, diagnosed=diagnosed)
         first = cost(folder, "-n")
-        if not to_end:
-            return Row(records, diagnosed, first, None, None, None)
-        asked = SLURM if profile == "slurm" else ()
-        run = cost(folder, "--cores", "2", "--profile", profile, *asked)
+        row = [f"{records:,}", "yes" if diagnosed else "no"]
+        row += [f"{first.cpu_s:.1f}", f"{first.memory_mb:.0f}"]
+        if to_end:
+            asked = SLURM if profile == "slurm" else ()
+            run = cost(folder, "--cores", "2", "--profile", profile, *asked)
+            cpu = [f"{run.cpu_s:.0f}", f"{run.cpu_s / records:.2f}"]
+            row += cpu if profile == "default" else ["", ""]
+            row += [f"{run.clock_s:.0f}", f"{run.memory_mb:.0f}"]
+        else:
+            pretend(folder)
+            row += [""] * 4
         with (folder / "records.tsv").open("a", encoding="utf-8") as table:
             table.write("added\t0.csv\n")
-        page_mb = (folder / "results/report.html").stat().st_size / 1e6
-        return Row(records, diagnosed, first, run, cost(folder, "-n"), page_mb)
+        page = folder / "results/report.html"
+        size = f"{page.stat().st_size / 1e6:.1f}" if to_end else ""
+        return [*row, f"{cost(folder, '-n').cpu_s:.1f}", size]
 
 
-def table(rows: list[Row], profile: str) -> str:
-    """Write the rows as a table of Markdown."""
+def write_page(rows: list[list[str]], profile: str) -> None:
+    """Write the rows as a table of Markdown into the page."""
     head = (
         *("records", "diagnosis", "first plan, CPU s", "MB", "run, CPU s", "a record"),
-        *("clock, s", "largest process, MB", "plan after one more, CPU s", "page, MB"),
+        *("clock, s", "largest process, MB", "plan after one more, CPU s", "page, MB", "load"),
     )
-    lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
-    for row in rows:
-        cells = [f"{row.records:,}", "yes" if row.diagnosed else "no"]
-        cells += [f"{row.first_plan.cpu_s:.1f}", f"{row.first_plan.memory_mb:.0f}"]
-        if row.run is not None and row.next_plan is not None and row.page_mb is not None:
-            ours = profile == "default"
-            cells += [f"{row.run.cpu_s:.0f}", f"{row.run.cpu_s / row.records:.2f}"]
-            cells = cells if ours else [*cells[:-2], "", ""]
-            cells += [f"{row.run.clock_s:.0f}", f"{row.run.memory_mb:.0f}"]
-            cells += [f"{row.next_plan.cpu_s:.1f}", f"{row.page_mb:.1f}"]
-        cells += [""] * (len(head) - len(cells))
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+    lines = [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
+    machine = f"{platform.python_version()}, {os.cpu_count()} cores, {platform.machine()}"
+    lines += ["", f"{machine}, {journal.commit()}."]
+    begin, end = f"<!-- {profile}: begin -->", f"<!-- {profile}: end -->"
+    page = PAGE.read_text(encoding="utf-8")
+    before, _, rest = page.partition(begin)
+    _, _, after = rest.partition(end)
+    text = "\n".join(lines)
+    PAGE.write_text(f"{before}{begin}\n\n{text}\n\n{end}{after}", encoding="utf-8")
 
 
 def main() -> None:
-    """Measure, print, and write the table into the page."""
+    """Measure what is not kept, print, and write the table into the page."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--run", type=int, nargs="*", default=[10, 100, 1000])
     parser.add_argument("--plan", type=int, nargs="*", default=[10000])
@@ -164,23 +192,19 @@ def main() -> None:
     asked = [(n, False, True) for n in arguments.run]
     asked += [(n, True, True) for n in arguments.diagnose]
     asked += [(n, True, False) for n in arguments.plan]
-    rows = []
+    name = f"scale-{arguments.profile}"
+    kept: dict[str, list[str]] = journal.read(name, {}, GUARDS)
     with one_node() if arguments.profile == "slurm" else nullcontext():
         for records, diagnosed, to_end in asked:
-            row = measure(records, diagnosed=diagnosed, to_end=to_end, profile=arguments.profile)
-            rows.append(row)
-            print(table([row], arguments.profile).splitlines()[-1], flush=True)
-    text = table(rows, arguments.profile)
-    load = os.getloadavg()[0]
-    text += (
-        f"\n\n{platform.python_version()}, {os.cpu_count()} cores, {platform.machine()};"
-        f" load {load:.0f} while it was measured.\n"
-    )
-    begin, end = f"<!-- {arguments.profile}: begin -->", f"<!-- {arguments.profile}: end -->"
-    page = PAGE.read_text(encoding="utf-8")
-    before, _, rest = page.partition(begin)
-    _, _, after = rest.partition(end)
-    PAGE.write_text(f"{before}{begin}\n\n{text}\n{end}{after}", encoding="utf-8")
+            what = f"{records} {diagnosed} {to_end}"
+            if what not in kept:
+                row = measure(
+                    records, diagnosed=diagnosed, to_end=to_end, profile=arguments.profile
+                )
+                kept[what] = [*row, f"{os.getloadavg()[0]:.0f}"]
+                journal.keep(name, kept, GUARDS)
+            print(f"| {' | '.join(kept[what])} |", flush=True)
+            write_page(list(kept.values()), arguments.profile)
 
 
 if __name__ == "__main__":
