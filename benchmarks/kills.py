@@ -1,4 +1,4 @@
-"""Kill, starve and repeat a small campaign: the next run ends as an undisturbed one.
+"""Kill and starve a small campaign: the next run ends as an undisturbed one.
 
     python -m benchmarks.kills                       every part; goes on where it was stopped
     python -m benchmarks.kills group job --number 10 of these parts ten cases more each
@@ -234,7 +234,7 @@ class Trial:
     def __init__(self, scratch: Path) -> None:
         self.scratch = scratch
         project = Project(scratch / "undisturbed")
-        self.begun_bytes, self.begun_files = size_of(project.folder)
+        self.begun_bytes = size_of(project.folder)
         kept = journal.KEPT / f"undisturbed-{journal.code(STAGES)}"
         if kept.is_dir():
             shutil.copytree(kept, project.folder, dirs_exist_ok=True)
@@ -247,14 +247,11 @@ class Trial:
             shutil.copytree(project.folder, kept.with_suffix(".new"), dirs_exist_ok=True)
             kept.with_suffix(".new").rename(kept)
         self.project, self.sums = project, project.sums()
-        self.bytes, self.files = size_of(project.folder)
+        self.bytes = size_of(project.folder)
         self.largest = max(path.stat().st_size for path in project.results.rglob("*"))
 
-    def ended(self, project: Project, case: Case, *, repaired: bool = False) -> Case:
-        """Do what the doctor says, run again, and tell how it ended.
-
-        Where results were `repaired`, the manifests' memory of it is no difference.
-        """
+    def ended(self, project: Project, case: Case) -> Case:
+        """Do what the doctor says, run again, and tell how it ended."""
         began = time.monotonic()
         found = project.doctor()
         case["left"] = count(found)
@@ -263,8 +260,6 @@ class Trial:
         case["status"], said = project.run()
         sums = project.sums()
         differ = [n for n in sorted({*sums, *self.sums}) if sums.get(n) != self.sums.get(n)]
-        if repaired:
-            differ = [n for n in differ if record(project, n) != record(self.project, n)]
         case["after"] = count(project.doctor())
         case["differ"] = differ
         case["same"] = not differ and case["status"] == 0
@@ -280,25 +275,12 @@ class Trial:
         return case
 
 
-def record(project: Project, name: str) -> Any:
-    """A manifest without what was repaired; nothing that is like another, if it is none."""
-    path = project.results / name
-    if path.parent.name not in ("manifest", "chunks") or not path.is_file():
-        return object()
-    content = json.loads(path.read_text(encoding="utf-8"))
-    for each in (content, *content.get("records", {}).values()):
-        each.pop("repaired", None)
-        each.pop("check", None)
-    return content
-
-
 Part = Callable[[Trial, Project, random.Random], list[Case]]
 
 
-def size_of(folder: Path) -> tuple[int, int]:
-    """Bytes, in blocks of 4096, and number of the files and folders."""
-    paths = list(folder.rglob("*"))
-    return sum(-(-path.lstat().st_size // 4096) * 4096 for path in paths), len(paths)
+def size_of(folder: Path) -> int:
+    """Bytes, in blocks of 4096, of the files and folders."""
+    return sum(-(-path.lstat().st_size // 4096) * 4096 for path in folder.rglob("*"))
 
 
 Kill = Callable[[Trial, Project, random.Random, float], Case]
@@ -339,7 +321,7 @@ def wrong(trial: Trial, project: Project) -> list[str]:
         for home in homes
         for entry in manifests(home)
         if not entry.damages(hash_all=True)
-        for name in (*entry.outputs, *entry.extras)
+        for name in entry.outputs
     ]
     sums = project.sums()
     return [name for name in sound if name in sums and sums[name] != trial.sums.get(name)]
@@ -387,31 +369,19 @@ def mount(*words: str | Path) -> bool:
     return not subprocess.run(["mount", *map(str, words)], capture_output=True).returncode
 
 
-def starved(trial: Trial, draw: random.Random, what: str) -> list[Case]:
+def full(trial: Trial, _project: Project, draw: random.Random) -> list[Case]:
     """A run on a disk that gets full, in a project on a file system of its own."""
     share = draw.uniform(0.05, 0.95)
-    files = trial.begun_files + 8 + round(share * (trial.files - trial.begun_files))
-    blocks = trial.begun_bytes + 65536 + round(share * (trial.bytes - trial.begun_bytes))
-    room = f"nr_inodes={files}" if what == "inodes" else f"size={blocks}"
-    with small_disk(trial.scratch / "small", room) as mounted:
+    room = trial.begun_bytes + 65536 + round(share * (trial.bytes - trial.begun_bytes))
+    with small_disk(trial.scratch / "small", f"size={room}") as mounted:
         if not mounted:
             return [{}]
         project = Project(trial.scratch / "small")
         first, said = project.run()
         named = said_why(project, said)
-        mount("-o", "remount,size=1g,nr_inodes=100k", project.folder)
+        mount("-o", "remount,size=1g", project.folder)
         case = {"room": room, "disturbed": first != 0, "named": named}
         return [trial.ended(project, case)]
-
-
-def full(trial: Trial, _project: Project, draw: random.Random) -> list[Case]:
-    """A disk without bytes."""
-    return starved(trial, draw, "bytes")
-
-
-def inodes(trial: Trial, _project: Project, draw: random.Random) -> list[Case]:
-    """A disk without inodes."""
-    return starved(trial, draw, "inodes")
 
 
 def limit(trial: Trial, project: Project, draw: random.Random) -> list[Case]:
@@ -428,44 +398,9 @@ def said_why(project: Project, said: str) -> str:
         path.read_text(encoding="utf-8", errors="replace")
         for path in project.results.glob("**/logs/*.log")
     )
-    why = re.compile(r".*(?:No space left|too large|[Rr]ead-only|Permission denied).*")
+    why = re.compile(r".*(?:No space left|too large).*")
     found = why.search(logs) or why.search(said)
     return found[0].strip()[:200].replace(str(project.folder), "") if found else ""
-
-
-def read_only(trial: Trial, _project: Project, draw: random.Random) -> list[Case]:
-    """Half-made results that may not be written, or the whole project."""
-    whole = draw.random() < 0.5
-    with small_disk(trial.scratch / "small", "size=1g") as mounted:
-        if not mounted:
-            return [{}]
-        project = Project(trial.scratch / "small")
-        place = project.folder
-        if not whole:
-            place = project.results
-            place.mkdir()
-            mount("--bind", place, place)
-        try:
-            process = project.start()
-            alive = project.wait(process, draw.uniform(0.3, 0.8), len(trial.sums))
-            kill_group(process)
-            project.run("--unlock")
-            before = project.sums()
-            bind = "" if whole else "bind,"
-            mount("-o", f"remount,{bind}ro", place)
-            first, said = project.run()
-            touched = project.sums() != before
-            mount("-o", f"remount,{bind}rw", place)
-            case = {"place": "project" if whole else "results", "first": first}
-            case |= {
-                "disturbed": alive and first != 0,
-                "touched": touched,
-                "named": said_why(project, said),
-            }
-            return [trial.ended(project, case)]
-        finally:
-            if not whole:
-                subprocess.run(["umount", str(place)], check=True)
 
 
 def two(trial: Trial, project: Project, draw: random.Random) -> list[Case]:
@@ -479,65 +414,12 @@ def two(trial: Trial, project: Project, draw: random.Random) -> list[Case]:
     return [trial.ended(project, case | {"named": named[0] if named else ""})]
 
 
-def order(trial: Trial, _project: Project, draw: random.Random) -> list[Case]:
-    """Other cores, another order, folder, time zone, language and seed of hashes."""
-    project = Project(trial.scratch / f"another folder {draw.randrange(10**6)}")
-    cores = draw.choice((1, 2))
-    environment = {
-        "PYTHONHASHSEED": str(draw.randrange(1, 10**6)),
-        "TZ": draw.choice(("Asia/Kathmandu", "America/New_York", "UTC")),
-        "LC_ALL": draw.choice(("C", "C.UTF-8")),
-    }
-    names = [f"results/{record}/fit.json" for record in ("high", "air", "file")]
-    status = [project.run(name, cores=cores, **environment)[0] for name in draw.sample(names, k=2)]
-    case = {"disturbed": not any(status), "cores": cores, "environment": environment}
-    ended = trial.ended(project, case)
-    shutil.rmtree(project.folder)
-    return [ended]
-
-
-def advice(trial: Trial, project: Project, draw: random.Random) -> list[Case]:
-    """Results broken in every way at once: what the doctor says is done to the letter."""
-    project.run()
-    process = project.start("--forceall")
-    project.wait(process, 0.05, len(trial.sums))
-    time.sleep(draw.uniform(0.0, 4.0))
-    kill_group(process)
-    names = sorted(project.sums())
-    altered, torn, missing = draw.sample([n for n in names if "manifest/" not in n], 3)
-    manifest = draw.choice([n for n in names if "manifest/" in n])
-    changed = [project.results / name for name in (altered, torn, manifest)]
-    for path, content in zip(changed, (b"#", b"", b"{"), strict=True):
-        status = path.stat()
-        path.write_bytes(content + path.read_bytes()[len(content) : draw.randrange(2, 200)])
-        os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
-    (project.results / missing).unlink()
-    for name in ("high/.fit.json.ab12cd34", "high/notes.csv"):
-        (project.results / name).parent.mkdir(exist_ok=True)
-        (project.results / name).write_text("x")
-        changed.append(project.results / name)
-    found = project.doctor()
-    said = {project.folder / finding["path"] for finding in found}
-    for finding in found:
-        if "delete it" in finding["safe"]:
-            (project.folder / finding["path"]).unlink()
-    case = trial.ended(project, {"disturbed": True, "kinds": count(found)}, repaired=True)
-    unnamed = [path.name for path in changed if path not in said]
-    case["named"] = "" if unnamed else "all"
-    case["unnamed"] = unnamed
-    return [case]
-
-
 PARTS: Final[dict[str, tuple[str, Part, int]]] = {
     "group": ("kill -9 of the group", chain(group), 100),
     "job": ("kill -9 of a job", chain(job), 50),
-    "full": ("disk full (bytes)", full, 10),
-    "inodes": ("disk full (inodes)", inodes, 10),
+    "full": ("disk full", full, 10),
     "limit": ("limit on a file's size", limit, 10),
-    "read-only": ("read-only folder", read_only, 4),
     "two": ("two at once", two, 10),
-    "order": ("cores, order, folder", order, 10),
-    "advice": ("broken in every way, the doctor obeyed", advice, 5),
 }
 
 
