@@ -282,10 +282,10 @@ def job(
         with writing(inputs=(*inputs, *sources)):
             yield written
         return
-    history = set_aside_damaged(old := read_manifest(home, stage))
+    old = set_aside_damaged(read_manifest(home, stage))
     checked = check(inputs)
     # Until the stage has ended its old results are nobody's.
-    begun = disown(replace(old, repaired=history))
+    begun = disown(old)
     with writing(inputs=(*inputs, *sources)):
         yield written
     replace(
@@ -296,14 +296,15 @@ def job(
     ).write()
 
 
-def set_aside_damaged(old: Manifest) -> str:
-    """Set the damaged results of a stage aside before it runs; return its `Manifest.repaired`."""
+def set_aside_damaged(old: Manifest) -> Manifest:
+    """Set the damaged results of a stage aside before it runs; return the manifest that says so."""
     damages = old.damages()
     for damage in damages:
         if damage.path.exists():
             line = f"{damage.path}: {damage.problem}; {damage.set_aside()}"
             print(f"pendpipe: {line}", file=sys.stderr)
-    return str(handed_on()["repaired"].get(str(old.path), _history(old, damages)))
+    repaired = handed_on()["repaired"].get(str(old.path), _history(old, damages))
+    return replace(old, repaired=repaired)
 
 
 def disown(old: Manifest) -> Manifest:

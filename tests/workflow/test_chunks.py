@@ -91,6 +91,12 @@ def written(paths: dict[str, Path]) -> dict[str, int]:
     return {name: path.stat().st_ino for name, path in paths.items() if path.exists()}
 
 
+def changed(before: dict[str, int]) -> list[str]:
+    """The records whose file was replaced: a new one is there before the old one is gone."""
+    after = written(fits())
+    return [name for name in RECORDS if after[name] != before[name]]
+
+
 def test_what_is_done_is_not_done_again(campaign: Campaign) -> None:
     run(*ORDER)
     before = written(fits())
@@ -105,8 +111,7 @@ def test_a_changed_input_is_done_anew_and_no_other(campaign: Campaign) -> None:
     before = written(fits())
     write_decay(Path("two.csv"), 17)
     run(*ORDER)
-    after = written(fits())
-    assert [name for name in RECORDS if after[name] != before[name]] == ["two"]
+    assert changed(before) == ["two"]
 
 
 def test_a_changed_setting_is_done_anew(campaign: Campaign) -> None:
@@ -115,7 +120,7 @@ def test_a_changed_setting_is_done_anew(campaign: Campaign) -> None:
     with Path("config.yaml").open("a", encoding="utf-8") as stream:
         stream.write("fit: {method: waveform}\n")
     run("fit")
-    assert not set(written(fits()).values()) & set(before.values())
+    assert changed(before) == list(RECORDS)
 
 
 def test_a_forced_stage_is_done_anew(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,7 +129,7 @@ def test_a_forced_stage_is_done_anew(campaign: Campaign, monkeypatch: pytest.Mon
     monkeypatch.setenv(manifest.RUN, "")
     manifest.hand_on(anew=["fit"], repaired={})
     run("fit")
-    assert not set(written(fits()).values()) & set(before.values())
+    assert changed(before) == list(RECORDS)
 
 
 def test_one_records_fault_is_its_own(
@@ -211,8 +216,23 @@ def test_a_plan_notices_what_a_job_then_makes_again(
     assert sha256(fits()["two"]) == before
     after = plan(campaign, fit, "all", records).found
     assert (after.damages, after.repaired) == ((), found.repaired), "and runs it once"
-    now = written(fits())
-    assert [record for record in RECORDS if now[record] != others[record]] == ["two"]
+    assert changed(others) == ["two"]
+
+
+def test_a_torn_refusal_is_made_again(campaign: Campaign) -> None:
+    refused, stage = Path("results/two/refused.json"), STAGES["turning-points"]
+    Path("two.csv").write_text(
+        "time_s,angle_rad\n" + "".join(f"{n},1\n" for n in range(400)), "utf-8"
+    )
+    run(*ORDER)
+    before = refused.read_bytes()
+    refused.write_bytes(before[:20])
+    found = plan(campaign, stage, "all", chunks_of(campaign)["all"]).found
+    run(*ORDER)
+    assert refused.read_bytes() == before
+    after = plan(campaign, stage, "all", chunks_of(campaign)["all"]).found
+    assert (after.damages, after.repaired) == ((), found.repaired)
+    assert found.repaired.startswith("refused.json:")
 
 
 def test_a_refusal_that_is_over_is_no_damage(campaign: Campaign) -> None:

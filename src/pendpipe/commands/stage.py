@@ -16,7 +16,7 @@ from pendpipe.arguments import Arguments, load, tell
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.errors import refuse_if
 from pendpipe.files import make_folder
-from pendpipe.manifest import handed_on, read_manifest
+from pendpipe.manifest import disown, handed_on, read_manifest, set_aside_damaged
 from pendpipe.options import Flags, flags
 from pendpipe.stages.chunks import (
     STAGES,
@@ -56,6 +56,8 @@ def _of_record(campaign: Campaign, stage: Stage, record: Record, configuration: 
     done = read_manifest(home, stage.name)
     if done.key == wanted and stage.name not in handed_on()["anew"] and not done.damages():
         return 0
+    # Before the command looks at its outputs: a torn file is nobody's.
+    disown(set_aside_damaged(done))
     log = home / "logs" / f"{stage.name.replace('-', '_')}.log"
     status = _logged(log, call(campaign, stage, record, configuration))
     lines = [line for line in log.read_text(encoding="utf-8").splitlines() if line.strip()]

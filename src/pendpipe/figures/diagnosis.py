@@ -10,6 +10,7 @@ from operator import methodcaller
 from pathlib import Path
 from typing import Any, Final
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.colors import AsinhNorm, LinearSegmentedColormap
 from matplotlib.figure import Figure
@@ -181,9 +182,7 @@ _IN_A_CELL: Final = 4
 """Readings, usually: fewer would leave holes."""
 _CHARACTER: Final = 0.0165
 """Width of a figure in a tick label, over the drawing's."""
-_COLOURS = LinearSegmentedColormap.from_list(
-    "residual", [BLUE, "#FFFFFF", VERMILION]
-).with_extremes(bad="#E3E6EA")
+_COLOURS: Final = LinearSegmentedColormap.from_list("residual", [BLUE, "white", VERMILION])
 
 
 @styled
@@ -199,7 +198,7 @@ def draw_residual_map(content: Shown) -> Figure:
     time = content.data.time_s
     look = {
         "norm": AsinhNorm(linear_width=2.0, vmin=-largest, vmax=largest),
-        "cmap": _COLOURS,
+        "cmap": _COLOURS.with_extremes(bad=mpl.rcParams["grid.color"]),
         "aspect": "auto",
         "origin": "lower",
         "interpolation": "nearest",

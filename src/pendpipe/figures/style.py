@@ -23,53 +23,16 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from pendpipe.arrays import FloatArray
 from pendpipe.files import replaced
 
-BLUE, VERMILION, GREEN = "#0072B2", "#C8321A", "#007A5A"
-INK, GREY, PALE = "#1A1A1A", "#5F6670", "#9CC4E0"
-WIDTH_IN: Final = 5.2
+SHEET: Final = Path(__file__).with_name("pendpipe.mplstyle")
+"""Sizes, letters, lines and colours of all figures."""
+_LOOK: Final = mpl.rc_params_from_file(SHEET, use_default_template=False)
+styled = mpl.rc_context(_LOOK)
+"""Gives a drawing function the common look, and leaves matplotlib's settings as they were."""
+WIDTH_IN: Final = float(_LOOK["figure.figsize"][0])
 """One size for all: letters stay legible at a column's width and on a phone."""
-
+BLUE, GREEN, INK, GREY, PALE, VERMILION = _LOOK["axes.prop_cycle"].by_key()["color"][:6]
 _FONTS: Final = ["DejaVu Sans", "Verdana", "Arial", "sans-serif"]
-_LOOK: Final[dict[Any, Any]] = {
-    "font.family": ["DejaVu Sans"],
-    "font.size": 9.0,
-    "axes.labelsize": 9.0,
-    "axes.titlesize": 9.0,
-    "axes.titlelocation": "left",
-    "axes.labelcolor": INK,
-    "axes.edgecolor": GREY,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-4, 6),
-    "axes.unicode_minus": True,
-    "grid.color": "#E3E6EA",
-    "grid.linewidth": 0.6,
-    "xtick.labelsize": 8.5,
-    "ytick.labelsize": 8.5,
-    "xtick.color": GREY,
-    "ytick.color": GREY,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "text.color": INK,
-    "legend.fontsize": 8.5,
-    "legend.frameon": False,
-    "legend.handlelength": 2.2,
-    "legend.columnspacing": 1.4,
-    "legend.borderaxespad": 0.2,
-    "lines.linewidth": 1.4,
-    "lines.markersize": 5.0,
-    "errorbar.capsize": 2.0,
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
-    "figure.constrained_layout.use": False,
-    "mathtext.fontset": "dejavusans",
-    # Letters stay letters: they can be searched, selected and read aloud.
-    "svg.fonttype": "none",
-    "path.simplify": True,
-}
+"""Of a saved figure: what reads it may not have the first."""
 
 
 class Branch(NamedTuple):
@@ -90,9 +53,6 @@ def branch(name: str) -> Branch:
     """The style of a branch; one that is not in the paper is drawn in grey."""
     return BRANCHES.get(name, Branch(name or "no branch", GREY, "^"))
 
-
-styled = mpl.rc_context(_LOOK)
-"""Gives a drawing function the common look, and leaves matplotlib's settings as they were."""
 
 Mark = Callable[[Axes], Any]
 """One thing that a panel shows: it draws itself on axes."""
