@@ -88,11 +88,11 @@ def fits() -> dict[str, Path]:
 
 
 def written(paths: dict[str, Path]) -> dict[str, int]:
-    return {name: path.stat().st_ino for name, path in paths.items() if path.exists()}
+    return {name: path.stat().st_mtime_ns for name, path in paths.items() if path.exists()}
 
 
 def changed(before: dict[str, int]) -> list[str]:
-    """The records whose file was replaced: a new one is there before the old one is gone."""
+    """The records whose file was written again."""
     after = written(fits())
     return [name for name in RECORDS if after[name] != before[name]]
 
