@@ -24,7 +24,6 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
-from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -34,7 +33,7 @@ import numpy as np
 from benchmarks import journal
 from pendpipe.configuration.load import load_campaign, read_configuration
 from pendpipe.files import write_json
-from pendpipe.manifest import job, read_manifest
+from pendpipe.manifest import Manifest, sum_of
 from pendpipe.stages.chunks import STAGES, chunks_of, write_chunk
 
 ROOT: Final = Path(__file__).resolve().parents[1]
@@ -131,11 +130,11 @@ def pretend(folder: Path) -> None:
         for (chunk, records), stage in product(chunks.items(), STAGES.values()):
             for record in records:
                 home = campaign.folder / record.record
-                files = {"outputs": [home / stage.output]}
-                files["sources"] = [record.file] if record.file and not stage.inputs else []
-                with job(home, stage.name, inputs=[home / n for n in stage.inputs], **files):
-                    write_json(home / stage.output, {})
-                replace(read_manifest(home, stage.name), key="pretended").write()
+                write_json(home / stage.output, {})
+                made = {stage.output: sum_of(home / stage.output)}
+                read = [record.file] if record.file and not stage.inputs else []
+                sources = {path.name: sum_of(path) for path in read}
+                Manifest(home, stage.name, made, {}, sources, key="pretended").write()
             write_chunk(campaign, stage, records, stage.path(campaign, chunk))
     cost(folder, "--", "--touch", "--until", "fit", "diagnose")
 
