@@ -37,7 +37,6 @@ RIG = "profcarter-adip/adip_pend_data.mat"
 STRING = "jiarui-phy180/AAAtAmp3.txt"
 SHIP = "kvlcc2-roll-decay/model_test_21337.csv"
 SPRING = "filo0509-spring/molla_durissima_discopieno_14.91945_0.2016_1.csv"
-VIDEO = "tylertian-phy180/lab1_data.txt"
 ROD, GAP = "yfysiks-encoder/data2_14.csv", "yfysiks-encoder/data2_12.csv"
 
 
@@ -130,26 +129,6 @@ def test_bearing_and_air_share_the_loss_of_a_rig() -> None:
     # Known: quadratic drag and Coulomb friction in near equal measure, at 1.2 rad and below.
     drag, friction = fit.value[A] * 1.2, fit.value[C] / 1.2
     assert 0.2 < friction / drag < 5.0
-
-
-@pytest.mark.xfail(strict=True, reason="beside sin x presumed, presliding friction is likelier")
-def test_the_sine_precedes_a_clock_that_fits_slightly_better() -> None:
-    """At 0.7 rad and without Eq. 3's quadratic drag a drift of the clock gains more."""
-    named = diagnose_recording(whole(VIDEO), baseline="viscous").effects
-    assert named[0].identifier == "circular-error"
-    assert named[0].probability > 0.5
-    odds = {named[1].identifier: named[1].probability, **dict(named[1].indistinguishable)}
-    assert max(odds, key=lambda name: odds[name]) == "quadratic-drag"
-
-
-@pytest.mark.xfail(strict=True, reason="from sin x presumed, the search stops at one of the two")
-@pytest.mark.parametrize(("video", "kappa"), [("lab1_data", -9.7e-3), ("trial1_rawdata", -3.0e-3)])
-def test_videos_have_a_rolling_shutter_and_an_oblique_camera(video: str, kappa: float) -> None:
-    """As worked out by hand with another fitter."""
-    outcome = diagnose_recording(whole(f"tylertian-phy180/{video}.txt"))
-    found = {effect.identifier: effect for effect in outcome.effects}
-    assert {"circular-error", "camera-geometry", "rolling-shutter"} <= set(found)
-    assert found["rolling-shutter"].parameters["kappa"].value == pytest.approx(kappa, rel=0.15)
 
 
 def test_a_gap_of_the_time_stamps_is_noted_with_its_time_and_length() -> None:

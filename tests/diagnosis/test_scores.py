@@ -46,11 +46,6 @@ def white_residuals(draws: int) -> tuple[Bank, FloatArray]:
     return bank, drawn - bank.basis @ (bank.basis.T @ drawn)
 
 
-def test_the_two_engines_agree_far_below_the_noise() -> None:
-    fit, _, _, _ = perfect()
-    assert np.abs(other_engine(TRUTH) - fit.at.reading).max() < 1e-7
-
-
 def test_columns_are_of_unit_length_and_beside_the_models_tangent_space() -> None:
     """To single precision, in which they are kept."""
     fit, _, _, bank = perfect()

@@ -55,6 +55,8 @@ VIEWS = {
     "slower": View(slower=8.0),
     "later": View(later_s=1024.0),
     "mirrored": View(larger=-1.0),
+    "faster and mirrored": View(slower=0.125, larger=-1.0),
+    "slower and later": View(slower=8.0, later_s=1024.0),
 }
 METRES = {
     name: View(quantity="displacement_m", larger=larger, slower=slower)
@@ -154,7 +156,7 @@ def diagnoses_agree(name: str, one: View, other: View) -> None:
         assert second.held_out.rms_after == pytest.approx(rms, rel=1e-3)
 
 
-@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize("view", ["faster", "slower", "later", "mirrored"])
 @pytest.mark.parametrize("name", [*NAMES, "a magnet"])
 def test_a_fit_of_angles_is_the_same_fit(name: str, view: str) -> None:
     fits_agree(name, View(), VIEWS[view])
@@ -166,13 +168,21 @@ def test_a_fit_of_displacements_is_the_same_fit(name: str, view: str) -> None:
     fits_agree(name, METRES["as it is"], METRES[view])
 
 
-@pytest.mark.parametrize("view", VIEWS)
-@pytest.mark.parametrize("name", [*NAMES, "a magnet"])
+@pytest.mark.parametrize(
+    ("name", "view"),
+    [
+        ("circular-error", "slower and later"),
+        ("equilibrium-step", "slower and later"),
+        ("equilibrium-step", "faster and mirrored"),
+        ("frequency-drift", "faster and mirrored"),
+        ("tone-pickup", "later"),
+        ("a magnet", "faster and mirrored"),
+    ],
+)
 def test_a_diagnosis_of_angles_is_the_same_diagnosis(name: str, view: str) -> None:
     diagnoses_agree(name, View(), VIEWS[view])
 
 
-@pytest.mark.parametrize("view", ["small", "slow"])
 @pytest.mark.parametrize("name", ["equilibrium-step", "frequency-drift"])
-def test_a_diagnosis_of_displacements_is_the_same_diagnosis(name: str, view: str) -> None:
-    diagnoses_agree(name, METRES["as it is"], METRES[view])
+def test_a_diagnosis_of_displacements_is_the_same_diagnosis(name: str) -> None:
+    diagnoses_agree(name, METRES["as it is"], METRES["slow"])

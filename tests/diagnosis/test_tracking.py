@@ -30,7 +30,7 @@ def seen(folder: Path, along: FloatArray, across: FloatArray) -> Recording:
 
 
 def red(random: np.random.Generator) -> FloatArray:
-    drawn = np.convolve(random.standard_normal(len(TIME) + 99), np.exp(-np.arange(100) / 20))
+    drawn = np.convolve(random.standard_normal(len(TIME) + 99), np.exp(-np.arange(30) / 20))
     return np.asarray(drawn[99 : 99 + len(TIME)])
 
 
@@ -52,7 +52,7 @@ def test_errors_of_their_own_in_both_coordinates_are_no_wander(tmp_path: Path) -
     """Then the test's p-value is uniform, whatever the colour of the noise."""
     random = np.random.default_rng(5)
     values = []
-    for _ in range(100):
+    for _ in range(30):
         # Trackers interpolate: neighbouring rows share what they err by.
         white = random.standard_normal((2, len(TIME) + 4))
         own = 2e-4 * np.array([np.convolve(each, np.ones(5), "valid") for each in white])

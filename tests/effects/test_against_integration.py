@@ -131,33 +131,42 @@ def test_motion_is_that_of_the_law(identifier: str) -> None:
     assert error < (1e-3 if effect > 1e-3 else 1e-2) * effect
 
 
-@pytest.mark.parametrize("gap", [1e-4, 2e-3, 2e-2])
-def test_play_is_right_to_a_ten_thousandth(gap: float) -> None:
-    """Its corners lie between the nodes of the clock, and enter by their harmonics."""
-    law = with_extra(lambda t, x, v, s, turn: OMEGA**2 * min(max(x, -gap / 2), gap / 2))
-    expected = integrate(law, START, 0.0, TIME)
-    found = evaluated("backlash", (gap,), BASE, TIME).sampled.angle
+@pytest.mark.parametrize(
+    ("identifier", "values", "extra", "within"),
+    [
+        # The corners of play lie between the nodes of the clock, and enter by their harmonics.
+        *(
+            (
+                "backlash",
+                (gap,),
+                lambda t, x, v, s, turn, half=gap / 2: OMEGA**2 * min(max(x, -half), half),
+                1e-4,
+            )
+            for gap in (1e-4, 2e-2)
+        ),
+        # Near twice the frequency, where it beats.
+        (
+            "parametric-drive",
+            (1e-3, 0.0, 1.85),
+            lambda t, x, v, s, turn: -1e-3 * OMEGA**2 * x * math.cos(3.7 * math.pi * t),
+            1e-4,
+        ),
+        # Its curvature jumps at x = 0, between the nodes.
+        (
+            "amplitude-linear-stiffness",
+            (0.1,),
+            lambda t, x, v, s, turn: -0.1 * OMEGA**2 * x * abs(x),
+            1e-3,
+        ),
+    ],
+)
+def test_the_change_of_the_motion_is_that_of_the_law(
+    identifier: str, values: tuple[float, ...], extra: Any, within: float
+) -> None:
+    expected = integrate(with_extra(extra), START, 0.0, TIME)
+    found = evaluated(identifier, values, BASE, TIME).sampled.angle
     effect = np.max(np.abs(expected - plain(BASE, TIME)))
-    assert np.max(np.abs(found - expected)) < 1e-4 * effect
-
-
-def test_a_parametric_drive_is_right_to_a_ten_thousandth() -> None:
-    """Near twice the frequency, where it beats."""
-    h, pace = 1e-3, 2.0 * math.pi * 1.85
-    law = with_extra(lambda t, x, v, s, turn: -h * OMEGA**2 * x * math.cos(pace * t))
-    expected = integrate(law, START, 0.0, TIME)
-    found = evaluated("parametric-drive", (h, 0.0, 1.85), BASE, TIME).sampled.angle
-    effect = np.max(np.abs(expected - plain(BASE, TIME)))
-    assert np.max(np.abs(found - expected)) < 1e-4 * effect
-
-
-def test_x_times_its_size_is_right_to_a_thousandth() -> None:
-    """Its curvature jumps at x = 0, between the nodes of the clock."""
-    law = with_extra(lambda t, x, v, s, turn: -0.1 * OMEGA**2 * x * abs(x))
-    expected = integrate(law, START, 0.0, TIME)
-    found = evaluated("amplitude-linear-stiffness", (0.1,), BASE, TIME).sampled.angle
-    effect = np.max(np.abs(expected - plain(BASE, TIME)))
-    assert np.max(np.abs(found - expected)) < 1e-3 * effect
+    assert np.max(np.abs(found - expected)) < within * effect
 
 
 def test_presliding_friction_is_dahls() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -52,40 +53,36 @@ def test_the_equilibrium_creeps(exponential: float) -> None:
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.7, 1.6, 2.9, 4.4])
-def test_a_jump_of_the_equilibrium_changes_amplitude_and_phase(phase: float) -> None:
-    """Changes are dy = -J cos(psi), dpsi = J sin(psi)/y; the level rises by J, without a jump."""
-    jump, instant = 5e-4, 27.0 * CYCLE + phase / OMEGA
-    base = baseline()
-    found = evaluated("equilibrium-step", (jump, instant), base, TIME)
-    before = lock_in(TIME, found.reading, OMEGA, instant - 8.0 * CYCLE, instant - 0.05)
-    after = lock_in(TIME, found.reading, OMEGA, instant + 0.05, instant + 8.0 * CYCLE)
-    assert after.level - before.level == pytest.approx(jump, rel=0.01)
-    assert after.amplitude - before.amplitude == pytest.approx(
-        -jump * math.cos(phase), abs=0.02 * jump
-    )
-    advance = after.phase - before.phase - OMEGA * (after.time_s - before.time_s)
-    advance = math.remainder(advance, 2.0 * math.pi)
-    assert advance == pytest.approx(jump * math.sin(phase) / 0.15, abs=0.02 * jump / 0.15)
-    fine = np.linspace(instant - 1e-3, instant + 1e-3, 2001)
-    across = reading("equilibrium-step", (jump, instant), base, fine)
-    assert np.max(np.abs(np.diff(across))) < 2e-6
-
-
-@pytest.mark.parametrize("phase", [0.0, 0.7, 1.6, 2.9, 4.4])
-def test_a_knock_changes_amplitude_and_phase(phase: float) -> None:
-    """Changes are dy = -dv sin(psi)/w, dpsi = -dv cos(psi)/(w y); the level stays."""
-    dv, instant = 2e-3, 27.0 * CYCLE + phase / OMEGA
-    found = reading("impulse", (dv, instant), baseline(), TIME)
+@pytest.mark.parametrize(
+    ("identifier", "size", "unit", "rise", "change"),
+    [
+        # The level rises by J; dy = -J cos(psi), y dpsi = J sin(psi).
+        ("equilibrium-step", 5e-4, 5e-4, 5e-4, lambda psi: (-math.cos(psi), math.sin(psi))),
+        # The level stays; dy = -dv sin(psi)/w, y dpsi = -dv cos(psi)/w.
+        ("impulse", 2e-3, 2e-3 / OMEGA, 0.0, lambda psi: (-math.sin(psi), -math.cos(psi))),
+    ],
+)
+def test_a_jump_or_a_knock_changes_amplitude_and_phase(
+    identifier: str,
+    size: float,
+    unit: float,
+    rise: float,
+    change: Callable[[float], tuple[float, float]],
+    phase: float,
+) -> None:
+    instant, base = 27.0 * CYCLE + phase / OMEGA, baseline()
+    found = reading(identifier, (size, instant), base, TIME)
     before = lock_in(TIME, found, OMEGA, instant - 8.0 * CYCLE, instant - 0.05)
     after = lock_in(TIME, found, OMEGA, instant + 0.05, instant + 8.0 * CYCLE)
-    size = dv / OMEGA
-    assert after.level == pytest.approx(before.level, abs=1e-6)
-    assert after.amplitude - before.amplitude == pytest.approx(
-        -size * math.sin(phase), abs=0.02 * size
-    )
     advance = after.phase - before.phase - OMEGA * (after.time_s - before.time_s)
-    advance = math.remainder(advance, 2.0 * math.pi)
-    assert advance == pytest.approx(-size * math.cos(phase) / 0.15, abs=0.02 * size / 0.15)
+    ahead = 0.15 * math.remainder(advance, 2.0 * math.pi)
+    assert after.level - before.level == pytest.approx(rise, rel=0.01, abs=1e-6)
+    assert (after.amplitude - before.amplitude, ahead) == pytest.approx(
+        tuple(unit * each for each in change(phase)), abs=0.02 * unit
+    )
+    fine = np.linspace(instant - 1e-3, instant + 1e-3, 2001)
+    across = reading(identifier, (size, instant), base, fine)
+    assert np.max(np.abs(np.diff(across))) < 2e-6
 
 
 def test_an_amplitude_jumps_and_nothing_else() -> None:

@@ -11,7 +11,7 @@ from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.effect import STRAIGHT_S
 
 from .lock_in import lock_in
-from .pendulums import OMEGA, baseline, evaluated, plain, reading, times
+from .pendulums import OMEGA, Floats, baseline, evaluated, plain, reading, times
 
 TIME = times(40.0, 0.02)
 CYCLE = 2.0 * math.pi / OMEGA
@@ -76,22 +76,19 @@ def test_play_in_the_sensor_is_the_play_operator() -> None:
     assert lines.lines[3].imag == pytest.approx(-2.0 * width / (3.0 * math.pi), rel=0.1)
 
 
-def test_drifts_of_offset_and_gain() -> None:
-    """They relax; without a time constant, they are straight."""
-    tau = 12.0
-    relaxed = tau * (1.0 - np.exp(-TIME / tau))
-    np.testing.assert_allclose(
-        reading("offset-drift", (1e-4, tau), BASE, TIME), OWN + 1e-4 * relaxed, 0.0, 1e-12
+@pytest.mark.parametrize(
+    ("tau", "gained", "within"),
+    [(12.0, 12.0 * (1.0 - np.exp(-TIME / 12.0)), 1e-12), (STRAIGHT_S, TIME, 1e-7)],
+)
+def test_drifts_of_offset_and_gain_relax_or_are_straight(
+    tau: float, gained: Floats, within: float
+) -> None:
+    offset, gain = (
+        reading(f"{name}-drift", (rate, tau), BASE, TIME)
+        for name, rate in (("offset", 1e-4), ("gain", 1e-3))
     )
-    np.testing.assert_allclose(
-        reading("gain-drift", (1e-3, tau), BASE, TIME), OWN * (1.0 + 1e-3 * relaxed), 0.0, 1e-12
-    )
-    np.testing.assert_allclose(
-        reading("offset-drift", (1e-4, STRAIGHT_S), BASE, TIME), OWN + 1e-4 * TIME, 0.0, 1e-7
-    )
-    np.testing.assert_allclose(
-        reading("gain-drift", (1e-3, STRAIGHT_S), BASE, TIME), OWN * (1.0 + 1e-3 * TIME), 0.0, 1e-7
-    )
+    np.testing.assert_allclose(offset, OWN + 1e-4 * gained, 0.0, within)
+    np.testing.assert_allclose(gain, OWN * (1.0 + 1e-3 * gained), 0.0, within)
 
 
 @pytest.mark.parametrize(
