@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple, get_args
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import Restoring
 
-TORQUES: Final[tuple[Restoring, ...]] = get_args(Restoring)
+TORQUES: Final[tuple[Restoring, Restoring]] = ("linear", "sine")
 TOP: Final = 3.13
 """Amplitude in rad beyond which a half swing says nothing of the frequency."""
 
@@ -134,19 +134,31 @@ def clear(points: TurningPoints, least: float = 0.0) -> TurningPoints:
     return points.chosen(seen & (amplitude > least * np.max(amplitude, where=seen, initial=0.0)))
 
 
-def told_apart(points: TurningPoints, readings: int, noise: float) -> float:
-    """Chi^2 by which x would miss a pendulum of sin x: what no frequency makes up for."""
+class Apart(NamedTuple):
+    """What turning points of sin x say of a motion by x that is as near as can be."""
+
+    chi2: float
+    """By which x would miss: what no frequency makes up for."""
+    pace: float
+    """Phase of sin x in a half cycle of x."""
+    late: float
+    """Phase by which x turns later at the first of the clear ones."""
+
+
+def told_apart(points: TurningPoints, readings: int, noise: float) -> Apart:
+    """How far a pendulum of sin x is from any motion by x."""
     part = clear(points)
     if len(part) < 3:
-        return 0.0
-    amplitude = part.amplitude_rad
-    swings = (swing_phase(amplitude, "sine") - math.pi) * np.diff(part.half_cycle)
+        return Apart(0.0, math.pi, 0.0)
+    amplitude, number = part.amplitude_rad, part.half_cycle - part.half_cycle[0]
+    swings = (swing_phase(amplitude, "sine") - math.pi) * np.diff(number)
     late = np.concatenate([[0.0], np.cumsum(swings)])
-    weight = amplitude[:, None]
-    line = np.stack([np.ones_like(late), part.half_cycle], axis=1)
-    left = amplitude * late - weight * line @ np.linalg.lstsq(weight * line, amplitude * late)[0]
+    line = amplitude[:, None] * np.stack([np.ones_like(late), number], axis=1)
+    first, each = np.linalg.lstsq(line, amplitude * late)[0]
+    left = amplitude * (late - first - each * number)
     in_half_cycle = readings / max(float(np.ptp(points.half_cycle)), 1.0)
-    return 0.5 * in_half_cycle * float(left @ left) / noise**2
+    chi2 = 0.5 * in_half_cycle * float(left @ left) / noise**2
+    return Apart(chi2, math.pi + float(each), float(first))
 
 
 def restoring_of(

@@ -11,25 +11,24 @@ import numpy as np
 from pendpipe.analysis.fit.by_points import as_angles, check_fixed, fit_points
 from pendpipe.analysis.fit.by_waveform import (
     ODDS,
-    Fitted,
+    Forms,
     fitted_waveform,
     waveform_result,
 )
-from pendpipe.analysis.fit.goodness import LEVEL, Goodness
+from pendpipe.analysis.fit.goodness import LEVEL
+from pendpipe.analysis.fit.period import by_times
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, read_fit
 from pendpipe.analysis.torque import may_be_sine, restoring_of, told_apart
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.find import turning_points_of
 from pendpipe.analysis.turning_points.measure import Samples, prepare
-from pendpipe.dynamics.eq8 import Restoring
+from pendpipe.dynamics.eq8 import OMEGA, Restoring
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, pretty_unit, with_error
 from pendpipe.recording import Recording
 
 __all__ = ["FitResult", "fit_recording", "read_fit"]
-
-Forms = tuple[tuple[Fitted, Goodness], ...]
 
 _STEP: Final = 1.25
 """By which the least amplitude grows, where the smaller ones contradict every law tried."""
@@ -200,13 +199,13 @@ def _waveform(
 ) -> FitResult:
     """Fit all readings, with the torque that is given, presumed, or that they ask for."""
 
-    def fitted(torque: Restoring) -> Forms:
+    def fitted(torque: Restoring) -> Forms | None:
         return fitted_waveform(
             samples, points, baseline=baseline, fixed=fixed, restoring=torque, length_m=length_m
         )
 
-    def result(forms: Forms, torque: Restoring) -> FitResult:
-        if forms:
+    def result(forms: Forms | None, torque: Restoring) -> FitResult:
+        if forms is not None:
             return waveform_result(forms, samples, points, baseline, fixed or {})
         # No motion of the law comes near the readings.
         lost = fit_points(points, baseline=baseline, fixed=fixed, restoring=torque)
@@ -218,36 +217,46 @@ def _waveform(
         restoring = restoring_of(points, stated=False)
     if restoring is not None:
         return result(fitted(restoring), restoring)
-    sine = fitted("sine")
-    if not sine:
-        return result(fitted("linear"), "linear")
-    swung, goodness = sine[0]
-    plain = swung.minimum.converged and goodness.enlarged == 1.0
-    if plain and told_apart(points, len(samples), goodness.noise_rms) > _CERTAIN:
-        return result(sine, "sine")
-    linear = fitted("linear")
-    if not linear:
-        return result(sine, "sine")
-    odds, converged = swung.better_by(linear[0][0]), linear[0][0].minimum.converged
-    odds = min(max(odds, -_SURE), _SURE)
-    if converged and (odds < -ODDS or not swung.minimum.converged):
-        found, words = result(linear, "linear"), f"10^{-odds / math.log(10.0):.0f}"
+    first, second = by_times(points)
+    forms, others = fitted(first), None
+    if forms is None:
+        return result(fitted(second), second)
+    own, other, odds = forms.fitted, None, _SURE
+    if own.minimum.converged and forms.goodness.enlarged == 1.0:
+        # What fits to the noise tells by itself how far off the other is.
+        apart = told_apart(points, len(samples), forms.goodness.noise_rms)
+        odds = 0.5 * apart.chi2
+        if apart.chi2 < _CERTAIN:
+            other = own.with_torque(second, points, apart)
+    elif (others := fitted(second)) is not None:
+        other = others.fitted
+    if other is not None:
+        odds = min(max(own.better_by(other), -_SURE), _SURE)
+    pendulum, spring = (own, other) if first == "sine" else (other, own)
+    for_spring = odds if first == "linear" else -odds
+    no_pendulum = pendulum is not None and not pendulum.minimum.converged
+    is_spring = for_spring > ODDS or no_pendulum
+    if spring is not None and spring.minimum.converged and is_spring:
+        spring_forms = forms if first == "linear" else others or fitted("linear")
+        found, words = result(spring_forms, "linear"), for_spring / math.log(10.0)
         said = (
-            f"x fits better than sin x by a likelihood ratio of {words}: a spring or torsion wheel"
+            "x fits better than sin x by a likelihood ratio of"
+            f" 10^{words:.0f}: a spring or torsion wheel"
         )
-        return replace(found, torque_odds=-odds, warnings=(*found.warnings, said))
-    found = replace(result(sine, "sine"), torque_odds=odds)
-    if odds > ODDS or not converged:
+        return replace(found, torque_odds=for_spring, warnings=(*found.warnings, said))
+    found = result(forms if first == "sine" else others or fitted("sine"), "sine")
+    found = replace(found, torque_odds=-for_spring)
+    if spring is None or for_spring < -ODDS or not spring.minimum.converged:
         return found
-    other = result(linear, "linear")["frequency"]
-    own = found["frequency"]
-    if abs(other.value - own.value) <= own.sd:
+    frequency, as_spring = found["frequency"], float(spring.value[OMEGA]) / math.tau
+    if abs(as_spring - frequency.value) <= frequency.sd:
         return found
+    told = Estimate(as_spring, frequency.sd * as_spring / frequency.value, frequency.unit)
     said = (
-        f"as a pendulum {_period(own)}; as a spring or torsion wheel {_period(other)}:"
+        f"as a pendulum {_period(frequency)}; as a spring or torsion wheel {_period(told)}:"
         " --restoring linear"
     )
-    return replace(found, other_frequency=other, warnings=(*found.warnings, said))
+    return replace(found, other_frequency=told, warnings=(*found.warnings, said))
 
 
 def _period(frequency: Estimate) -> str:

@@ -55,9 +55,7 @@ class EnvelopeFit:
         return self.quadratic.chi2 / max(freedom, 1)
 
 
-def fit_envelope(
-    points: TurningPoints, fixed: Mapping[str, float] | None = None, *, tolerance: float = 1e-5
-) -> EnvelopeFit:
+def fit_envelope(points: TurningPoints, fixed: Mapping[str, float] | None = None) -> EnvelopeFit:
     """Fit a, b, c >= 0 and y0 of Eq. 14 to turning points.
 
     The shared error of the level is a parameter with a prior: it has the alternating
@@ -69,8 +67,6 @@ def fit_envelope(
         Turning points with their errors.
     fixed
         Values of a, b, c, amplitude or offset that are held.
-    tolerance
-        Of chi^2, see `minimise`.
     """
     time = points.time_s - points.time_s[0]
     measured = points.amplitude_rad
@@ -85,7 +81,7 @@ def fit_envelope(
         return _quadratic(points, measured - model - shared * level, jacobian, float(level))
 
     start, held = _start(points, fixed or {})
-    found = minimise(evaluate, start, BOUNDS, held=held, tolerance=tolerance)
+    found = minimise(evaluate, start, BOUNDS, held=held)
     a, b, c, y0, level = found.value
     model = amplitude(time, y0, a, b, c)
     residual = measured - model - shared * level
@@ -232,11 +228,12 @@ def envelope_and_period(
     start: bool = False,
 ) -> tuple[EnvelopeFit, Period, float | None]:
     """Fit the amplitudes of turning points, and then their times; as a start without errors."""
-    if restoring == "linear":
-        envelope = fit_envelope(points, held, tolerance=0.3 if start else 1e-5)
+    if restoring == "linear" and not start:
+        envelope = fit_envelope(points, held)
     else:
         middle = share_of(parts, held.get("b", 0.0), baseline)
-        envelope = fit_energies(points, held, share=0.5 if middle is None else middle)
+        middle = 0.5 if middle is None else middle
+        envelope = fit_energies(points, held, restoring=restoring, share=middle)
     rates = envelope.value[:3].tolist()
     share = share_of(parts, rates[1], baseline)
     omega = 2.0 * math.pi * fixed["frequency"] if "frequency" in fixed else None

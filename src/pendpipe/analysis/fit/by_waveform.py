@@ -12,10 +12,10 @@ random, which it is not, least of all in the tail.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -37,7 +37,7 @@ from pendpipe.analysis.fit.least_squares import (
 )
 from pendpipe.analysis.fit.period import Period
 from pendpipe.analysis.fit.result import Baseline, DragForm, FitResult, result_of
-from pendpipe.analysis.torque import TOP, clear, period_excess, swing_phase
+from pendpipe.analysis.torque import TOP, Apart, clear, period_excess, swing_phase
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
@@ -551,6 +551,20 @@ class Fitted:
         own, others = own * self.problem.noise_rms**2, others * other.problem.noise_rms**2
         return 0.5 * (others - own) / min(self.noise_rms, other.noise_rms) ** 2
 
+    def rival(self, value: FloatArray, **law: Any) -> Fitted:
+        """Another law beside this one: of the same readings and noise, at the likeliest share."""
+        problem = replace(self.problem, **law)
+        minimum = _minimised(problem, value, self.held, self.chi2)
+        return replace(self, problem=problem, minimum=minimum, shared=None)
+
+    def with_torque(self, restoring: Restoring, points: TurningPoints, apart: Apart) -> Fitted:
+        """The other torque's motion that is most like this one."""
+        value, linear = self.value.copy(), restoring == "linear"
+        wide, late = (apart.pace, apart.late) if linear else (math.pi, -apart.late)
+        value[TIME] = points.time_s[0] + (late - self.start.before * wide) / value[OMEGA]
+        value[OMEGA] *= math.pi / apart.pace if linear else apart.pace / math.pi
+        return self.rival(value, restoring=restoring)
+
     def chi2_between(self, first_s: float, last_s: float) -> float:
         """Chi^2 of the readings of a span."""
         problem = self.problem
@@ -558,6 +572,14 @@ class Fitted:
             return self.chi2
         inside = (problem.time_s >= first_s) & (problem.time_s <= last_s)
         return problem.unlikely(problem.residual(self.value)[inside])
+
+
+class Forms(NamedTuple):
+    """A law with the likelier form of its drag, its test of fit, and with the other form."""
+
+    fitted: Fitted
+    goodness: Goodness
+    other: Fitted | None
 
 
 def fitted_waveform(
@@ -568,7 +590,7 @@ def fitted_waveform(
     fixed: Mapping[str, float] | None = None,
     restoring: Restoring = "linear",
     length_m: float | None = None,
-) -> tuple[tuple[Fitted, Goodness], ...]:
+) -> Forms | None:
     """Fit Eq. 8 to the readings, starting from the turning points.
 
     Parameters
@@ -588,9 +610,8 @@ def fitted_waveform(
 
     Returns
     -------
-    tuple of Fitted with its Goodness
-        With the drag's energy form and with v|v|, the likelier first; one where there is no drag,
-        none where no motion of the law comes near the readings.
+    Forms
+        None where no motion of the law comes near the readings.
 
     Notes
     -----
@@ -615,24 +636,35 @@ def fitted_waveform(
         length_m=length_m or 1.0,
     )
     first = np.append(start.value, 0.0)
-    found = _settled(problem, start, first, (*held, DRIFT), samples)
+
+    def fitted(value: FloatArray, held: tuple[int, ...]) -> Fitted:
+        return _settled(Fitted(problem, _at_share(problem, value, held), held, start), samples)
+
+    found = fitted(first, (*held, DRIFT))
     if not math.isfinite(found.chi2):
-        return ()
-    level = _judged(found, samples, points)
-    if OFFSET not in held and combined(level.p_values[:2]) < _DRIFTS:
-        drifting = _settled(found.problem, start, found.value, held, samples)
-        if drifting.minimum.converged and _drifts(drifting):
-            found, level = drifting, _judged(drifting, samples, points)
-    without = found.value[A] <= 0.0
-    if A in held or not found.minimum.converged or (without and level.enlarged == 1.0):
-        return ((found, level),)
-    other, value = replace(found.problem, drag="speed"), first if without else found.value
-    speed = _settled(other, start, value, found.held, samples)
+        return None
+    forms = _with_drag(found, first, samples, points)
+    if OFFSET in held or combined(forms.goodness.p_values[:2]) >= _DRIFTS:
+        return forms
+    drifting = fitted(found.value, held)
+    clear_drift = drifting.minimum.converged and _drifts(drifting)
+    return _with_drag(drifting, first, samples, points) if clear_drift else forms
+
+
+def _with_drag(found: Fitted, first: FloatArray, samples: Samples, points: TurningPoints) -> Forms:
+    """Ask for the other form of the drag: a step from the first one's minimum tells how likely."""
+    goodness = _judged(found, samples, points)
+    without, plain = found.value[A] <= 0.0, goodness.enlarged == 1.0
+    if A in found.held or not found.minimum.converged or (without and plain):
+        return Forms(found, goodness, None)
+    speed = found.rival(first if without else found.value, drag="speed")
+    if not plain or speed.better_by(found) > -ODDS:
+        speed = _settled(speed, samples)
     if not speed.minimum.converged:
-        return ((found, level),)
+        return Forms(found, goodness, None)
     if speed.better_by(found) < 0.0:
-        return (found, level), (speed, level)
-    return (speed, _judged(speed, samples, points)), (found, level)
+        return Forms(found, goodness, speed)
+    return Forms(speed, _judged(speed, samples, points), found)
 
 
 def _drifts(fitted: Fitted) -> bool:
@@ -641,24 +673,30 @@ def _drifts(fitted: Fitted) -> bool:
     return abs(float(fitted.value[DRIFT])) > _CLEAR_DRIFT * sd
 
 
-def _minimised(problem: Waveform, value: FloatArray, held: tuple[int, ...]) -> Minimum:
+def _minimised(
+    problem: Waveform, value: FloatArray, held: tuple[int, ...], bar: float = math.inf
+) -> Minimum:
     return minimise(
         problem.evaluate,
         value,
         problem.bounds,
-        held=(*held, SHARE),
+        held=held,
         tolerance=_TOLERANCE,
         chi2=problem.chi2,
         curved=problem.curved,
+        bar=bar,
     )
 
 
-def _settled(
-    problem: Waveform, start: Start, value: FloatArray, held: tuple[int, ...], samples: Samples
-) -> Fitted:
+def _at_share(problem: Waveform, value: FloatArray, held: tuple[int, ...]) -> Minimum:
+    return _minimised(problem, value, (*held, SHARE))
+
+
+def _settled(found: Fitted, samples: Samples) -> Fitted:
     """Minimise until noise, rounding and share are those of the minimum."""
-    found, settled = Fitted(problem, _minimised(problem, value, held), held, start), SHARE in held
+    settled = SHARE in found.held
     for _ in range(_MOST):
+        problem = found.problem
         if not math.isfinite(found.chi2):
             return found
         if found.noise_rms < _OTHER * problem.noise_rms:
@@ -669,8 +707,9 @@ def _settled(
             found = _at_mean_share(found)
             if settled := found.shared is not None:
                 continue
-        found = Fitted(problem, _minimised(problem, found.value, held), held, start)
-        settled = SHARE in held
+        minimum = _at_share(problem, found.value, found.held)
+        found = replace(found, problem=problem, minimum=minimum, shared=None)
+        settled = SHARE in found.held
     return _rounded(found, samples)
 
 
@@ -877,17 +916,25 @@ def _not_negative(
 
     The best of those with any of them at its bound.
     """
-    step = np.zeros_like(gradient)
-    least = np.full(len(gradient), np.inf)
-    for chosen in _SUBSETS[(free >= _SUBSETS).all(axis=1)]:
+    step, least = np.zeros_like(gradient), np.full(len(gradient), np.inf)
+    subsets = _SUBSETS[(free >= _SUBSETS).all(axis=1)]
+    # Most shares have the same ones at their bound.
+    subsets = subsets[np.argsort(np.abs(subsets - (value > 0.0)).sum(axis=1), kind="stable")]
+    left = np.arange(len(gradient))
+    for chosen in subsets:
+        own, pull = normal[left], gradient[left]
         at_zero = (free - chosen) * -value
-        system = normal * np.outer(chosen, chosen) + np.diag(1.0 - chosen)
-        right = (gradient - normal @ at_zero) * chosen + at_zero
+        system = own * np.outer(chosen, chosen) + np.diag(1.0 - chosen)
+        right = (pull - own @ at_zero) * chosen + at_zero
         tried = np.linalg.solve(system, right[..., None])[..., 0]
-        cost = np.einsum("kp,kpq,kq->k", tried, normal, tried) - 2.0 * np.sum(tried * gradient, 1)
-        better = (cost < least) & (tried >= -value - _SLACK * np.abs(value)).all(axis=1)
-        step[better], least[better] = tried[better], cost[better]
-        if np.isfinite(least).all() and chosen.sum() == free.sum():
+        slope = pull - np.einsum("kpq,kq->kp", own, tried)
+        cost = -np.sum(tried * (pull + slope), 1)
+        inside = (tried >= -value - _SLACK * np.abs(value)).all(axis=1)
+        better = inside & (cost < least[left])
+        step[left[better]], least[left[better]] = tried[better], cost[better]
+        # A minimum: what is at its bound is pulled beyond it.
+        left = left[~(inside & (slope * (free - chosen) <= 0.0).all(axis=1))]
+        if not len(left):
             break
     return np.maximum(step, -value)
 
@@ -905,7 +952,7 @@ def _rounded(fitted: Fitted, samples: Samples) -> Fitted:
     for _ in range(_ROUNDS):
         noise = best_noise(problem.residual(found.value), step, 0.1 * step)
         problem = replace(problem, noise_rms=noise, step=step)
-        minimum = _minimised(problem, found.value, found.held)
+        minimum = _at_share(problem, found.value, found.held)
         if not math.isfinite(minimum.quadratic.chi2):
             return fitted
         found = replace(found, problem=problem, minimum=minimum, shared=None)
@@ -913,20 +960,20 @@ def _rounded(fitted: Fitted, samples: Samples) -> Fitted:
 
 
 def waveform_result(
-    forms: Sequence[tuple[Fitted, Goodness]],
+    forms: Forms,
     samples: Samples,
     points: TurningPoints,
     baseline: Baseline,
     fixed: Mapping[str, float],
 ) -> FitResult:
     """Put the numbers of the likelier form of the drag together, with errors that cover both."""
-    fitted, goodness = forms[0]
+    fitted, goodness, other = forms
     problem, start_s = fitted.problem, float(samples.time_s[0])
     value, matrix, ends = _numbers(fitted, goodness, start_s)
     form: DragForm = problem.drag
-    if len(forms) > 1 and fitted.better_by(forms[1][0]) < ODDS:
+    if other is not None and fitted.better_by(other) < ODDS:
         form = "undecided"
-        others, _, other_ends = _numbers(*forms[1], start_s)
+        others, _, other_ends = _numbers(other, goodness, start_s)
         apart = others - value
         apart[5] = math.remainder(apart[5], math.tau)
         matrix = matrix + np.outer(apart, apart)

@@ -6,6 +6,7 @@ middle and the smallest amplitude that was analysed.
 """
 
 import math
+from functools import lru_cache
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -198,6 +199,7 @@ def losses_of(law: Eq8, amplitude: float) -> tuple[float, FloatArray]:
     return loss, loss / total * parts if total > 0.0 else slow
 
 
+@lru_cache(maxsize=16)
 def _cycle(law: Eq8, amplitude: float) -> tuple[float, float] | None:
     """Where a cycle with `amplitude` in its middle starts, and its loss; None where none is."""
     start = amplitude

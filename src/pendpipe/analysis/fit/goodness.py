@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.noise import quantisation_rms, undithered_rms
+from pendpipe.analysis.turning_points.measure import invert
 from pendpipe.arrays import AnyArray, FloatArray
 
 LEVEL: Final = 1e-3
@@ -25,6 +26,10 @@ _BLOCKS: Final = 128
 """Of a record, at most."""
 _SLOW: Final = 8
 """Polynomials that follow a slow change along the record."""
+
+_HAIR: Final = 1e-9
+_GAPPED: Final = 60.0
+"""Variances of a block's coefficients, added up, over that of its mean: 13 where it is whole."""
 
 
 class Question(NamedTuple):
@@ -191,25 +196,20 @@ def _demodulated(
     # Products of cosines and sines are those of sums and differences of their phases.
     folded = np.stack([np.add.reduceat(weights * power, place) for power in powers])
     taken = np.stack([np.add.reduceat(sums * power, place) for power in powers[: harmonics + 1]])
-    columns = [(0, 0)] + [(h, part) for h in range(1, harmonics + 1) for part in (0, 1)]
-    size = len(columns)
-    gram, right = np.empty((count, size, size)), np.empty((count, size))
-    for p, (h, sine) in enumerate(columns):
-        right[:, p] = taken[h].imag if sine else taken[h].real
-        for q, (k, other) in enumerate(columns):
-            add, less = folded[h + k], folded[abs(h - k)]
-            if sine and other:
-                gram[:, p, q] = 0.5 * (less.real - add.real)
-            elif not sine and not other:
-                gram[:, p, q] = 0.5 * (less.real + add.real)
-            else:
-                turn = (h - k if sine else k - h) >= 0
-                gram[:, p, q] = 0.5 * (add.imag + (less.imag if turn else -less.imag))
+    # A level, and cosine and sine of each harmonic: Re and Im of -i times its power.
+    harmonic = np.arange(1, 2 * harmonics + 2) // 2
+    turned = (-1j) ** (np.arange(1, 2 * harmonics + 2) % 2 * (harmonic > 0))
+    right = (turned[:, None] * taken[harmonic]).real.T
+    apart = harmonic[:, None] - harmonic
+    less = np.where((apart >= 0)[..., None], folded[np.abs(apart)], folded[np.abs(apart)].conj())
+    add = folded[harmonic[:, None] + harmonic] * np.outer(turned, turned)[..., None]
+    less = less * np.outer(turned, turned.conj())[..., None]
+    gram = 0.5 * (add + less).real.transpose(2, 0, 1)
     # Blocks with a gap tell not all of them.
-    least = np.linalg.eigvalsh(gram)[:, 0]
-    whole = least > 0.02 * gram[:, 0, 0]
-    gram, right = gram[whole], right[whole]
-    inverse = np.asarray(np.linalg.inv(gram), dtype=np.float64)
+    inverse = np.ascontiguousarray(gram + _HAIR * gram[:, :1, :1] * np.eye(len(harmonic)))
+    invert(inverse)
+    whole = np.einsum("kpp->k", inverse) * gram[:, 0, 0] < _GAPPED
+    inverse, right = inverse[whole], right[whole]
     value = np.einsum("kpq,kq->kp", inverse, right)
     middle = 0.5 * (edges[1:] + edges[:-1])[whole]
     return _Blocks(middle, value, inverse, np.einsum("kp,kp->k", value, right))

@@ -140,6 +140,10 @@ AS_PROMISED: Final = 0.03
 last: what bends the model by e standard deviations makes it differ by about 2 e."""
 
 
+_CLOSE: Final = 0.1
+"""Of what a law is worse by than its rival."""
+
+
 class Quadratic(NamedTuple):
     """chi^2 at a point, with minus half its gradient and its normal matrix."""
 
@@ -165,6 +169,7 @@ def minimise(
     tolerance: float = 1e-5,
     chi2: Callable[[FloatArray], float] | None = None,
     curved: Callable[[FloatArray, FloatArray], FloatArray] = np.add,
+    bar: float = math.inf,
     most: int = 60,
 ) -> Minimum:
     """Minimise chi^2 by Gauss-Newton steps that respect bounds, shortened where they overshoot.
@@ -185,6 +190,8 @@ def minimise(
         promised is the last.
     curved
         Where a step from a point ends, where more is known of the model than its derivatives.
+    bar
+        chi^2 of a rival: the farther above it, the less closely a minimum is looked for.
     most
         Greatest number of evaluations.
     """
@@ -195,9 +202,8 @@ def minimise(
         promised = float(2.0 * now.gradient @ step - step @ now.normal @ step)
         trial = bounds.clip(curved(value, step))
         expected = moved(now, step)
-        if promised < tolerance or (
-            chi2 is not None and abs(chi2(trial) - expected.chi2) < AS_PROMISED
-        ):
+        close = max(AS_PROMISED, _CLOSE * (expected.chi2 - bar))
+        if promised < tolerance or (chi2 is not None and abs(chi2(trial) - expected.chi2) < close):
             return Minimum(trial, expected, True)
         ways = (bounds.clip(curved(value, part * step)) for part in FRACTIONS)
         tried = ((way, evaluate(way)) for way in ways)
@@ -295,6 +301,9 @@ def _profiled_end(
     way, and between these chi^2 is a parabola.
     """
     room, side = bounds.about(value), math.copysign(1.0, reach)
+    most = min(abs(reach), float(room.upper[index] if side > 0.0 else -room.lower[index]))
+    if most <= 0.0:
+        return float(value[index])
     others = np.array([j for j in range(len(value)) if j != index and j not in held], dtype=int)
     low, high = room.lower[others], room.upper[others]
     part = normal[np.ix_(others, others)]
@@ -307,7 +316,6 @@ def _profiled_end(
     pull = pull * np.abs(walls)
     bend, slope = float(normal[index, index]), side * float(gradient[index])
     end, risen = 0.0, 0.0
-    most = min(abs(reach), float(room.upper[index] if side > 0.0 else -room.lower[index]))
     for _ in range(4 * len(others) + 4):
         free = np.flatnonzero(walls == 0.0)
         pace = np.zeros(len(others))

@@ -434,6 +434,25 @@ def measure(
     )
 
 
+@kernel()
+def invert(matrices: Stack) -> None:
+    """Invert positive definite matrices in their place, shape (k, size, size), by sweeps."""
+    size = matrices.shape[1]
+    for k in range(matrices.shape[0]):
+        one = matrices[k]
+        for p in range(size):
+            pivot = one[p, p]
+            one[p, p] = 1.0
+            for r in range(size):
+                one[p, r] /= pivot
+            for q in range(size):
+                if q != p:
+                    factor = one[q, p]
+                    one[q, p] = 0.0
+                    for r in range(size):
+                        one[q, r] -= factor * one[p, r]
+
+
 def _solved(
     gram: FloatArray, right: FloatArray, prior: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -460,7 +479,8 @@ def _solved(
     system[:, 1, 1] += prior + 1e-12
     empty = gram[:, 0, 0] == 0.0
     system[empty] = one
-    inverse: FloatArray = np.asarray(np.linalg.inv(system), dtype=np.float64)
+    inverse = np.ascontiguousarray(system)
+    invert(inverse)
     inverse[empty] = np.nan
     told = np.stack([right[:, 1:], gram[:, 1:, 0]], axis=2)
     return np.asarray(inverse @ told), inverse
