@@ -1,6 +1,7 @@
 """Whether fit and diagnosis give the numbers of clean recordings of the law within their errors.
 
     python -m benchmarks.consistency [--number 200] [--seed N] [--fits] [--jobs 2]
+    python -m benchmarks.consistency --fits-only 3000
 
 The recordings are integrated by `benchmarks.apparatus.motion`, which shares no code with the
 library: pendulums (sin x, angles) and every fourth a spring (x, displacements), Q 5 to 5000 at the
@@ -10,7 +11,8 @@ v|v|. A recording ends where the amplitude meets the noise. Where the Cramer-Rao
 20 % a refusal is right: these are counted apart. It prints a line a recording as it goes, then the
 rates, over all and by region, and every recording that is wrong. What is done is kept (`.evidence`)
 for as long as the code is the same: a run that was stopped goes on. Exit status 1 where a rate
-misses what is asked of it.
+misses what is asked of it. The second form asks how often the one test of fit refutes a perfect
+recording: it fits so many of one law, which differ in their noise alone.
 """
 
 from __future__ import annotations
@@ -29,7 +31,8 @@ import numpy as np
 import pendpipe as pp
 from benchmarks import journal
 from benchmarks.apparatus.motion import PARAMETERS, TIMES, Array, P, T, integrate
-from pendpipe.dynamics import Eq8, Release, sample_with_jacobian
+from pendpipe.analysis.fit.goodness import LEVEL
+from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian
 from pendpipe.errors import InputError
 
 CODE: Final = ("pendpipe.api", "benchmarks/consistency.py", "benchmarks/apparatus/motion.py")
@@ -41,6 +44,8 @@ _BIAS: Final = 0.02
 """Standard deviations of the frequency by which the integrator may be off."""
 KINDS: Final = ("a", "b hysteretic", "b viscous", "c", "all")
 QUANTITIES: Final = ("T0", "Q", "a", "b", "c")
+REFUTED: Final = 0.003
+"""Of perfect recordings, that may be red: three times the level of the test."""
 UNDECIDABLE: Final = 0.2
 """Cramer-Rao error of Q, relative, from which a refusal is right."""
 
@@ -417,10 +422,13 @@ def main() -> int:
     parser.add_argument("--number", type=int, default=200, help="recordings")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--fits", action="store_true", help="no diagnoses")
+    parser.add_argument("--fits-only", type=int, metavar="N", help="one law with N kinds of noise")
     parser.add_argument("--only", type=int, metavar="K", help="recording K alone")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--minutes", type=float, default=20.0, help="none is begun after these")
     arguments = parser.parse_args([each for each in sys.argv[1:] if each != "consistency"])
+    if arguments.fits_only is not None:
+        return fits_only(arguments.fits_only, arguments.seed, arguments.jobs)
     numbers = range(arguments.number) if arguments.only is None else [arguments.only]
     name = f"consistency-{arguments.seed}{'-fits' if arguments.fits else ''}"
     done: dict[str, Any] = journal.read(name, {}, CODE)
@@ -455,6 +463,31 @@ def _judged(numbers: list[int], arguments: argparse.Namespace) -> Iterator[Found
 
 def _judge(number: int, seed: int, diagnose: bool) -> Found:
     return judge(draw(number, seed), seed, diagnose=diagnose)
+
+
+def _perfect(seed: int) -> tuple[str, float]:
+    """Light and p of the test of fit of one perfect recording: fig. 8's law at 0.1 rad."""
+    law = Eq8(2.0 * math.pi * 0.516, 0.45, 0.00596, 0.00596, 1.4e-6, "sine")
+    time_s = np.linspace(0.0, 280.0, 16_384)
+    noise = 1e-4 * np.random.default_rng([seed, 2]).standard_normal(len(time_s))
+    values = sample(law, Release(-0.1, 0.1), time_s) + noise
+    found = pp.fit(pp.Recording(time_s=time_s, angle_rad=values))
+    return found.light, 1.0 if found.fit_p_value is None else found.fit_p_value
+
+
+def fits_only(number: int, seed: int, jobs: int) -> int:
+    """Print how many of perfect recordings are red or refuted; return 1 where too many are red."""
+    seeds = range(seed * 1_000_000, seed * 1_000_000 + number)
+    with ProcessPoolExecutor(jobs) as pool:
+        found = list(pool.map(_perfect, seeds, chunksize=20))
+    red = sum(light == "red" for light, _ in found)
+    refuted = sum(p < LEVEL for _, p in found)
+    green = sum(light == "green" for light, _ in found)
+    print(
+        f"{number} perfect recordings of one law: {red} red (at most {REFUTED:.1%}), {green} green,"
+        f" {refuted} refuted (at the level of {LEVEL:g})"
+    )
+    return 0 if red <= REFUTED * number else 1
 
 
 def report(found: list[Found]) -> int:
