@@ -99,9 +99,9 @@ def test_the_free_coefficient_of_sin_x_tells_pendulums_from_other_torques() -> N
     assert abs(sine_coefficient(wheel).value) < 0.02
     assert sine_coefficient(wheel).excludes_sine
     assert restoring_of(wheel) == "linear"
-    # Swings so small that nobody can tell stay linear, and so do torques that harden.
-    small = Eq8(OMEGA, viscous=0.01, restoring="sine")
-    assert restoring_of(points_of(small, 0.01, 60)) == "linear"
+    # Angles so small that nobody can tell are a pendulum's; torques that harden are not.
+    small = points_of(Eq8(OMEGA, viscous=0.01, restoring="sine"), 0.01, 60)
+    assert [restoring_of(small, stated=stated) for stated in (True, False)] == ["sine", "linear"]
     hard = shifted(points_of(Eq8(OMEGA, viscous=0.02), 0.5, 60), lambda y: -0.05 * y**2)
     assert sine_coefficient(hard).value < -0.5
     assert restoring_of(hard) == "linear"

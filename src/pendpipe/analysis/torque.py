@@ -29,9 +29,6 @@ _AGREES: Final = 2.0
 """Standard deviations within which the coefficient agrees with 1 where it has to tell by itself."""
 _NEAR: Final = 0.2
 """How near to 1 it must be where sin x removes most of chi^2."""
-_PENDULUM: Final = 0.25
-"""Amplitude in rad from which sin x lengthens the period by 0.4 %, more than frequencies wander:
-what swings so far is taken for a pendulum unless its half cycles speak against it."""
 
 
 class Coefficient(NamedTuple):
@@ -166,14 +163,13 @@ def restoring_of(
 ) -> Restoring:
     """Which torque the half cycles favour.
 
-    Where it is `stated` that the readings are angles, swings beyond 0.25 rad are a pendulum's
-    unless the half cycles exclude sin x; else the half cycles must ask for it.
+    Where it is `stated` that the readings are angles, they are a pendulum's unless the half cycles
+    exclude sin x; else the half cycles must ask for it.
     """
     if not may_be_sine(points):
         return "linear"
     coefficient = coefficient or sine_coefficient(points)
-    wide = abs(float(clear(points).angle_rad[0])) > _PENDULUM
-    pendulum = stated and wide and not coefficient.excludes_sine
+    pendulum = stated and not coefficient.excludes_sine
     return "sine" if coefficient.agrees or pendulum else "linear"
 
 

@@ -16,7 +16,6 @@ from pendpipe.analysis.fit.by_waveform import (
     waveform_result,
 )
 from pendpipe.analysis.fit.goodness import LEVEL
-from pendpipe.analysis.fit.period import by_times
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, read_fit
 from pendpipe.analysis.torque import may_be_sine, restoring_of, told_apart
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
@@ -217,7 +216,8 @@ def _waveform(
         restoring = restoring_of(points, stated=False)
     if restoring is not None:
         return result(fitted(restoring), restoring)
-    first, second = by_times(points)
+    first = restoring_of(points)
+    second: Restoring = "linear" if first == "sine" else "sine"
     forms, others = fitted(first), None
     if forms is None:
         return result(fitted(second), second)

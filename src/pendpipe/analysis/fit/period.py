@@ -8,14 +8,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.torque import TORQUES, clear, phases
+from pendpipe.analysis.torque import phases
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import Restoring
 
 _LOUD: Final = 2.0
-_PREFERRED: Final = 14.0
-"""Chi^2 of the times by which x is to be better than sin x to be tried before it."""
 
 
 class Period(NamedTuple):
@@ -90,14 +88,3 @@ def fit_period(
         matrix[1, 1] += (b / (4.0 * float(found[0]) ** 2)) ** 2 / 2.0
     omega = float(found[0])
     return Period(omega, first_s + float(begun[0]), matrix, chi2, omega * late)
-
-
-def by_times(points: TurningPoints) -> tuple[Restoring, Restoring]:
-    """Both torques: that which the times of the turning points favour, to be fitted first."""
-    part = clear(points)
-    plain, sine = (
-        fit_period(part, part.amplitude_rad, (0.0, 0.0, 0.0), share=0.5, restoring=torque)
-        for torque in TORQUES
-    )
-    better = (len(part) - 2) * (sine.chi2_per_dof - plain.chi2_per_dof)
-    return TORQUES if better > _PREFERRED else ("sine", "linear")
