@@ -33,45 +33,17 @@ BOTH = [(11, 12), (33, 34)]
 LOSS_3, LOSS_4 = Loss(1, 3, 1), Loss(1, 4, 1)
 
 
-@pytest.mark.parametrize(
-    ("bits", "received", "raw"),
-    [
-        (12, "00 01", 0),
-        (12, "08 01", 1),
-        (12, "90 4D", 1234),
-        (12, "F8 7F", 2047),
-        (12, "00 81", 2048),
-        (12, "08 81", 2049),
-        (12, "F8 FF", 4095),
-        (10, "00 01", 0),
-        (10, "20 01", 1),
-        (10, "E0 7F", 511),
-        (10, "00 81", 512),
-        (10, "E0 FF", 1023),
-        (14, "00 01", 0),
-        (14, "FE 7F", 8191),
-        (14, "02 81", 8193),
-        (14, "00 C1", 12288),
-        (14, "FE FF", 16383),
-    ],
-)
-def test_sync_bit_worked_bytes(bits: int, received: str, raw: int) -> None:
-    scans = marked_scans(bytes.fromhex(received), 1, bits)
-    assert scans.counts.tolist() == [[raw - 2 ** (bits - 1)]]
-    assert not scans.losses
-
-
 def test_digital_inputs_do_not_reach_the_analog_reading() -> None:
-    """D1 and D0 stand in bits 2 and 1 of the first byte."""
+    """D1 and D0 stand in bits 2 and 1 of the first byte; in words in the two low bits."""
+    assert plain_scans(bytes.fromhex("F3 7F"), 1, 12).counts.tolist() == [[2047]]
     assert marked_scans(bytes.fromhex("96 4D"), 1, 12).counts.tolist() == [[1234 - 2048]]
 
 
-@pytest.mark.parametrize(
-    ("received", "count"),
-    [("FF 7F", 32767), ("00 80", -32768), ("FF FF", -1), ("00 40", 16384), ("F0 7F", 32752)],
-)
-def test_word_worked_bytes(received: str, count: int) -> None:
-    assert plain_scans(bytes.fromhex(received), 1).counts.tolist() == [[count]]
+def test_a_stop_code_ends_the_scans_and_what_only_begins_like_one_is_data() -> None:
+    scans = plain_scans(bytes.fromhex("01 00 02 00") + b"stop 02\rxx", 1)
+    assert scans.counts.ravel().tolist() == [1, 2]
+    assert scans.losses == (Loss(2, 10, 0, reason="stop 02"),)
+    assert plain_scans(b"stop 0", 1).counts.tobytes() == b"stop 0"
 
 
 @pytest.mark.parametrize("channels", [1, 2, 3, 4])
