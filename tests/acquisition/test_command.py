@@ -79,11 +79,6 @@ def test_a_users_fault_is_one_line_and_status_two(
     assert not out.exists()
 
 
-def test_listing_never_fails(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["acquire", "--list"]) == 0
-    assert capsys.readouterr().out
-
-
 def test_a_length_in_samples_and_a_range(tmp_path: Path) -> None:
     out = tmp_path / "short.csv"
     call = "acquire --device simulated:di4108 --rate 100 --samples 250 --range-volts 1.5"
@@ -113,21 +108,6 @@ def test_a_second_call_records_beside_the_first(tmp_path: Path) -> None:
     assert len(both) == 2
     newer = next(name for name in both if name != "decay.raw")
     assert read_plain(out).metadata["raw_file"] == newer
-
-
-def test_a_raw_file_named_by_the_user_is_never_overwritten(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    raw = tmp_path / "mine.raw"
-    assert main([*QUICK.split(), str(tmp_path / "a.csv"), "--raw", str(raw)]) == 0
-    kept = raw.read_bytes()
-    assert main([*QUICK.split(), str(tmp_path / "b.csv"), "--raw", str(raw)]) == 2
-    (tmp_path / "notes.txt").write_text("not a recording")
-    assert (
-        main([*QUICK.split(), str(tmp_path / "b.csv"), "--raw", str(tmp_path / "notes.txt")]) == 2
-    )
-    assert capsys.readouterr().err.count("\n") == 2
-    assert raw.read_bytes() == kept
 
 
 def test_a_csv_that_could_not_be_written_is_made_at_the_next_call(

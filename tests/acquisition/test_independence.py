@@ -10,8 +10,8 @@ import pytest
 import pendpipe.acquisition
 
 ROOT = Path(pendpipe.acquisition.__file__).parent
-NEUTRAL = {"pendpipe.acquisition.clock", "pendpipe.arrays", "pendpipe.errors"}
-"""Time, array types and the user's faults: nothing of these knows a byte of a protocol."""
+NEUTRAL, LINE = {"pendpipe.acquisition.clock"}, "pendpipe.acquisition.line"
+"""Time, and the line: neither knows a byte of a protocol."""
 
 
 def imports(module: Path) -> set[str]:
@@ -26,25 +26,16 @@ def imports(module: Path) -> set[str]:
     return found
 
 
-def modules(package: str) -> list[Path]:
-    found = sorted((ROOT / package).glob("**/*.py"))
+@pytest.mark.parametrize(
+    ("side", "allowed"), [("devices", NEUTRAL), ("drivers", NEUTRAL | {LINE}), (".", None)]
+)
+def test_devices_and_drivers_know_nothing_of_each_other(
+    side: str, allowed: set[str] | None
+) -> None:
+    """Nor does what both may use know either."""
+    names = ["clock.py", "line.py"] if allowed is None else ["*.py"]
+    found = [path for name in names for path in (ROOT / side).glob(name)]
     assert found
-    return found
-
-
-@pytest.mark.parametrize("module", modules("devices"), ids=lambda path: path.stem)
-def test_devices_know_nothing_of_the_reading_side(module: Path) -> None:
-    ours = {name for name in imports(module) if name.startswith("pendpipe")}
-    assert {n for n in ours if not n.startswith("pendpipe.acquisition.devices")} <= NEUTRAL
-
-
-@pytest.mark.parametrize("module", modules("drivers"), ids=lambda path: path.stem)
-def test_drivers_know_nothing_of_the_devices(module: Path) -> None:
-    ours = {name for name in imports(module) if name.startswith("pendpipe")}
-    allowed = NEUTRAL | {"pendpipe.acquisition.line"}
-    assert {n for n in ours if not n.startswith("pendpipe.acquisition.drivers")} <= allowed
-
-
-def test_what_both_may_use_knows_neither() -> None:
-    for name in ("clock.py", "line.py"):
-        assert not any("drivers" in n or "devices" in n for n in imports(ROOT / name))
+    ours = {name for path in found for name in imports(path) if name.startswith("pendpipe.acq")}
+    own = f"pendpipe.acquisition.{side}"
+    assert {name for name in ours if not name.startswith(own)} <= (allowed or NEUTRAL)

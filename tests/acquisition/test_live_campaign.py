@@ -23,29 +23,16 @@ from pendpipe.cli import main
 from pendpipe.recording import read_plain
 
 pytestmark = pytest.mark.slow
-LINKS = [
-    pytest.param(
-        "pty",
-        marks=pytest.mark.skipif(
-            not hasattr(os, "openpty"), reason="this system has no pseudo-terminals"
-        ),
-    ),
-    "socket",
-]
+LINK = "pty" if hasattr(os, "openpty") else "socket"
+"""Both kinds of line are those of `test_sessions`."""
 DURATION_S = 4.0
 LONG_S = 8.0
 """Of a recording that is broken off, so that a busy machine does not end it before."""
 
 
-@pytest.fixture(params=LINKS)
-def link(request: pytest.FixtureRequest) -> str:
-    """Both kinds of line."""
-    return str(request.param)
-
-
-def test_neither_changed_code_nor_force_records_again(link: str, tmp_path: Path) -> None:
+def test_neither_changed_code_nor_force_records_again(tmp_path: Path) -> None:
     """With the device gone, everything is made from the raw file, byte for byte."""
-    with served_device(tmp_path, link) as port:
+    with served_device(tmp_path, LINK) as port:
         campaign = LiveCampaign(tmp_path, port, DURATION_S)
         done = campaign.run()
         assert done.returncode == 0, done.stderr
@@ -69,8 +56,8 @@ def test_neither_changed_code_nor_force_records_again(link: str, tmp_path: Path)
     assert campaign.recording.read_bytes() == recording
 
 
-def test_a_killed_campaign_uses_what_was_recorded(link: str, tmp_path: Path) -> None:
-    with served_device(tmp_path, link) as port:
+def test_a_killed_campaign_uses_what_was_recorded(tmp_path: Path) -> None:
+    with served_device(tmp_path, LINK) as port:
         campaign = LiveCampaign(tmp_path, port, 600.0, "turning-points")
         campaign.kill_at(0.7 * DURATION_S)
         raw = campaign.raw_files
@@ -87,10 +74,8 @@ def test_a_killed_campaign_uses_what_was_recorded(link: str, tmp_path: Path) -> 
     assert (campaign.results / "live/turning_points.csv").stat().st_size > 500
 
 
-def test_a_dead_line_fails_its_job_alone_and_the_next_run_tries_again(
-    link: str, tmp_path: Path
-) -> None:
-    with served_device(tmp_path, link) as port:
+def test_a_dead_line_fails_its_job_alone_and_the_next_run_tries_again(tmp_path: Path) -> None:
+    with served_device(tmp_path, LINK) as port:
         pass  # unplugged before the first scan
     campaign = LiveCampaign(tmp_path, port, DURATION_S)
     done = campaign.run()
@@ -99,7 +84,7 @@ def test_a_dead_line_fails_its_job_alone_and_the_next_run_tries_again(
     assert (campaign.results / "file/recording.csv").exists()
     assert not campaign.recording.exists()
     assert not (campaign.results / "live/refused.json").exists()
-    with served_device(tmp_path, link) as port:
+    with served_device(tmp_path, LINK) as port:
         campaign.connect(port, 1.0)
         done = campaign.run()
     assert done.returncode == 0, done.stderr
@@ -118,11 +103,10 @@ def lost_in_the_midst(campaign: LiveCampaign, device: subprocess.Popen[str]) -> 
     return (campaign.results / "live/logs/acquire.log").read_text()
 
 
-def test_a_line_that_is_lost_fails_its_job_and_the_next_run_records_anew(
-    link: str, tmp_path: Path
-) -> None:
-    with served_process(tmp_path, link) as (device, port):
-        campaign = LiveCampaign(tmp_path, port, LONG_S)
+def test_a_line_that_is_lost_fails_its_job_and_its_raw_file_is_kept(tmp_path: Path) -> None:
+    """Unless it is accepted as what there is, the next run records anew."""
+    with served_process(tmp_path, LINK) as (device, port):
+        campaign = LiveCampaign(tmp_path, port, LONG_S, "calibrate")
         log = lost_in_the_midst(campaign, device)
     assert f"s of {LONG_S:g} s are kept in" in log.splitlines()[-1]
     assert "Traceback" not in log
@@ -130,26 +114,13 @@ def test_a_line_that_is_lost_fails_its_job_and_the_next_run_records_anew(
     assert not campaign.recording.exists()
     first = campaign.raw_files
     assert len(first) == 1
-    with served_device(tmp_path, link) as port:
-        campaign.connect(port, DURATION_S)
-        done = campaign.run()
-    assert done.returncode == 0, done.stderr
-    assert first.items() < campaign.raw_files.items()
-    assert len(read_plain(campaign.recording)) == 60 * DURATION_S
-
-
-def test_what_a_lost_line_has_left_is_the_record_once_it_is_accepted(tmp_path: Path) -> None:
-    with served_process(tmp_path, "socket") as (device, port):
-        campaign = LiveCampaign(tmp_path, port, LONG_S, "calibrate")
-        lost_in_the_midst(campaign, device)
     call = ["acquire", "--campaign", str(tmp_path / "config.yaml"), "--record", "live"]
     assert main([*call, "--accept-short"]) == 0
     recording = campaign.recording.read_bytes()
-    # It stays the record, whatever is made again.
     done = campaign.run("--forceall")
     assert done.returncode == 0, done.stderr
     assert campaign.recording.read_bytes() == recording
-    assert len(campaign.raw_files) == 1
+    assert campaign.raw_files.keys() == first.keys()
     kept_s = read_plain(campaign.recording).time_s[-1]
     assert 1.0 < kept_s < LONG_S
     # The report prints the calibration's warnings.
@@ -159,11 +130,24 @@ def test_what_a_lost_line_has_left_is_the_record_once_it_is_accepted(tmp_path: P
     assert f"{kept_s:.6g} s of {LONG_S:g} s kept" in warning
 
 
+def test_after_a_lost_line_the_next_run_records_anew(tmp_path: Path) -> None:
+    with served_process(tmp_path, LINK) as (device, port):
+        campaign = LiveCampaign(tmp_path, port, LONG_S)
+        lost_in_the_midst(campaign, device)
+    first = campaign.raw_files
+    with served_device(tmp_path, LINK) as port:
+        campaign.connect(port, 1.0)
+        done = campaign.run()
+    assert done.returncode == 0, done.stderr
+    assert first.items() < campaign.raw_files.items()
+    assert len(read_plain(campaign.recording)) == 60
+
+
 def test_only_an_explicit_request_records_anew(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     call = ["acquire", "--campaign", str(tmp_path / "config.yaml"), "--record"]
-    with served_device(tmp_path, "socket") as port:
+    with served_device(tmp_path, LINK) as port:
         campaign = LiveCampaign(tmp_path, port, 1.0)
         assert main([*call, "live"]) == 0
         first = campaign.raw_files
@@ -180,8 +164,8 @@ def test_only_an_explicit_request_records_anew(
     assert main([*call, "file", "--anew"]) == 2
 
 
-def test_two_jobs_never_record_from_one_port(link: str, tmp_path: Path) -> None:
-    with served_device(tmp_path, link) as port:
+def test_two_jobs_never_record_from_one_port(tmp_path: Path) -> None:
+    with served_device(tmp_path, LINK) as port:
         command = [sys.executable, "-m", "pendpipe.cli", "acquire", "--port", port]
         command += ["--model", "di2108", "--duration", "3", "--out"]
         jobs = [
