@@ -36,10 +36,7 @@ def one_line(capsys: pytest.CaptureFixture[str]) -> str:
     [
         (1.0, 1e-300, "the readings move by"),
         (1.0, 1e-320, "the readings move by"),
-        (1.0, 1e-100, "the readings move by"),
-        (1.0, 1e100, "the readings are too large"),
         (1.0, 1e300, "the readings are too large"),
-        (1e30, 1.0, "the times span"),
         (1e300, 1.0, "the times span"),
         (1e-300, 1.0, "the times span"),
     ],

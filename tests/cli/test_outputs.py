@@ -14,7 +14,6 @@ import pendpipe as pp
 from pendpipe.cli import main
 from pendpipe.errors import InputError
 from pendpipe.files import check_output, replaced, write_json, write_whole, writing
-from pendpipe.recording import Recording, write_plain
 
 TIME_S = np.arange(900) / 30.0
 SWING = 0.1 * np.exp(-0.01 * TIME_S) * np.cos(4.0 * TIME_S)
@@ -78,9 +77,13 @@ def symbolic_link(path: Path) -> Path:
     return link
 
 
-@pytest.mark.parametrize("name", [itself, dotted, hard_link, symbolic_link])
-@pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.parametrize("force", [(), ("--force",)])
+@pytest.mark.parametrize(
+    ("command", "name", "force"),
+    [
+        *((command, itself, force) for command in COMMANDS for force in ((), ("--force",))),
+        *(("fit", name, ("--force",)) for name in (dotted, hard_link, symbolic_link)),
+    ],
+)
 def test_an_output_that_is_an_input_is_refused(
     given: dict[str, Path],
     command: str,
@@ -96,27 +99,14 @@ def test_an_output_that_is_an_input_is_refused(
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_recording_that_pendpipe_has_written_is_an_input_as_well(
-    given: dict[str, Path], command: str
-) -> None:
-    if command in INPUT:
-        pytest.skip("its input is no recording")
-    given["recording"].unlink()
-    write_plain(given["recording"], Recording(TIME_S, SWING, "angle_rad"))
-    before = given["recording"].read_bytes()
-    assert main(call(command, given["recording"], given)) == 2
-    assert given["recording"].read_bytes() == before
-
-
-@pytest.mark.parametrize("content", [b"my notes\n", b'\x00{"made by": "me"}'])
-@pytest.mark.parametrize("command", COMMANDS)
 def test_a_file_of_others_is_replaced_only_with_force(
     given: dict[str, Path],
     command: str,
-    content: bytes,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
+    """And what a command has written it may write again."""
+    content = b'\x00{"made by": "me"}'
     out = tmp_path / FORM.get(command, "mine.csv")
     out.write_bytes(content)
     words = call(command, out, given)
@@ -129,14 +119,7 @@ def test_a_file_of_others_is_replaced_only_with_force(
     if command != "refused":  # what stands there is read first
         assert main([*words, "--force"]) == 0
         assert out.read_bytes() != content
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_what_a_command_has_written_it_may_write_again(
-    given: dict[str, Path], command: str, tmp_path: Path
-) -> None:
-    for _ in range(2):
-        assert main(call(command, tmp_path / FORM.get(command, "mine.csv"), given)) == 0
+        assert main(words) == 0
 
 
 @pytest.mark.parametrize("form", ["svg", "png", "pdf"])
