@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from pendpipe.diagnosis.held_out import completed, held_out, predicts_worse
+from pendpipe.diagnosis.held_out import completed, held_out, predicted_worse
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.effects.catalogue import by_identifier
@@ -53,17 +53,16 @@ def test_an_effect_that_is_not_there_predicts_no_better(name: str) -> None:
     assert found.gain < 3.0 * found.gain_sd + 1.0
 
 
-def test_a_law_that_only_noise_asked_for_predicts_worse_and_a_right_one_does_not() -> None:
+def test_a_law_that_only_noise_asked_for_predicted_worse_and_a_right_one_does_not() -> None:
     """A line fitted to noise loses about a unit of ln p for its two sizes."""
     fit, data, noise = null_fit()
     model = fit.model.adding(by_identifier("tone-pickup"))
     more = refine(model, data, noise, np.concatenate([fit.value, [1e-4, 1e-4, 3.3]]))
-    assert predicts_worse(fit, more, data, noise, (), (), drawn=False)
+    assert predicted_worse(fit, more, data, noise, (), (), drawn=False) > 0.0
     outcome = diagnosed("sensor-cubic")
     found = outcome.search
-    assert not predicts_worse(
-        found.baseline, found.fit, found.data, found.noise, (), found.held, drawn=False
-    )
+    fits = (found.baseline, found.fit, found.data, found.noise)
+    assert predicted_worse(*fits, (), found.held, drawn=False) == 0.0
 
 
 def test_coloured_noise_is_predicted_from_what_is_known() -> None:

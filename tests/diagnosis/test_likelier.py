@@ -14,7 +14,7 @@ from pendpipe.diagnosis.hypothesis import Hypothesis, Step
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.run import diagnose_recording
-from pendpipe.diagnosis.weighing import Weighed, swap_in_likelier, weigh
+from pendpipe.diagnosis.weighing import Weighed, likelier, weigh
 from pendpipe.effects.baseline import B
 
 from .records import TRUTH, diagnosed, other_engine, recording, scanned
@@ -47,9 +47,21 @@ def having_taken(outcome: Diagnosis, name: str) -> Hypothesis:
     )
 
 
+def exchanged(found: Hypothesis) -> tuple[Hypothesis, tuple[Weighed, ...]]:
+    """Put likelier rivals in, until there is none."""
+    seen = set()
+    while True:
+        seen.add(found.key)
+        weighed = tuple(weighing.weigh(found, step) for step in found.steps)
+        after = likelier(found, weighed, seen)
+        if after is None:
+            return found, weighed
+        found = after
+
+
 def led(outcome: Diagnosis, name: str) -> tuple[Step, float, dict[str, float], Hypothesis]:
     """Return the final leader if another was added first, and all probabilities."""
-    found, (weighed,) = swap_in_likelier(having_taken(outcome, name))
+    found, (weighed,) = exchanged(having_taken(outcome, name))
     (step,) = found.steps
     own, *others = weighed.weights[:-1].tolist()
     mates = {mate.identifier: each for mate, each in zip(weighed.mates, others, strict=True)}
@@ -97,7 +109,7 @@ def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
 
     monkeypatch.setattr(weighing, "weigh", weighed)
     outcome = scanned("circular-error")
-    found, _ = swap_in_likelier(outcome.search)
+    found, _ = exchanged(outcome.search)
     assert [effect.identifier for effect in found.fit.model.effects] == [leads]
     assert found.steps[0].winner.identifier == leads
 
@@ -136,7 +148,7 @@ def test_the_next_effect_is_compared_beside_the_new_leader(
     first = outcome.search.steps[0]
     other = first.rivals[1]
     monkeypatch.setattr(weighing, "_likelier", lambda _, step, __: other if step is first else None)
-    found, _ = swap_in_likelier(outcome.search)
+    found, _ = exchanged(outcome.search)
     assert found.steps[0].winner.identifier == other.identifier
     assert found.steps[1].before is found.steps[0].winner.fit
     assert found.steps[1].winner is outcome.search.steps[1].winner
@@ -162,7 +174,7 @@ def test_after_a_swap_every_effect_is_weighed_beside_the_new_ones(
     )
     # Trial models overflow, as in `diagnose_decay`.
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        found, weighed = swap_in_likelier(outcome.search)
+        found, weighed = exchanged(outcome.search)
     names = {rival.identifier for rival in wanted}
     assert {step.winner.identifier for step in found.steps} == names
     assert {effect.identifier for effect in found.fit.model.effects} == names

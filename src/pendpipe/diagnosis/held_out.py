@@ -87,7 +87,7 @@ def held_out(
     )
 
 
-def predicts_worse(
+def predicted_worse(
     before: Fit,
     after: Fit,
     data: Data,
@@ -96,15 +96,16 @@ def predicts_worse(
     held_after: Sequence[int],
     *,
     drawn: bool,
-) -> bool:
-    """Return whether a model predicts cycles that it was not fitted to worse than another.
+) -> float:
+    """Return twice the log density by which a model predicts cycles that are left out worse.
 
-    Then what it has more than the other describes the noise of the readings and no law. A curve
+    What it has more than the other then describes the noise of the readings and no law. A curve
     (`drawn`) may diverge in one block where its knots have no readings: that is a loss of one
-    standard deviation of the sum, and two are asked.
+    standard deviation of the sum, and two are allowed.
     """
     found = held_out(before, after, data, noise, held_before, held_after)
-    return found.gain < (-2.0 * found.gain_sd if drawn else 0.0)
+    allowed = 2.0 * found.gain_sd if drawn and math.isfinite(found.gain_sd) else 0.0
+    return 2.0 * max(-found.gain - allowed, 0.0)
 
 
 def _blocks(fit: Fit) -> IntArray:

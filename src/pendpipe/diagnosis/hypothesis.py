@@ -57,11 +57,14 @@ class Step:
         Global, when it was found.
     before
         The model to which it was added.
+    predicted_worse
+        Twice the log density that it costs in the prediction of cycles left out.
     """
 
     rivals: tuple[Rival, ...]
     p_value: float
     before: Fit
+    predicted_worse: float = 0.0
 
     @property
     def winner(self) -> Rival:
@@ -70,9 +73,9 @@ class Step:
 
 
 def price(steps: Sequence[Step]) -> float:
-    """Return the charges of a set of effects, with the price of each name."""
-    names = sum(map(is_further, steps))
-    return sum(map(price_of_another, range(names))) + sum(step.winner.charge for step in steps)
+    """Return the charges of a set of effects, with the prices of names and of predictions."""
+    names = sum(map(price_of_another, range(sum(map(is_further, steps)))))
+    return names + sum(step.winner.charge + step.predicted_worse for step in steps)
 
 
 def price_of_another(names: int) -> float:
@@ -118,8 +121,8 @@ class Hypothesis:
     scanned
         Fit, data and noise of the last scan, and the effects that it asked.
     without_curve
-        The fit with the named effects only: probabilities of names refer to it. None where that
-        is `fit` itself.
+        The fit without the curve at the end: probabilities of names refer to it. None where there
+        is no such curve, or no name beside it.
     """
 
     beginning: Beginning
@@ -146,6 +149,13 @@ class Hypothesis:
         fit, data, noise = settled(fit, data, noise, self.held)
         baseline = self.baseline if fit.model.effects else fit
         return replace(self, fit=fit, data=data, noise=noise, baseline=baseline)
+
+    @property
+    def key(self) -> tuple[frozenset[str], frozenset[str]]:
+        """Its effects and its faults: where a search has been it does not return."""
+        effects = frozenset(effect.key for effect in self.fit.model.effects)
+        released = frozenset(str(index) for index in self.beginning.held if index not in self.held)
+        return effects | released, frozenset(each.identifier for each in self.faults)
 
     @property
     def scan(self) -> Detection:

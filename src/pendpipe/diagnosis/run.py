@@ -45,7 +45,6 @@ from pendpipe.diagnosis.weighing import (
     effect_named,
     fault_named,
     law_of,
-    swap_in_likelier,
 )
 from pendpipe.dynamics.any_law import NoMotionError, sample_pieces
 from pendpipe.dynamics.eq8 import Restoring
@@ -177,7 +176,7 @@ def diagnose_decay(
         beginning = begin(
             samples, points, fit, baseline=baseline, fixed=fixed, stated=part.unit_is_stated
         )
-        found = search(
+        found, weighed = search(
             beginning,
             samples,
             catalogue_beside(restoring),
@@ -187,7 +186,6 @@ def diagnose_decay(
             released=[ReleasedParameter(name) for name in fixed],
             progress=progress,
         )
-        found, weighed = swap_in_likelier(found, progress)
         found = _with_scatter(found, samples)
     except NoMotionError as error:
         remedy = "cut it with --start and --stop, or change what is held with --fix"

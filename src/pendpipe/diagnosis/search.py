@@ -1,6 +1,6 @@
-"""Add one effect after another, until nothing significant is left."""
+"""From the baseline to the answer: go to a neighbour of a smaller score, until there is none."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -9,74 +9,33 @@ import numpy as np
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
-from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Lead, more_leads, printed
+from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.faults import correct, examine, random_torque
-from pendpipe.diagnosis.held_out import predicts_worse
-from pendpipe.diagnosis.hypothesis import (
-    Hypothesis,
-    Step,
-    Task,
-    first_noise,
-    is_gross,
-    loses_phase,
-    price,
-    undrawn,
+from pendpipe.diagnosis.hypothesis import Hypothesis, Step, Task, first_noise, is_gross
+from pendpipe.diagnosis.neighbours import (
+    Neighbour,
+    Proposed,
+    adding,
+    compared,
+    describing,
+    leading,
+    refit_without,
+    shares_a_misfit,
+    simpler,
+    with_other_noise,
 )
-from pendpipe.diagnosis.moves import (
-    describe,
-    improve,
-    prefer_parameters,
-    prefer_rare,
-    reconsider_red_noise,
-)
-from pendpipe.diagnosis.refine import Fit, best_fit, fitted_from
+from pendpipe.diagnosis.refine import Fit, best_fit, fitted_from, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.remainder import remainder_of, with_errors
+from pendpipe.diagnosis.remainder import with_errors
 from pendpipe.diagnosis.result import BASELINES
-from pendpipe.diagnosis.rivals import NO_SCAN, Rival, Scale, refit_leads
+from pendpipe.diagnosis.rivals import NO_SCAN, Rival, Scale
+from pendpipe.diagnosis.weighing import Weighed, likelier, weigh
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C
 from pendpipe.effects.catalogue.in_time import BEATING_MODE
-from pendpipe.effects.curves import FOLLOW_UP_CURVES
-from pendpipe.quantities import compact
-
-
-def second_mode_first(state: Hypothesis, task: Task) -> Hypothesis:
-    """Fit it from its own start, and take it as the first effect if it leaves less.
-
-    Parameters
-    ----------
-    state
-        After the baseline's fit.
-    task
-        What the search is to do.
-    """
-    beginning = state.beginning
-    if beginning.second_mode is None:
-        return state
-    task.progress(f"the turning points beat: fitting {BEATING_MODE.name} first")
-    before, data, noise = state.fit, state.data, state.noise
-    start = np.concatenate([beginning.value, beginning.second_mode])
-    fit = fitted_from(before.model.adding(BEATING_MODE), data, noise, start, held=state.held)
-    # Without its phase a model's chi^2 says less than the squares of what it leaves.
-    if fit is None or not _square(fit, state) < _square(before, state):
-        return state
-    state = task.scanned(state)
-    lead = Lead(BEATING_MODE, (), before.chi2 - fit.chi2, 0.0)
-    rival = Rival.of(lead, fit, before.chi2, Scale.of(fit, data, noise), NO_SCAN)
-    step = Step((rival,), state.scan.p_value / CATALOGUE_SHARE, before)
-    return replace(state, steps=(step,)).settle(fit)
-
-
-def _square(fit: Fit, state: Hypothesis) -> float:
-    return float(np.sum((state.data.residual(fit.at.reading) * state.data.weight) ** 2))
-
 
 _MOST_EFFECTS: Final = 4
-_GOOD_PART: Final = 1.0 / 3.0
-"""Of a misfit, that one of a few laws takes which share it."""
 LESS_FRICTION: Final = (1.0, 0.9, 0.7, 0.4)
 """Fractions of the Coulomb friction to try if the baseline stops before the last reading."""
 
@@ -91,8 +50,8 @@ def search(
     seed: int,
     released: Sequence[ReleasedParameter] = (),
     progress: Progress = silent,
-) -> Hypothesis:
-    """Fit the baseline, and add what improves it most, until chance explains the rest.
+) -> tuple[Hypothesis, tuple[Weighed, ...]]:
+    """Fit the baseline, and run the search from there.
 
     Parameters
     ----------
@@ -112,6 +71,13 @@ def search(
         The held parameters that may be wrong.
     progress
         Receives one line for each step.
+
+    Returns
+    -------
+    Hypothesis
+        To which there is no better neighbour.
+    tuple of Weighed
+        One for each of its steps.
     """
     data, held = beginning.data, list(beginning.held)
     progress(f"fitting {BASELINES.get(baseline, baseline)} to {data.used} readings")
@@ -121,68 +87,106 @@ def search(
         raise NoMotionError("it stops")
     state = Hypothesis(beginning, fit, data, white, beginning.held, fit, samples).settle(fit)
     task = Task(catalogue, released, baseline, level, seed, progress, samples)
-    return grown(second_mode_first(state, task), task)
+    return run_search(state, task)
 
 
-def grown(state: Hypothesis, task: Task) -> Hypothesis:
-    """Add effects to a hypothesis, until chance explains the rest."""
-    state, named = _described(_grow(state, task), task)
-    state = examine(state, task)
-    return replace(
-        state,
-        fit=with_errors(state.fit, state.data, state.noise),
-        baseline=_baseline_alone(state),
-        without_curve=named,
-    )
+def run_search(state: Hypothesis, task: Task) -> tuple[Hypothesis, tuple[Weighed, ...]]:
+    """Go to a neighbour of a smaller score, until there is none that was not seen.
 
-
-def _grow(state: Hypothesis, task: Task) -> Hypothesis:
-    """Add effects until chance explains the rest, then improve the set.
-
-    Of two laws that share a misfit neither may pay its price before the other is there. From the
-    first that does not pay on, names stand if together they leave noise alone.
+    Cheap neighbours come first, and the first kind that has a better one is taken. Last comes a
+    rival in the place of what it looks like, for which all are weighed.
     """
-    paid: Hypothesis | None = None
-    while len(state.steps) < _MOST_EFFECTS:
-        before = correct(state, task)
-        state = _add_one(before, task, names_first=paid is not None)
-        if len(state.steps) == len(before.steps):
-            break
-        if paid is None and not _pays(state.steps[-1], state.steps[:-1]):
-            paid = before
-    state = _improve(state, task)
-    clean = Scale.of(state.fit, state.data, state.noise).clean
-    if paid is not None and (not clean or any(step.winner.drawn for step in state.steps)):
-        task.progress("more than noise is left: dropping what does not pay its price")
-        state = _improve(paid, task)
-    return state
+    seen = set()
+    while True:
+        state = with_other_noise(task.scanned(correct(state, task)), task)
+        seen.add(state.key)
+        for some in (_starts, _additions, simpler, _descriptions):
+            new = [each for each in some(state, task) if each.state.key not in seen]
+            best = max(new, key=lambda each: each.lower, default=None)
+            if best is not None and best.lower > 0.0:
+                task.progress(best.words)
+                state = best.state.settle(best.state.fit)
+                break
+        else:
+            state = _judged(examine(state, task))
+            weighed = tuple(weigh(state, step) for step in state.steps)
+            other = likelier(state, weighed, seen)
+            if other is None:
+                return state, weighed
+            task.progress(f"{' and '.join(step.winner.name for step in other.steps)} is likelier")
+            state = other
 
 
-def _improve(state: Hypothesis, task: Task) -> Hypothesis:
-    """Make the moves that lower the score; readings that were left out may come back with them."""
-    better = improve(state, task.progress, task.rare(state))
-    after = correct(better, task)
-    if after.fit is better.fit:
-        return after
-    return improve(after, task.progress, task.rare(after))
+def _starts(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
+    """Add an effect from a start of its own, where it leaves less of the readings.
 
-
-def _described(state: Hypothesis, task: Task) -> tuple[Hypothesis, Fit | None]:
-    """Describe what the names leave by rare names and a curve; return the fit without the curve.
-
-    None where there is no curve, or no name beside it.
+    Without its phase a model's chi^2 says less than the squares of what it leaves.
     """
-    state = task.scanned(state)
-    while state.remainder.systematic and not _ends_with_curve(state):
-        named = with_errors(state.fit, state.data, state.noise)
-        better = describe(state, state.scan.p_value / CATALOGUE_SHARE, task)
-        if better is state:
-            break
-        state = task.scanned(better)
-        task.progress(f"describing what is left by {state.steps[-1].winner.name}")
-        if _ends_with_curve(state):
-            return state, named
-    return state, None
+    second, before = state.beginning.second_mode, state.fit
+    if second is None or state.steps:
+        return
+    task.progress(f"the turning points beat: fitting {BEATING_MODE.name} first")
+    start = np.concatenate([state.beginning.value, second])
+    model, data, noise = before.model.adding(BEATING_MODE), state.data, state.noise
+    fit = fitted_from(model, data, noise, start, held=state.held)
+    if fit is None:
+        return
+    lead = Lead(BEATING_MODE, (), before.chi2 - fit.chi2, 0.0)
+    rival = Rival.of(lead, fit, before.chi2, Scale.of(fit, data, noise), NO_SCAN)
+    other = replace(state, fit=fit, steps=(Step((rival,), state.unexplained, before),))
+    squares = [np.sum((data.residual(f.at.reading) * data.weight) ** 2) for f in (before, fit)]
+    yield Neighbour(other, float(squares[0] - squares[1]), f"beginning with {rival.name}")
+
+
+def _additions(state: Hypothesis, task: Task, *, names_first: bool = False) -> Iterator[Neighbour]:
+    """Add the effect that leads, or several of which none pays its price before the others."""
+    drawn, chance = _ends_with_curve(state), state.scan.p_value > task.threshold
+    if chance or drawn or len(state.steps) >= _MOST_EFFECTS:
+        return
+    step = leading(state, task, names_first=names_first)
+    if step is None:
+        return
+    if not is_gross(state.fit, state.data) and (kicked := random_torque(state, step.winner, task)):
+        yield Neighbour(kicked, 1.0, "random kicks explain more")
+        return
+    one = adding(state, step)
+    # Of two laws that share a misfit neither may pay its price before the other is there.
+    if one.lower >= -one.state.steps[-1].predicted_worse or not shares_a_misfit(step, state):
+        yield one
+        return
+    trial = task.scanned(correct(one.state.settle(one.state.fit), task))
+    for more in _additions(trial, task, names_first=True):
+        yield _from(state, more)
+
+
+def _from(state: Hypothesis, more: Neighbour) -> Neighbour:
+    """Compare a neighbour of a neighbour with the hypothesis before both."""
+    after = more.state
+    model = state.fit.model.at_times(after.data.time_s)
+    fit = refine(model, after.data, after.noise, state.fit.value, held=state.held, rounds=0)
+    here, there = Proposed(fit, state.steps), Proposed(after.fit, after.steps)
+    (found,) = compared(after, here, [there])
+    return more._replace(lower=found.lower)
+
+
+def _descriptions(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
+    if state.remainder.systematic and not _ends_with_curve(state):
+        yield from describing(state, task)
+
+
+def _ends_with_curve(state: Hypothesis) -> bool:
+    """Whether the last effect is a curve without a name: no name is added after it."""
+    return bool(state.steps) and state.steps[-1].winner.drawn
+
+
+def _judged(state: Hypothesis) -> Hypothesis:
+    """Return it with errors, and with the fit of its names where a curve stands beside them."""
+    named = None
+    if _ends_with_curve(state) and len(state.steps) > 1:
+        named = refit_without(state, state.steps[-1:])
+        named = named and with_errors(named, state.data, state.noise)
+    fit = with_errors(state.fit, state.data, state.noise)
+    return replace(state, fit=fit, baseline=_baseline_alone(state), without_curve=named)
 
 
 def _baseline_alone(state: Hypothesis) -> Fit:
@@ -205,92 +209,3 @@ def _baseline_alone(state: Hypothesis) -> Fit:
     if fit is None:
         raise NoMotionError("it stops")
     return fit
-
-
-def _add_one(state: Hypothesis, task: Task, *, names_first: bool) -> Hypothesis:
-    """Scan the catalogue and add the best effect, or name."""
-    gross, progress = is_gross(state.fit, state.data), task.progress
-    state = task.scanned(state)
-    chance = state.scan.p_value > task.threshold
-    if state.noise.coloured and not state.noise.known and not gross and (chance or not state.steps):
-        state = reconsider_red_noise(state, task.level, task.seed, progress)
-    if state.scan.p_value > task.threshold or _ends_with_curve(state):
-        return state
-    p_value = state.scan.p_value / CATALOGUE_SHARE
-    progress(f"chance does not explain the residual ({printed(p_value)}): refitting leads")
-    rare = [effect for effect in task.rare(state) if effect.rare]
-    unscanned = [*undrawn(FOLLOW_UP_CURVES, state.fit), *rare]
-    closer = more_leads(state.fit, state.noise, unscanned)
-    found = replace(state.scan, leads=(*state.scan.leads, *closer))
-    rivals = refit_leads(
-        state.fit,
-        state.data,
-        state.noise,
-        found,
-        held=state.held,
-        phase_lost=loses_phase(state.fit),
-    )
-    # A rare name is a rival of what it looks like, and leads where `prefer_rare` says so.
-    rivals.sort(key=lambda rival: rival.lead.effect.rare)
-    if rivals:
-        rivals = prefer_parameters(state, rivals)
-    if names_first:
-        rivals.sort(key=lambda rival: rival.drawn)
-    if rivals:
-        rivals = prefer_rare(state, rivals, task)
-    if not rivals:
-        return state
-    if not gross and (kicked := random_torque(state, rivals[0], task)):
-        return kicked
-    step = Step(tuple(rivals), p_value, state.fit)
-    pays = _pays(step, state.steps)
-    if not (_predicts(step, state, progress) if pays else _on_trial(step, state)):
-        return state
-    winner = step.winner
-    released = winner.lead.effect
-    held = state.held
-    if isinstance(released, ReleasedParameter):
-        held = released.without(held)
-    unit, fits = state.data.unit, (state.fit, winner.fit)
-    before, after = (compact(_rms(fit, state.data), unit) for fit in fits)
-    progress(f"adding {winner.name}: the residual falls from {before} to {after} rms")
-    return replace(state, held=held, steps=(*state.steps, step)).settle(winner.fit)
-
-
-def _predicts(step: Step, state: Hypothesis, progress: Progress) -> bool:
-    """Whether an effect predicts cycles left out no worse.
-
-    In a gross misfit it is what is still missing that decides how well cycles are predicted.
-    """
-    best, held = step.winner, state.held
-    effect = best.lead.effect
-    if isinstance(effect, ReleasedParameter):
-        held = effect.without(held)
-    fits = (state.fit, best.fit, state.data, state.noise, state.held, held)
-    if is_gross(state.fit, state.data) or not predicts_worse(*fits, drawn=best.drawn):
-        return True
-    progress(f"{best.name} predicts cycles that are left out worse: it is not added")
-    return False
-
-
-def _on_trial(step: Step, state: Hypothesis) -> bool:
-    """Whether a name that does not pay its price alone takes a good part of a misfit."""
-    best = step.winner
-    before, left = (remainder_of(fit, state.data, state.noise) for fit in (state.fit, best.fit))
-    return best.gain > _GOOD_PART * before.excess and left.systematic and not best.drawn
-
-
-def _pays(step: Step, before: Sequence[Step]) -> bool:
-    """Whether an effect is worth the price of its name."""
-    return step.winner.worth >= price([*before, step]) - price(before)
-
-
-def _rms(fit: Fit, data: Data) -> float:
-    """Root mean square of the readings that count less the model."""
-    residual = data.residual(fit.at.reading)[data.weight > 0.0]
-    return float(np.sqrt(np.mean(residual**2)))
-
-
-def _ends_with_curve(state: Hypothesis) -> bool:
-    """Whether the last effect is a curve without a name: no name is added after it."""
-    return bool(state.steps) and state.steps[-1].winner.lead.effect.kind == "unnamed"

@@ -43,7 +43,7 @@ from pendpipe.diagnosis.result import (
 )
 from pendpipe.diagnosis.rivals import Scale
 from pendpipe.diagnosis.run import LEVEL, diagnose_recording
-from pendpipe.diagnosis.search import LESS_FRICTION, grown
+from pendpipe.diagnosis.search import LESS_FRICTION, run_search
 from pendpipe.diagnosis.statement import DOUBTFUL, statement
 from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.diagnosis.values import constants_of
@@ -51,7 +51,6 @@ from pendpipe.diagnosis.weighing import (
     Weighed,
     effect_named,
     law_of,
-    swap_in_likelier,
     with_other_descriptions,
 )
 from pendpipe.dynamics.any_law import NoMotionError
@@ -386,8 +385,7 @@ def search_together(
     ]
     task = Task(catalogue_beside(restoring), differing, baseline, level, seed, progress)
     state = Hypothesis(beginning, fit, data, noise, tuple(held), fit).settle(fit)
-    state = _known_first(state, task, searches)
-    return swap_in_likelier(grown(state, task), progress)
+    return run_search(_known_first(state, task, searches), task)
 
 
 def _member(outcome: Diagnosis) -> Model:

@@ -1,7 +1,7 @@
 """Final probabilities of each effect and its rivals; likelier rivals are swapped in."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Final, NamedTuple
@@ -9,7 +9,6 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Step, is_further, is_gross
 from pendpipe.diagnosis.instants import with_instants
 from pendpipe.diagnosis.location import locate
@@ -311,50 +310,23 @@ def _is_of(fit: Fit, without: Fit, effect: Effect, found: Hypothesis) -> bool:
     return False
 
 
-def swap_in_likelier(
-    found: Hypothesis, progress: Progress = silent
-) -> tuple[Hypothesis, tuple[Weighed, ...]]:
-    """Replace each added effect by a likelier rival, if there is one, and weigh all steps.
-
-    The last goes first. After a replacement all are weighed anew: what each was compared beside has
-    changed.
+def likelier(
+    found: Hypothesis, weighed: Sequence[Weighed], seen: Container[object]
+) -> Hypothesis | None:
+    """Exchange an effect for a likelier rival: the last that has one, if the set is new.
 
     A search adds what reduces a gross misfit most. Where much remains unexplained, a slightly
     larger gain means nothing and the prior decides; and effects added later, or the final
-    estimate of the noise, may have changed the odds.
-
-    Returns
-    -------
-    Hypothesis
-        With the swaps made.
-    tuple of Weighed
-        One for each of its steps.
+    estimate of the noise, may have changed the odds. Names under a curve stay: their probabilities
+    show how little they explain.
     """
-    # Names under a curve stay: their probabilities show how little they explain.
-    may_change = found.named.model is found.fit.model
-    tried: list[set[str]] = []
-    while True:
-        tried.append({effect.key for effect in found.fit.model.effects})
-        weighed: list[Weighed] = []
-        for number in reversed(range(len(found.steps))):
-            weighed.append(weigh(found, found.steps[number]))
-            likelier = may_change and _with_a_likelier(found, number, weighed[-1], tried)
-            if likelier:
-                name, found = found.steps[number].winner.name, likelier
-                progress(f"replacing {name} by {found.steps[number].winner.name}: it is likelier")
-                break
-        else:
-            return found, tuple(reversed(weighed))
-
-
-def _with_a_likelier(
-    found: Hypothesis, number: int, weighed: Weighed, tried: Sequence[set[str]]
-) -> Hypothesis | None:
-    """Exchange a step's winner for a likelier rival, if there is one, and the set is new."""
-    best = _likelier(found, found.steps[number], weighed)
-    after = _exchanged(found, number, best, weighed) if best else None
-    if after and {effect.key for effect in after.fit.model.effects} not in tried:
-        return after
+    if found.without_curve is not None:
+        return None
+    for number in reversed(range(len(found.steps))):
+        best = _likelier(found, found.steps[number], weighed[number])
+        after = _exchanged(found, number, best, weighed[number]) if best else None
+        if after and after.key not in seen:
+            return after
     return None
 
 

@@ -1,12 +1,10 @@
-"""Sets of effects: their score, and the moves from one set to a better one.
+"""The neighbours of a set of effects, and the one score that compares them (docs/score.md).
 
-The score of a set is
+    S = lost(chi^2) + the charges of its effects + the price of each name
 
-    S = lost(chi^2) + the charges of its effects + the price of each further name,
-
-and the set with the smallest S is the answer. `lost` is the fall of the log-likelihood against
-the best set (`rivals.Scale`): chi^2 itself where the best leaves noise alone. The charge of an
-effect is that of its scan, shapes and sizes, less its prior (`rivals.Rival.charge`).
+`lost` is the fall of the log-likelihood against the best of the sets compared (`rivals.Scale`):
+chi^2 itself where that leaves noise alone. The charge of an effect is that of its scan, shapes and
+sizes, less its prior (`rivals.Rival.charge`), with what its set predicts worse of cycles left out.
 """
 
 import math
@@ -18,7 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis import Progress
+from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import (
     CATALOGUE_SHARE,
     RED_NOISE_SHARE,
@@ -26,8 +24,10 @@ from pendpipe.diagnosis.detect import (
     Trials,
     build_bank,
     detect,
+    more_leads,
     prepare,
 )
+from pendpipe.diagnosis.held_out import predicted_worse
 from pendpipe.diagnosis.hypothesis import (
     CHOICE,
     FURTHER,
@@ -35,6 +35,8 @@ from pendpipe.diagnosis.hypothesis import (
     Step,
     Task,
     is_further,
+    is_gross,
+    loses_phase,
     price,
     price_of_another,
     settled,
@@ -42,6 +44,7 @@ from pendpipe.diagnosis.hypothesis import (
 )
 from pendpipe.diagnosis.refine import Fit, best_fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
+from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.rivals import (
     NO_SCAN,
     SIZE_CHARGE,
@@ -54,6 +57,7 @@ from pendpipe.diagnosis.rivals import (
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
+from pendpipe.quantities import compact
 
 
 def prefer_parameters(state: Hypothesis, rivals: Sequence[Rival]) -> list[Rival]:
@@ -132,9 +136,7 @@ def _unit(rival: Rival) -> float:
     return rival.gain / rival.worth if rival.worth > 0.0 else 1.0
 
 
-def reconsider_red_noise(
-    state: Hypothesis, level: float, seed: int, progress: Progress
-) -> Hypothesis:
+def with_other_noise(state: Hypothesis, task: Task) -> Hypothesis:
     """Test whether apparent red noise is an effect, and re-estimate the noise if so.
 
     No tone is asked: red noise has no line. The best effect for noise that is not red is fitted,
@@ -142,18 +144,14 @@ def reconsider_red_noise(
     together are more likely by a factor 1/p, where p is this test's part of the significance level:
     a normalised density exceeds that of the true model by 1/p with a probability of at most p
     (Markov).
-
-    Parameters
-    ----------
-    state
-        The search so far, with its scan; that and the noise are replaced.
-    level, seed
-        The significance level; the seed of the draws that count trials.
-    progress
-        Receives one line.
     """
+    chance = state.scan.p_value > task.threshold
+    asked = state.noise.coloured and not state.noise.known and (chance or not state.steps)
+    if not asked or is_gross(state.fit, state.data):
+        return state
+    level, seed = task.level, task.seed
     share = level * RED_NOISE_SHARE
-    progress("testing whether the red noise is a drift or a step")
+    task.progress("testing whether the red noise is a drift or a step")
     assert state.scanned is not None
     effects = [each for each in state.scanned[-1] if each.kind != "unnamed" and not each.spectral]
     fit, data, noise = settled(state.fit, state.data, state.noise, state.held, red=False)
@@ -191,9 +189,19 @@ def _charge(state: Hypothesis, rivals: Sequence[Rival]) -> float:
     return 2.0 * math.log(tried) + effect.sizes * math.log(gain)
 
 
-_MOST_MOVES: Final = 6
 _MOST_RARE: Final = 2
 """Rare names that may take the place of one curve."""
+_GOOD_PART: Final = 1.0 / 3.0
+"""Of a misfit, that one of a few laws takes which share it."""
+
+
+class Neighbour(NamedTuple):
+    """A hypothesis one step away, whose noise is yet to be estimated anew."""
+
+    state: Hypothesis
+    lower: float
+    """By how much its score is lower."""
+    words: str
 
 
 class Proposed(NamedTuple):
@@ -204,40 +212,92 @@ class Proposed(NamedTuple):
     words: str = ""
 
 
-def improve(state: Hypothesis, progress: Progress, rare: Sequence[Effect] = ()) -> Hypothesis:
-    """Make the best move, again and again, until none lowers the score.
-
-    `rare` are the names that may take the place of a curve.
-    """
-    for _ in range(_MOST_MOVES):
-        here = Proposed(state.fit, state.steps)
-        there = [*_drops(state), *_curves_for_names(state), *_rare_for_a_curve(state, rare)]
-        best = _best(here, there, state)
-        if best is here:
-            return state
-        progress(best.words)
-        state = replace(state, steps=best.steps).settle(best.fit)
-    return state
-
-
-def _best(here: Proposed, there: Sequence[Proposed], state: Hypothesis) -> Proposed:
-    """Return the set of the smallest score; `here` if no other is smaller."""
-    found = [here, *there]
-    best = min(found, key=lambda each: each.fit.chi2)
+def compared(state: Hypothesis, here: Proposed, there: Sequence[Proposed]) -> Iterator[Neighbour]:
+    """Compare sets of effects with the present one by their scores."""
+    best = min((here, *there), key=lambda each: each.fit.chi2)
     scale = Scale.of(best.fit, state.data, state.noise)
-    return min(found, key=lambda each: scale.lost_by(each.fit) + price(each.steps))
+
+    def score(each: Proposed) -> float:
+        return scale.lost_by(each.fit) + price(each.steps)
+
+    for each in there:
+        other = replace(state, fit=each.fit, steps=each.steps)
+        yield Neighbour(other, score(here) - score(each), each.words)
+
+
+def simpler(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
+    """Drop an effect, or exchange several for a curve, or a curve for rare names."""
+    rare = task.rare(state)
+    there = [*_drops(state), *_curves_for_names(state), *_rare_for_a_curve(state, rare)]
+    return compared(state, Proposed(state.fit, state.steps), there)
+
+
+def leading(state: Hypothesis, task: Task, *, names_first: bool) -> Step | None:
+    """Refit what the scan asks for; return it as a step, the effect to add first."""
+    rare = [effect for effect in task.rare(state) if effect.rare]
+    unscanned = [*undrawn(FOLLOW_UP_CURVES, state.fit), *rare]
+    closer = more_leads(state.fit, state.noise, unscanned)
+    rivals = refit_leads(
+        state.fit,
+        state.data,
+        state.noise,
+        replace(state.scan, leads=(*state.scan.leads, *closer)),
+        held=state.held,
+        phase_lost=loses_phase(state.fit),
+    )
+    if not rivals:
+        return None
+    # A rare name is a rival of what it looks like, and leads where `prefer_rare` says so.
+    rivals = prefer_parameters(state, sorted(rivals, key=lambda rival: rival.lead.effect.rare))
+    if names_first:
+        rivals.sort(key=lambda rival: rival.drawn)
+    return Step(tuple(prefer_rare(state, rivals, task)), state.unexplained, state.fit)
+
+
+def adding(state: Hypothesis, step: Step) -> Neighbour:
+    """Add a step's leader. What its set predicts worse of cycles left out counts against it.
+
+    Where it does not pay that is not asked; nor in a gross misfit, where it is what is still
+    missing that decides how well cycles are predicted.
+    """
+    winner, steps = step.winner, (*state.steps, step)
+    effect, held = winner.lead.effect, state.held
+    if isinstance(effect, ReleasedParameter):
+        held = tuple(effect.without(held))
+    lower = winner.worth - (price(steps) - price(state.steps))
+    if lower >= 0.0 and not is_gross(state.fit, state.data):
+        worse = predicted_worse(
+            state.fit,
+            winner.fit,
+            state.data,
+            state.noise,
+            state.held,
+            held,
+            drawn=winner.drawn,
+        )
+        lower, steps = lower - worse, (*state.steps, replace(step, predicted_worse=worse))
+    other = replace(state, fit=winner.fit, steps=steps, held=held)
+    unit = state.data.unit
+    before, after = (compact(_rms(fit, state.data), unit) for fit in (state.fit, winner.fit))
+    words = f"adding {winner.name}: the residual falls from {before} to {after} rms"
+    return Neighbour(other, lower, words)
+
+
+def shares_a_misfit(step: Step, state: Hypothesis) -> bool:
+    """Whether a name takes a good part of a misfit, of which another law may take the rest."""
+    best = step.winner
+    before, left = (remainder_of(fit, state.data, state.noise) for fit in (state.fit, best.fit))
+    return best.gain > _GOOD_PART * before.excess and left.systematic and not best.drawn
+
+
+def _rms(fit: Fit, data: Data) -> float:
+    """Root mean square of the readings that count less the model."""
+    residual = data.residual(fit.at.reading)[data.weight > 0.0]
+    return float(np.sqrt(np.mean(residual**2)))
 
 
 def _drops(state: Hypothesis) -> Iterator[Proposed]:
-    """Drop one effect.
-
-    The last one, which was significant, is not dropped where it leaves only noise, unless a fault
-    of the measurement was found after it.
-    """
-    clean = Scale.of(state.fit, state.data, state.noise).clean
-    joined = any(fault.after == len(state.steps) for fault in state.faults)
-    if clean and len(state.steps) < 2 and not joined:
-        return
+    """Drop one effect; what was held may not be held again."""
     for step in state.steps:
         effect = step.winner.lead.effect
         if isinstance(effect, ReleasedParameter):
@@ -319,24 +379,22 @@ def refit_without(state: Hypothesis, steps: Sequence[Step]) -> Fit | None:
     return best_fit(model, state.data, state.noise, [value, bare], held=state.held)
 
 
-def describe(state: Hypothesis, p_value: float, task: Task) -> Hypothesis:
-    """Add what describes best what is left, a curve or a rare name, if that lowers the score.
+def describing(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
+    """Describe what is left by the best curve, or a rare name.
 
-    Where nothing but sin x was found in what chance does not explain, the best curve says so.
+    Where nothing was found in what chance does not explain, a curve says so, whatever it is worth.
     """
     curves = [(curve, np.zeros(curve.count)) for curve in _curves(state.fit, state, in_time=True)]
     fits = [fit for pair in curves if (fit := _with(state.fit, *pair, state))]
     if not fits:
-        return state
+        return
     scale = Scale.of(min(fits, key=lambda fit: fit.chi2), state.data, state.noise)
     rivals = ranked([_rival(state.fit, fit, scale) for fit in fits])
-    found = [*filter(is_further, state.steps), *state.faults]
-    needed = not found and p_value < task.level
-    if rivals[0].evidence <= CHOICE and not needed:
-        return state
-    rivals = prefer_rare(state, rivals, task)
-    step = Step(tuple(rivals), p_value, state.fit)
-    return replace(state, steps=(*state.steps, step)).settle(rivals[0].fit)
+    found = any(map(is_further, state.steps)) or state.faults
+    step = Step(tuple(prefer_rare(state, rivals, task)), state.unexplained, state.fit)
+    lower = rivals[0].evidence - CHOICE if found else math.inf
+    other = replace(state, fit=step.winner.fit, steps=(*state.steps, step))
+    yield Neighbour(other, lower, f"describing what is left by {step.winner.name}")
 
 
 def prefer_rare(state: Hypothesis, rivals: Sequence[Rival], task: Task) -> list[Rival]:

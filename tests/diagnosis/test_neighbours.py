@@ -13,17 +13,16 @@ from scipy.interpolate import CubicSpline
 
 from pendpipe.analysis.turning_points.measure import prepare as prepare_samples
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis import silent
 from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.faults import _applied
 from pendpipe.diagnosis.hypothesis import CHOICE, FURTHER, Hypothesis, Step, price
-from pendpipe.diagnosis.moves import describe, improve
+from pendpipe.diagnosis.neighbours import describing, shares_a_misfit, simpler
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import Finding
 from pendpipe.diagnosis.rivals import NO_SCAN, Rival, Scale, lines, off_harmonics
 from pendpipe.diagnosis.run import diagnose_recording
-from pendpipe.diagnosis.search import _on_trial
+from pendpipe.diagnosis.search import run_search
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
@@ -74,6 +73,14 @@ def state_with(readings: FloatArray, *names: str) -> Hypothesis:
     return hypothesis_of(fit, data, noise, (), bare, steps=tuple(steps))
 
 
+def simplified(state: Hypothesis) -> Hypothesis:
+    """Make the best of the moves that lower the score, until none does."""
+    while better := [each for each in simpler(state, task_of()) if each.lower > 0.0]:
+        best = max(better, key=lambda each: each.lower).state
+        state = best.settle(best.fit)
+    return state
+
+
 @given(scale=SCALES, behind=st.floats(0.0, 1e6))
 def test_what_a_model_loses_grows_with_chi2_and_never_exceeds_it(
     scale: Scale, behind: float
@@ -108,7 +115,7 @@ def test_a_magnet_may_be_a_restoring_torque_without_a_name() -> None:
 def test_two_names_for_one_law_give_way_to_a_curve() -> None:
     state = state_with(pulled() + white(6), "frequency-drift", "cubic-stiffness")
     before = state.fit.chi2
-    state = improve(state, silent)
+    state = simplified(state)
     assert [step.winner.identifier for step in state.steps] == ["unnamed-restoring"]
     assert state.fit.chi2 < before + FURTHER + 18.0
 
@@ -136,7 +143,7 @@ def test_each_further_name_has_its_price_and_sin_x_has_none() -> None:
 def test_a_name_that_leaves_noise_stays() -> None:
     state = state_with(with_effects("sensor-quadratic") + white(5), "sensor-quadratic")
     before = state.fit
-    state = improve(state, silent)
+    state = simplified(state)
     assert state.fit is before
 
 
@@ -161,7 +168,7 @@ def test_what_chance_does_not_explain_is_never_called_consistent(first_hz: float
 def test_a_second_name_that_the_readings_do_not_need_is_dropped() -> None:
     readings = with_effects("sensor-quadratic") + white(5)
     state = state_with(readings, "sensor-quadratic", "tone-pickup")
-    state = improve(state, silent)
+    state = simplified(state)
     assert [step.winner.identifier for step in state.steps] == ["sensor-quadratic"]
 
 
@@ -235,7 +242,10 @@ def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
     data, noise = prepared(other_engine(TRUTH) + bent + white(6))
     fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
     before = remainder_of(fit, data, noise)
-    state = describe(hypothesis_of(fit, data, noise, (), fit), 1e-9, task_of())
+    state = task_of().scanned(hypothesis_of(fit, data, noise, (), fit))
+    (drawn,) = describing(state, task_of())
+    assert drawn.lower > 0.0
+    state = drawn.state
     assert state.steps[-1].winner.lead.effect.kind == "unnamed"
     after = remainder_of(state.fit, state.data, state.noise)
     assert after.excess < 0.2 * before.excess
@@ -249,14 +259,16 @@ def test_what_is_left_is_described_where_only_sin_x_was_found() -> None:
     fit = refine(model, data, noise, value)
     known = Step((Rival(Lead(sine, (), 9.0, 0.0), fit, 9.0, 9.0, 9.0),), 0.0, fit)
     bare = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
-    state = describe(hypothesis_of(fit, data, noise, (), bare, steps=(known,)), 1e-9, task_of())
-    assert state.steps[-1].winner.drawn
+    state = task_of().scanned(hypothesis_of(fit, data, noise, (), bare, steps=(known,)))
+    (drawn,) = describing(state, task_of())
+    assert drawn.lower > 0.0
+    assert drawn.state.steps[-1].winner.drawn
 
 
 def test_noise_is_not_described() -> None:
     fit, data, noise = null_fit()
-    state = hypothesis_of(fit, data, noise, (), fit)
-    assert describe(state, 0.1, task_of()) is state
+    state, _ = run_search(hypothesis_of(fit, data, noise, (), fit), task_of())
+    assert state.steps == ()
 
 
 def test_a_step_and_a_tone_are_both_named_and_no_curve_instead() -> None:
@@ -346,4 +358,4 @@ def test_a_name_is_tried_on_credit_if_it_takes_a_good_part_of_the_misfit(
     lead = Lead(by_identifier("impulse"), (), 0.0, 0.0)
     step = Step((Rival(lead, state.fit, part * excess, worth, worth),), 0.0, state.fit)
     assert worth < CHOICE
-    assert _on_trial(step, state) == tried
+    assert shares_a_misfit(step, state) == tried
