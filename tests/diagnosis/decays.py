@@ -11,7 +11,8 @@ from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise
+from pendpipe.diagnosis.noise import Noise, white_noise
+from pendpipe.diagnosis.noise_estimate import estimate_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.model import Model

@@ -12,7 +12,7 @@ from scipy.stats import binom
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.forensics.colour import wander_note
-from pendpipe.diagnosis.noise import estimate_noise
+from pendpipe.diagnosis.noise_estimate import estimate_noise
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.recording import Recording
 

@@ -13,7 +13,8 @@ from scipy.signal import lfilter
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.noise import Noise, _about_lines, estimate_noise, white_noise
+from pendpipe.diagnosis.noise import Noise, white_noise
+from pendpipe.diagnosis.noise_estimate import _about_lines, estimate_noise
 
 COUNT, INTERVAL_S, MOTION_HZ = 1500, 1.0 / 15.0, 0.9
 FREQUENCY_HZ = np.arange(COUNT) / (2.0 * COUNT * INTERVAL_S)

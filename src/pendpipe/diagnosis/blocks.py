@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,9 @@ from scipy.fft import idct
 
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Evaluation, Fit
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.refine import Fit
 
 _MANY: Final = 16_000
 """Readings from which on they are compared in blocks."""
@@ -140,9 +142,8 @@ def blocks_of(fit: Fit, noise: Noise) -> Blocks:
     )
     model, value = fit.model, fit.value
     at = fit.at.thinned(every, rows.reshape(-1), lambda motion: model.acceleration(motion, value))
-    numbers, slip = own.numbers_of(fit.residual), fit.max_phase_error_rad
-    evaluation = Evaluation(value, at, numbers, slip, model, own)
-    return Blocks(replace(fit, evaluation=evaluation), own)
+    compared = replace(fit.evaluation, at=at, residual=own.numbers_of(fit.residual), noise=own)
+    return Blocks(replace(fit, evaluation=compared), own)
 
 
 def _harmonic_sums(

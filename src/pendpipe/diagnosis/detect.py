@@ -188,7 +188,7 @@ def _beside(
 
 
 def _orthonormal(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Make each shape's columns orthonormal in their order (Gram and Schmidt), in place.
+    """Make each shape's columns orthonormal in their order.
 
     Returns
     -------
@@ -196,15 +196,9 @@ def _orthonormal(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
         Shape (shapes, width, n + 1), and what of each column is left beside those before it,
         shape (shapes, width).
     """
-    lengths = np.zeros(columns.shape[:2])
-    for place in range(columns.shape[1]):
-        own, before = columns[:, place], columns[:, :place]
-        # Twice is enough (Kahan).
-        for _ in range(2 if place else 0):
-            own -= np.matmul(np.matmul(before, own[..., None])[:, None, :, 0], before)[:, 0]
-        lengths[:, place] = np.linalg.norm(own, axis=1)
-        own /= np.where(lengths[:, place] > 0.0, lengths[:, place], 1.0)[:, None]
-    return columns, lengths
+    units, triangle = np.linalg.qr(np.swapaxes(columns, 1, 2))
+    diagonal = np.einsum("kii->ki", triangle)
+    return np.swapaxes(units * np.sign(diagonal)[:, None], 1, 2), np.abs(diagonal)
 
 
 def _shapes(effect: Effect, span: Span) -> list[tuple[float, ...]]:

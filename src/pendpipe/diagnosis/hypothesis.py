@@ -17,7 +17,8 @@ from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data, with_lattice
 from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Detection, detect, prepare
 from pendpipe.diagnosis.instants import with_better_instants
-from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise
+from pendpipe.diagnosis.noise import Noise, white_noise
+from pendpipe.diagnosis.noise_estimate import estimate_noise
 from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR, Fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import INCOMPLETE, Remainder, remainder_of

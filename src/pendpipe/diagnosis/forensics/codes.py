@@ -1,24 +1,24 @@
 """Codes of a converter: their lattice, rounding, and the angles that the motion had."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from scipy.special import ndtr
 
+from pendpipe.analysis.fit.by_waveform import best_noise
 from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.local import Local, error_of, local_residual
-from pendpipe.diagnosis.refine import Fit
 from pendpipe.dynamics.any_law import lagrange
 
-_NOISE_RATIOS: Final = np.array(
-    [0.03, 0.05, 0.07, 0.1, 0.13, 0.16, 0.2, 0.24, 0.28, 0.33, 0.38, 0.44, 0.5, 0.56]
-)
-"""Noise before rounding, in steps, at which the likelihood is computed."""
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.refine import Fit
+
 _DITHERED: Final = 0.6
 """Rms of the errors in steps from which rounding is dithered."""
 _FIRST_CODES: Final = 256
@@ -161,11 +161,10 @@ def whole_readings(data: Data, samples: Samples) -> slice | None:
 
 
 def noise_before_rounding(local: Local, step: float) -> float:
-    """Estimate the noise before rounding by maximum likelihood, from P(code).
+    """Estimate the noise before rounding by maximum likelihood, as a fit does (`best_noise`).
 
-    The likelihood is that of `fit.by_waveform`, but the true angle comes from local fits and
-    has their noise. So each reading has its own standard deviation, and outliers (glitches) are
-    left out.
+    Outliers (glitches) are left out. The true angle comes from local fits, which take part of the
+    noise.
 
     Parameters
     ----------
@@ -177,14 +176,9 @@ def noise_before_rounding(local: Local, step: float) -> float:
     if local.rms > _DITHERED * step:
         # Rounding is dithered: variances add.
         return math.sqrt(local.rms**2 - step**2 / 12.0)
-    left = local.left[local.used] / step
-    near = np.abs(left) < 5.0 * local.rms / step + 1.0
-    left = left[near]
-    extra = np.maximum(local.leverage[local.used][near], -0.9)
-    spread = _NOISE_RATIOS[:, None] * np.sqrt(1.0 + extra)
-    chance = ndtr((left + 0.5) / spread) - ndtr((left - 0.5) / spread)
-    likelihood = np.sum(np.log(np.maximum(chance, 1e-12)), axis=1)
-    return float(_NOISE_RATIOS[np.argmax(likelihood)]) * step
+    near = local.used & (np.abs(local.left) < 5.0 * local.rms + step)
+    kept = 1.0 + float(np.mean(np.maximum(local.leverage[near], -0.9)))
+    return best_noise(local.left[near], step, 0.1 * step) / math.sqrt(kept)
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,12 @@ Under a random torque amplitude and phase perform a random walk, which colours t
 the pendulum's frequency; the density of coloured noise there differs from its mean.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from scipy.fft import dct
@@ -20,11 +22,13 @@ from pendpipe.diagnosis.detect import tangent_basis
 from pendpipe.diagnosis.forensics.local import residual_of
 from pendpipe.diagnosis.forensics.tails import tail_of_squares, upper_tail
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Finding, Location
 from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, compact
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.refine import Fit
 
 _HARMLESS_RATIO: Final = 1.5
 """Ratio of densities below which the colour changes no conclusion."""
@@ -140,7 +144,7 @@ class Shapes(NamedTuple):
     square: FloatArray
 
     @property
-    def smoother(self) -> "Shapes":
+    def smoother(self) -> Shapes:
         """The same squares, of fluctuations that are smoother than a random walk."""
         return Shapes(self.weight**2, self.square)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 import numpy as np
 from scipy.fft import irfft, rfft
@@ -25,10 +25,12 @@ from pendpipe.diagnosis.forensics.codes import (
 from pendpipe.diagnosis.forensics.local import local_residual
 from pendpipe.diagnosis.forensics.tails import upper_tail
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Finding, Location
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.refine import Fit
 
 _FEWEST_AT_END: Final = 2
 """Readings exactly at the end of the range that make a flat top."""

@@ -6,10 +6,12 @@ quadratures of the fundamental with their slopes are fitted and subtracted (and 
 third harmonic where these are significant).
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy.fft import dct, idct
@@ -17,8 +19,10 @@ from scipy.fft import dct, idct
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.unwrapped import unwrapped
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.refine import Fit
 
 _WINDOW_CYCLES: Final = 2
 _WINDOW_READINGS: Final = 40

@@ -1,7 +1,9 @@
 """Sampling times: gaps, stamps less regular than the readings themselves, and jitter."""
 
+from __future__ import annotations
+
 import math
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -12,10 +14,12 @@ from pendpipe.diagnosis.forensics.codes import read_codes
 from pendpipe.diagnosis.forensics.local import local_residual, residual_of, whitened_series
 from pendpipe.diagnosis.forensics.tails import tail_of_squares, upper_tail
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Finding, Location
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import with_error
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.refine import Fit
 
 _LARGEST_DEVIATION: Final = 0.25
 """Largest deviation from a regular clock, in intervals."""
