@@ -63,27 +63,42 @@ def test_a_fault_is_found_and_no_other(fault: str, clean: FloatArray) -> None:
     assert all(told[name].unit == unit for name, unit in declared.items() if name in told)
 
 
-def test_glitches_are_counted_and_masked(clean: FloatArray) -> None:
-    where = np.array([5, 700, 701, 2000, 3998])
-    readings = clean + white(generator(), AIR.count)
-    readings[where] += np.array([1.0, -1.0, 1.0, 1.0, -1.0]) * 15.0 * NOISE
-    finding = found(fitted(AIR, readings))["glitches"]
+GLITCHES = {
+    "of either sign, two on end": ([5, 700, 701, 2000, 3998], [1.0, -1.0, 1.0, 1.0, -1.0], 15.0),
+    # Seven standard deviations: one is as rare as 3e-12, and two make no tail.
+    **{
+        f"{number} of one size": (np.linspace(300, 3700, number).astype(int).tolist(), [1.0], 7.0)
+        for number in range(1, 6)
+    },
+}
+
+
+@pytest.mark.parametrize("kind", GLITCHES)
+def test_glitches_are_counted_and_masked(kind: str, clean: FloatArray) -> None:
+    where, signs, size = GLITCHES[kind]
+    noise = white(generator(3), AIR.count)
+    noise[where] = size * NOISE * np.resize(signs, len(where))
+    finding = found(fitted(AIR, clean + noise))["glitches"]
     assert finding.mask is not None
-    assert np.flatnonzero(finding.mask).tolist() == where.tolist()
+    assert np.flatnonzero(finding.mask).tolist() == where
     assert finding.parameters["number"].value == len(where)
-    assert finding.parameters["rms"].value == pytest.approx(15.0 * NOISE, rel=0.15)
-    assert finding.location.time_s == (AIR.times()[5], AIR.times()[3998])
+    assert finding.parameters["rms"].value == pytest.approx(size * NOISE, rel=0.15)
+    assert finding.location.time_s == (AIR.times()[where[0]], AIR.times()[where[-1]])
 
 
-@pytest.mark.parametrize("number", [1, 2, 3, 4, 5])
-def test_few_glitches_of_one_size_are_not_taken_for_a_tail(number: int, clean: FloatArray) -> None:
-    """Seven standard deviations: one is as rare as 3e-12, and two make no tail."""
-    where = np.linspace(300, AIR.count - 300, number).astype(int)
-    readings = clean + white(generator(3), AIR.count)
-    readings[where] = clean[where] + 7.0 * NOISE
-    finding = found(fitted(AIR, readings))["glitches"]
-    assert finding.mask is not None
-    assert np.flatnonzero(finding.mask).tolist() == where.tolist()
+def test_glitches_stand_out_of_noise_with_memory_and_of_a_sensor_that_bends(
+    clean: FloatArray,
+) -> None:
+    """Wrong readings at random places are masked; those at the tops are left to the sensor."""
+    noisy = clean + white(generator(), AIR.count)
+    remembering = FAULTS["memory 0.5"].make(clean, generator()).data.values.copy()
+    bent = noisy - 1e-3 * np.exp((clean - clean.max()) / 1e-3)
+    assert "glitches" not in found(fitted(AIR, bent))
+    for readings, where, size in ((remembering, [300, 2500], 20), (noisy, [700, 1501, 2600], 12)):
+        readings[where] -= size * NOISE
+        finding = found(fitted(AIR, readings))["glitches"]
+        assert finding.mask is not None
+        assert np.flatnonzero(finding.mask).tolist() == where
 
 
 def test_more_glitches_are_more_certain() -> None:
@@ -94,15 +109,6 @@ def test_more_glitches_are_more_certain() -> None:
         error[number - 1] = 8.0
         chances.append(_smallest_p_value(np.sort(error), 0.0))
     assert all(np.diff(np.log(chances)) < 0.0)
-
-
-def test_glitches_stand_out_of_noise_with_memory(clean: FloatArray) -> None:
-    noisy, where = FAULTS["memory 0.5"].make(clean, generator()), [300, 2500]
-    readings = noisy.data.values.copy()
-    readings[where] += 20.0 * NOISE
-    finding = found(fitted(AIR, readings))["glitches"]
-    assert finding.mask is not None
-    assert np.flatnonzero(finding.mask).tolist() == where
 
 
 def test_a_step_of_the_offset_is_not_a_glitch(clean: FloatArray) -> None:
@@ -313,19 +319,6 @@ def test_the_range_of_averaged_readings_is_tested() -> None:
     assert clipping.mask is not None
     assert clipping.mask.shape == record.data.values.shape
     assert 20 < np.count_nonzero(clipping.mask) < 0.1 * len(record.data)
-
-
-def test_a_sensor_that_bends_at_its_end_makes_no_glitches(clean: FloatArray) -> None:
-    """Wrong readings at random places are masked; those at the tops are left to the sensor."""
-    bent = clean - 1e-3 * np.exp((clean - clean.max()) / 1e-3)
-    finding = found(fitted(AIR, bent + white(generator(), AIR.count))).get("glitches")
-    assert finding is None
-    where = np.array([700, 1501, 2600])
-    readings = clean + white(generator(), AIR.count)
-    readings[where] -= 12.0 * NOISE
-    finding = found(fitted(AIR, readings))["glitches"]
-    assert finding.mask is not None
-    assert np.flatnonzero(finding.mask).tolist() == where.tolist()
 
 
 def test_glitches_need_no_model(clean: FloatArray) -> None:

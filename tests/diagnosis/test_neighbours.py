@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from pendpipe.analysis.turning_points.measure import prepare as prepare_samples
@@ -41,6 +41,7 @@ from .records import (
     prepared,
     pulled,
     recording,
+    swung,
     task_of,
     white,
     with_effects,
@@ -293,15 +294,10 @@ def test_a_rolling_shutter_is_no_second_mode() -> None:
 
 
 def test_a_torque_with_the_square_of_the_swing_is_no_second_plane() -> None:
-    time_s, omega, kappa, loss = np.arange(0.0, 40.0, 0.025), 4.54, -0.0191, 0.009
-
-    def motion(_: float, state: FloatArray) -> list[float]:
-        x, v = state
-        return [v, -(omega**2) * (np.sin(x) + kappa * x * abs(x)) - 2.0 * loss * v]
-
-    swing = solve_ivp(motion, (0.0, 40.0), [0.68, 0.0], t_eval=time_s, rtol=1e-9, atol=1e-10)
+    time_s, kappa = np.arange(0.0, 40.0, 0.025), -0.0191
+    angle = swung(time_s, 0.68, 4.54, 0.009, torque=lambda x: math.sin(x) + kappa * x * abs(x))[0]
     noise = 5e-4 * np.random.default_rng(1).standard_normal(len(time_s))
-    outcome = diagnose_recording(Recording(time_s, swing.y[0] + noise, "angle_rad"))
+    outcome = diagnose_recording(Recording(time_s, angle + noise, "angle_rad"))
     names = [each.identifier for each in outcome.effects]
     assert names == ["circular-error", "amplitude-linear-stiffness"]
     found = outcome.effects[1].parameters["kappa"]

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import white_noise
@@ -15,6 +14,8 @@ from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.effects.model import Model
 
+from .records import swung
+
 RATE_HZ, NOISE_RAD, LINEAR = 20.0, 1e-3, 0.012
 OMEGA_TRUE = 6.1
 TIME_S = np.arange(2400) / RATE_HZ
@@ -22,15 +23,8 @@ TIME_S = np.arange(2400) / RATE_HZ
 
 def test_circular_error_at_1_4_rad_is_found_from_a_frequency_that_is_12_percent_off() -> None:
     """The first cycles' own frequency is omega (1 - A^2/16): over 120 s that is 11 turns off."""
-
-    def rate(_: float, state: np.ndarray) -> list[float]:
-        x, v = state
-        return [v, -(OMEGA_TRUE**2) * math.sin(x) - 2.0 * LINEAR * v]
-
-    solved = solve_ivp(
-        rate, (0.0, TIME_S[-1]), [1.4, 0.0], "DOP853", t_eval=TIME_S, rtol=1e-10, atol=1e-12
-    )
-    values = solved.y[0] + NOISE_RAD * np.random.default_rng(4).standard_normal(len(TIME_S))
+    angle = swung(TIME_S, 1.4, OMEGA_TRUE, LINEAR)[0]
+    values = angle + NOISE_RAD * np.random.default_rng(4).standard_normal(len(TIME_S))
     data = Data(TIME_S, values, 1.0 / RATE_HZ, True, np.ones(len(TIME_S)))
     model = Model(TIME_S, 1.0 / RATE_HZ, (circular_error,), order=20)
     slow = OMEGA_TRUE * (1.0 - 1.4**2 / 16.0)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray, IntArray
@@ -22,6 +20,8 @@ from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
 
+from .records import swung
+
 OMEGA, LOSS, START, COUNT, RATE_HZ = 5.0, 0.004, 0.6, 0.02, 60.0
 
 
@@ -35,16 +35,7 @@ class Swing(NamedTuple):
 @pytest.fixture(scope="module")
 def swing() -> Swing:
     time = np.arange(0.0, 62.0, 1e-3)
-    found = solve_ivp(
-        lambda _, y: [y[1], -(OMEGA**2) * math.sin(y[0]) - 2.0 * LOSS * y[1]],
-        (0.0, 62.0),
-        [START, 0.0],
-        "DOP853",
-        t_eval=time,
-        rtol=1e-9,
-        atol=1e-11,
-    )
-    return Swing(time, found.y[0])
+    return Swing(time, swung(time, START, OMEGA, LOSS)[0])
 
 
 def counted(swing: Swing, level: FloatArray) -> Samples:
