@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -287,10 +288,14 @@ def test_a_scan_keeps_most_of_what_lies_between_its_rows(identifier: str) -> Non
     assert min(best) > 0.6
 
 
-def test_a_misspelt_declaration_is_refused() -> None:
-    """A word that no effect has would be lost otherwise."""
-    with pytest.raises(TypeError, match=r"push: an effect has no equatoin"):
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [({"equatoin": "y = x"}, "has no equatoin"), ({"name": "a push"}, "needs equation, discrim")],
+)
+def test_a_declaration_that_is_misspelt_or_short_is_refused(given: Any, said: str) -> None:
+    """Else a word would be lost, or missed when a diagnosis prints it."""
+    with pytest.raises(TypeError, match=f"push: an effect {said}"):
 
-        @enters("reading", identifier="push", equatoin="y = x")
+        @enters("reading", identifier="push", **given)
         def push(sampled: object, pendulum: object, size: float) -> float:
             return size

@@ -292,7 +292,14 @@ def enters(
 
     Examples
     --------
-    >>> @enters("reading", identifier="tilt", parameters=(Parameter("s2", "1/rad", -1.0, 1.0),))
+    >>> @enters(
+    ...     "reading",
+    ...     identifier="tilt",
+    ...     name="tilted sensor",
+    ...     equation=r"y = x + s_2 x^2",
+    ...     parameters=(Parameter("s2", "1/rad", -1.0, 1.0),),
+    ...     discriminating_test="turn the sensor round: the sign must change",
+    ... )
     ... def tilt(sampled, pendulum, s2):
     ...     return s2 * sampled.angle**2
     >>> tilt.identifier, tilt.kind, tilt.count
@@ -310,9 +317,16 @@ def enters(
             name: staticmethod(each) if callable(each) else each
             for name, each in attributes.items()
         }
-        return subclass(base, function.__name__, function.__doc__, own | given)()
+        made = subclass(base, function.__name__, function.__doc__, own | given)
+        if missing := [word for word in _WORDS if not hasattr(made, word)]:
+            raise TypeError(f"{function.__name__}: an effect needs {', '.join(missing)}")
+        return made()
 
     return declare
+
+
+_WORDS: Final = ("identifier", "name", "equation", "discriminating_test")
+"""What the catalogue and every answer print of an effect."""
 
 
 def other_form(module: str, text: str, form: Mapping[str, Any], **attributes: Any) -> Effect:

@@ -1,5 +1,7 @@
 """Drivers, a module a protocol family; each model is entered where its class is defined."""
 
+import importlib
+import pkgutil
 import sys
 from pathlib import Path
 from typing import Final
@@ -12,6 +14,9 @@ from pendpipe.acquisition.line import Line, LineLostError
 from pendpipe.errors import InputError
 
 __all__ = ["DRIVERS", "FAMILIES", "Driver", "find_driver"]
+
+for _module in pkgutil.iter_modules(__path__):
+    importlib.import_module(f"{__name__}.{_module.name}")
 
 FAMILIES: Final[tuple[type[Driver], ...]] = (DI2108, DI245, DI154RS)
 """One driver for each language in which a device can be asked who it is."""
