@@ -158,9 +158,7 @@ def told_apart(points: TurningPoints, readings: int, noise: float) -> Apart:
     return Apart(chi2, math.pi + float(each), float(first))
 
 
-def restoring_of(
-    points: TurningPoints, coefficient: Coefficient | None = None, *, stated: bool = True
-) -> Restoring:
+def restoring_of(points: TurningPoints, *, stated: bool = True) -> Restoring:
     """Which torque the half cycles favour.
 
     Where it is `stated` that the readings are angles, they are a pendulum's unless the half cycles
@@ -168,9 +166,8 @@ def restoring_of(
     """
     if not may_be_sine(points):
         return "linear"
-    coefficient = coefficient or sine_coefficient(points)
-    pendulum = stated and not coefficient.excludes_sine
-    return "sine" if coefficient.agrees or pendulum else "linear"
+    found = sine_coefficient(points)
+    return "sine" if found.agrees or (stated and not found.excludes_sine) else "linear"
 
 
 def may_be_sine(points: TurningPoints) -> bool:

@@ -552,7 +552,7 @@ class Fitted:
         return 0.5 * (others - own) / min(self.noise_rms, other.noise_rms) ** 2
 
     def rival(self, value: FloatArray, **law: Any) -> Fitted:
-        """Another law beside this one: of the same readings and noise, at the likeliest share."""
+        """Another law beside this one: of the same readings and noise, at the share they favour."""
         problem = replace(self.problem, **law)
         minimum = _minimised(problem, value, self.held, self.chi2)
         return replace(self, problem=problem, minimum=minimum, shared=None)
@@ -846,11 +846,13 @@ class _Losses:
         within = normal[np.ix_(rest, rest)] * size[:, None] * size + _HAIR * np.eye(len(rest))
         own = np.linalg.inv(within) * size[:, None] * size
         following, settling = -own @ normal[rest, :4], own @ gradient[rest]
+        # Of what is known at all: what the rest leaves of it may be rounding.
+        hair = np.diag(_HAIR * normal.diagonal()[:4] + _LEAST)
         return cls(
             fitted,
             value,
             np.array([float(j not in held) for j in (A, B, C)]),
-            normal[:4, :4] + normal[:4, rest] @ following,
+            hair + normal[:4, :4] + normal[:4, rest] @ following,
             gradient[:4] - normal[:4, rest] @ settling,
             rest,
             following,
@@ -869,7 +871,6 @@ class _Losses:
         off[:, 2] = -off[:, 1]
         normal = change.swapaxes(1, 2) @ self.normal @ change
         gradient = np.einsum("kqp,kq->kp", change, self.gradient - off @ self.normal)
-        normal += np.eye(3) * (_HAIR * normal + _LEAST)
         step = _not_negative(normal, gradient, value[:3], self.free)
         off += np.einsum("kpq,kq->kp", change, step)
         chi2 = np.einsum("kp,pq,kq->k", off, self.normal, off) - 2.0 * off @ self.gradient

@@ -148,21 +148,15 @@ def _binned(
     """Phase, sum and number of readings: of each reading, or of many in a part of a cycle."""
     turns = half_cycle * math.pi
     pace = np.diff(turns[[0, -1]])[0] / (turn_s[-1] - turn_s[0])
-    per_cycle = len(time_s) * 2.0 * math.pi / (pace * (time_s[-1] - time_s[0]))
-
-    def phase_at(when: FloatArray) -> FloatArray:
-        beyond = np.where(when < turn_s[0], when - turn_s[0], np.maximum(when - turn_s[-1], 0.0))
-        return np.asarray(np.interp(when, turn_s, turns) + pace * beyond)
-
-    if per_cycle < 2 * _BINS:
-        return phase_at(time_s), residual, np.ones(len(residual))
-    first, last = phase_at(time_s[[0, -1]]).tolist()
+    span = float(time_s[-1] - time_s[0])
+    # Beyond the turning points the motion goes on at its pace.
+    turn_s = np.concatenate([[turn_s[0] - span], turn_s, [turn_s[-1] + span]])
+    turns = np.concatenate([[turns[0] - pace * span], turns, [turns[-1] + pace * span]])
+    if len(time_s) * 2.0 * math.pi < 2 * _BINS * pace * span:
+        return np.interp(time_s, turn_s, turns), residual, np.ones(len(residual))
+    first, last = np.interp(time_s[[0, -1]], turn_s, turns).tolist()
     edges = np.linspace(first, last, math.ceil((last - first) / (2.0 * math.pi) * _BINS) + 1)
-    when = np.interp(edges, turns, turn_s)
-    before, behind = edges < turns[0], edges > turns[-1]
-    when[before] = turn_s[0] + (edges[before] - turns[0]) / pace
-    when[behind] = turn_s[-1] + (edges[behind] - turns[-1]) / pace
-    place = np.searchsorted(time_s, when)
+    place = np.searchsorted(time_s, np.interp(edges, turns, turn_s))
     place[0], place[-1] = 0, len(time_s)
     running = np.concatenate([[0.0], np.cumsum(residual)])
     weights = np.diff(place).astype(np.float64)
@@ -220,7 +214,8 @@ def _questions(
 ) -> list[Question]:
     """What noise has to explain, of each harmonic: scatter of the blocks, and slow change."""
     size, count = found.value.shape[1], len(found.value)
-    asked = []
+    asked, slow = [], min(_SLOW, count // 3)
+    basis = np.linalg.qr(np.linspace(-1.0, 1.0, count)[:, None] ** np.arange(slow))[0]
     for harmonic in range((size + 1) // 2):
         part = slice(2 * harmonic - 1, 2 * harmonic + 1) if harmonic else slice(0, 1)
         absorbed = (lines, fitted)[harmonic] if harmonic < 2 else 0
@@ -234,11 +229,7 @@ def _questions(
         name = ("level", "motion")[harmonic] if harmonic < 2 else f"harmonic {harmonic}"
         if freedom > 0:
             asked.append(Question(name, float(np.sum(white**2)), freedom))
-        slow = min(_SLOW, count // 3)
-        if wide * slow - absorbed < 1:
-            continue
-        powers = np.linspace(-1.0, 1.0, count)[:, None] ** np.arange(slow)
-        basis = np.linalg.qr(powers)[0]
-        taken = float(np.sum((basis.T @ white) ** 2))
-        asked.append(Question(f"{name}, slow", taken, wide * slow - absorbed))
+        if wide * slow > absorbed:
+            taken = float(np.sum((basis.T @ white) ** 2))
+            asked.append(Question(f"{name}, slow", taken, wide * slow - absorbed))
     return asked
