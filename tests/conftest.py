@@ -1,7 +1,6 @@
-"""What all tests share: no example of hypothesis fails for a busy machine's sake.
+"""What all tests share: examples of hypothesis depend on the code alone, and not on its speed.
 
-CI draws the same examples each time, so that its answer depends on the code alone; ``make test``
-draws new ones.
+``--hypothesis-profile=untimed`` draws new ones.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from hypothesis import settings
 
 settings.register_profile("untimed", deadline=None)
 settings.register_profile("same", settings.get_profile("untimed"), derandomize=True)
-settings.load_profile("untimed")
+settings.load_profile("same")
 
 
 @pytest.fixture(scope="session")

@@ -16,7 +16,7 @@ from pendpipe.effects.model import Model
 from .records import INTERVAL_S, TIME_S, TRUTH, null_fit, prepared, white
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.floats(-0.01, 0.01), st.floats(-2e-4, 2e-4), st.floats(-0.03, 0.03), st.floats(0.0, 1e-3))
 def test_small_residuals_hide_neither_phase_nor_amplitude(
     late_s: float, detuning: float, damping: float, noise_rad: float

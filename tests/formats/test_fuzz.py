@@ -36,9 +36,7 @@ BYTES |= {
     "g.WHC": WindaqFile(_COUNTS, True).pack(),
 }
 
-clean = settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+clean = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def hold(path: Path) -> None:

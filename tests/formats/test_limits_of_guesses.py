@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.special import ellipk
 
@@ -256,7 +256,6 @@ def test_an_encoder_s_counts_go_on_over_its_zero(bits: int, zero: float) -> None
     assert np.array_equal(units._over_the_turn(slow.copy())[0], slow)
 
 
-@settings(settings.get_profile("same"))
 @given(
     x=st.floats(-3.0, 3.0),
     y=st.floats(0.5, 3.0),

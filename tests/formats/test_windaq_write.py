@@ -264,7 +264,7 @@ def test_a_recording_straight_to_windaq(tmp_path: Path) -> None:
     assert again.read_bytes()[1156:] == out.read_bytes()[1156:]
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     codes=st.lists(st.integers(-32768, 32767), min_size=1, max_size=60),
     gaps=st.dictionaries(st.integers(1, 59), st.floats(0.1, 1e4), max_size=3),

@@ -47,7 +47,7 @@ def assert_agrees(t: float, y0: float, abc: tuple[float, float, float]) -> None:
 
 
 @given(y0=starts, abc=rates, fraction=fractions)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=200)
 def test_amplitude_is_the_printed_equation_over_many_decades(
     y0: float, abc: tuple[float, float, float], fraction: float
 ) -> None:
@@ -57,7 +57,7 @@ def test_amplitude_is_the_printed_equation_over_many_decades(
 
 
 @given(y0=starts, a=decades(-6, 2), b=decades(-6, 1), nearness=decades(-16, -1), fraction=fractions)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_branches_join_where_r_vanishes(
     side: float, y0: float, a: float, b: float, nearness: float, fraction: float
@@ -104,7 +104,6 @@ def test_time_is_the_integral_of_the_inverse_rate(abc: tuple[float, float, float
 
 
 @given(y0=starts, abc=rates, part=st.floats(1e-6, 1.0))
-@settings(deadline=None)
 def test_time_at_inverts_the_amplitude(
     y0: float, abc: tuple[float, float, float], part: float
 ) -> None:
@@ -116,22 +115,7 @@ def test_time_at_inverts_the_amplitude(
     assert float(back) == pytest.approx(float(t), rel=1e-12, abs=float(slack))
 
 
-@given(y0=starts, abc=rates, first=st.floats(0.0, 1.0), second=st.floats(0.0, 1.0))
-@settings(deadline=None)
-def test_a_decay_goes_on_from_where_it_is(
-    y0: float, abc: tuple[float, float, float], first: float, second: float
-) -> None:
-    end = moment_in_decay(y0, abc, 0.5)
-    assume(np.isfinite(end) and end < 1e30)
-    t1, t2 = first * end, second * end
-    whole = float(amplitude(t1 + t2, y0, *abc))
-    slack = 4.0 * np.spacing(t1 + t2) * float(abs(amplitude_rate(y0, *abc)))
-    in_steps = float(amplitude(t2, amplitude(t1, y0, *abc), *abc))
-    assert in_steps == pytest.approx(whole, rel=1e-11, abs=slack)
-
-
 @given(y0=starts, abc=rates)
-@settings(deadline=None)
 def test_amplitude_and_so_the_energy_never_rises(
     y0: float, abc: tuple[float, float, float]
 ) -> None:
@@ -142,24 +126,6 @@ def test_amplitude_and_so_the_energy_never_rises(
     assert np.all(np.diff(y) <= 4e-16 * y[:-1])
     assert y[0] == y0
     assert np.all(y >= 0.0)
-
-
-@given(y0=starts, abc=rates, time_unit=decades(-4, 4), angle_unit=decades(-4, 4))
-@settings(deadline=None)
-def test_units_of_time_and_angle_scale_out(
-    y0: float, abc: tuple[float, float, float], time_unit: float, angle_unit: float
-) -> None:
-    t = moment_in_decay(y0, abc, 0.7)
-    assume(np.isfinite(t) and t < 1e30)
-    a, b, c = abc
-    other = amplitude(
-        t * time_unit,
-        y0 * angle_unit,
-        a / (time_unit * angle_unit),
-        b / time_unit,
-        c * angle_unit / time_unit,
-    )
-    assert float(other / angle_unit) == pytest.approx(float(amplitude(t, y0, *abc)), rel=1e-11)
 
 
 @pytest.mark.parametrize("abc", [(0.45, 0.0119, 1.4e-6), (0.45, 1e-4, 1.4e-3), (0.0, 0.0, 1e-3)])

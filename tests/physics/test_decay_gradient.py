@@ -41,7 +41,7 @@ rates = st.tuples(*[st.one_of(st.just(0.0), decades)] * 3)
 @given(
     y0=st.floats(-6, 0).map(lambda power: 10.0**power), abc=rates, fraction=st.floats(1e-6, 0.999)
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_gradient_over_many_decades(
     y0: float, abc: tuple[float, float, float], fraction: float
 ) -> None:
@@ -51,22 +51,6 @@ def test_gradient_over_many_decades(
     y, gradient = amplitude_and_gradient(t, y0, *abc)
     assert y == amplitude(t, y0, *abc)
     np.testing.assert_allclose(gradient, slow_gradient(t, (y0, *abc)), rtol=1e-11)
-
-
-@pytest.mark.parametrize("abc", [(0.45, 0.0119, 1.4e-6), (0.45, 1e-3, 1.4e-3), (0.0, 0.01, 1e-4)])
-def test_gradient_is_that_of_the_implicit_relation(abc: tuple[float, float, float]) -> None:
-    a, b, c = abc
-    y0, t = 0.068, 30.0
-    y, gradient = amplitude_and_gradient(t, y0, *abc)
-
-    def g(u: float) -> float:
-        return a * u * u + b * u + c
-
-    expected = [g(float(y)) / g(y0)] + [
-        float(-g(float(y)) * mp.quad(lambda u, n=n: u**n / g(u) ** 2, [float(y), 0.01, y0]))
-        for n in (2, 1, 0)
-    ]
-    np.testing.assert_allclose(gradient, expected, rtol=1e-11)
 
 
 @pytest.mark.parametrize("nearness", [-1e-3, -1e-9, -1e-15, 0.0, 1e-15, 1e-9, 1e-3])

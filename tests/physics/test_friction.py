@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -53,7 +53,6 @@ def test_coulomb_and_fluid_quality_factors_go_with_and_against_the_amplitude() -
 
 
 @given(qualities=st.tuples(*[positive] * 4), y0=positive, y=positive)
-@settings(deadline=None)
 def test_eq9b_and_eq15_are_the_same_quality_factor(
     qualities: tuple[float, float, float, float], y0: float, y: float
 ) -> None:
@@ -63,7 +62,6 @@ def test_eq9b_and_eq15_are_the_same_quality_factor(
 
 
 @given(qualities=st.tuples(*[positive] * 4), y0=positive, omega=positive)
-@settings(deadline=None)
 def test_quality_factors_to_rates_and_back(
     qualities: tuple[float, float, float, float], y0: float, omega: float
 ) -> None:

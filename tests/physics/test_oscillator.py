@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -104,7 +104,6 @@ def test_frequency_shifts_at_the_smallest_q_met() -> None:
 
 
 @given(quality=st.floats(5.0, 1e5))
-@settings(deadline=None)
 def test_shifts_are_the_leading_order_of_the_exact_ratios(quality: float) -> None:
     for ratio, shift in (
         (viscous_frequency_ratio, viscous_frequency_shift),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pendpipe.physics import (
@@ -41,7 +41,6 @@ def test_product_of_a_and_c_from_the_maximum() -> None:
 
 
 @given(a=positive, b=positive, c=positive, factor=st.floats(0.1, 10.0))
-@settings(deadline=None)
 def test_q_is_largest_at_the_square_root_of_c_over_a(
     a: float, b: float, c: float, factor: float
 ) -> None:
@@ -52,7 +51,6 @@ def test_q_is_largest_at_the_square_root_of_c_over_a(
 
 
 @given(y=positive, a=positive, b=positive, c=positive)
-@settings(deadline=None)
 def test_eq15_is_two_pi_times_the_energy_over_its_loss_in_a_cycle(
     y: float, a: float, b: float, c: float
 ) -> None:
@@ -69,7 +67,6 @@ def test_q_without_losses_and_at_rest() -> None:
 
 
 @given(c=st.tuples(positive, positive, positive), inertia=positive, y=positive)
-@settings(deadline=None)
 def test_energy_of_eq12_falls_as_the_amplitude_of_eq13(
     c: tuple[float, float, float], inertia: float, y: float
 ) -> None:
@@ -94,7 +91,6 @@ def test_eq17_at_the_papers_record() -> None:
 
 
 @given(viscous=positive, hysteretic=positive)
-@settings(deadline=None)
 def test_eq17_undoes_the_sum_of_losses(viscous: float, hysteretic: float) -> None:
     measured = 1.0 / (1.0 / viscous + 1.0 / hysteretic)
     slack = 1e-12 + 1e-15 * viscous / hysteretic
