@@ -23,6 +23,8 @@ _WANTED: Final = 32.0
 _WINDOW: Final = 2.5
 """Cycles that a wave is fitted to."""
 _EVEN: Final = 0.2
+_AT_ONCE: Final = 1 << 15
+"""Moments whose waves are fitted together."""
 _MOST: Final = 1 << 16
 """Readings whose spectrum tells the frequency."""
 
@@ -66,15 +68,30 @@ def between(time_s: FloatArray, values: FloatArray, dense: float = DENSE) -> Bet
     inside = np.arange(-reach, reach + 1.0)
     inverse = np.linalg.pinv(_wave(inside, omega), rcond=1e-9)
     windows = np.lib.stride_tricks.sliding_window_view(values, window)
-    left = windows - windows @ (_wave(inside, omega) @ inverse).T
+    explained = (_wave(inside, omega) @ inverse).T
+    # Some at a time: together they would be many times the recording.
+    squares = [
+        float(np.sum((part - part @ explained) ** 2))
+        for part in np.array_split(windows, len(windows) // _AT_ONCE + 1)
+    ]
     freedom = window - inverse.shape[0]
-    noise = math.sqrt(float(np.mean(left**2)) * window / max(freedom, 1))
+    noise = math.sqrt(sum(squares) / len(windows) / max(freedom, 1))
     fine = math.ceil(_WANTED / per_cycle)
     place = np.arange((count - 1) * fine + 1) / fine
-    # Near the ends the first and the last window reach further.
-    middle = np.clip(np.rint(place), reach, count - 1 - reach)
-    waves = _wave(place - middle, omega)
-    found = np.einsum("np,np->n", waves, (windows @ inverse.T)[middle.astype(np.int64) - reach])
+    found = np.empty(len(place))
+    for at, out in zip(
+        *(np.array_split(each, len(place) // _AT_ONCE + 1) for each in (place, found)), strict=True
+    ):
+        # Near the ends the first and the last window reach further.
+        middle = np.clip(np.rint(at), reach, count - 1 - reach)
+        first, last = (int(middle[k]) - reach for k in (0, -1))
+        sizes = windows[first : last + 1] @ inverse.T
+        np.einsum(
+            "np,np->n",
+            _wave(at - middle, omega),
+            sizes[middle.astype(np.int64) - reach - first],
+            out=out,
+        )
     return Between(np.interp(place, np.arange(count), time_s), found, noise, window)
 
 
