@@ -79,15 +79,19 @@ def search(
     tuple of Weighed
         One for each of its steps.
     """
-    data, held = beginning.data, list(beginning.held)
-    progress(f"fitting {BASELINES.get(baseline, baseline)} to {data.used} readings")
+    task = Task(catalogue, released, baseline, level, seed, progress, samples)
+    # No name holds a fit that is left behind: of a long recording it is large.
+    return run_search(_baseline_fitted(beginning, task), task)
+
+
+def _baseline_fitted(beginning: Beginning, task: Task) -> Hypothesis:
+    data, held = beginning.data, beginning.held
+    task.progress(f"fitting {BASELINES.get(task.baseline, task.baseline)} to {data.used} readings")
     white = first_noise(beginning)
-    fit = fitted_from(beginning.model, data, white, beginning.value, held=held)
+    fit = fitted_from(beginning.model, data, white, beginning.value, held=list(held))
     if fit is None:
         raise NoMotionError("it stops")
-    state = Hypothesis(beginning, fit, data, white, beginning.held, fit, samples).settle(fit)
-    task = Task(catalogue, released, baseline, level, seed, progress, samples)
-    return run_search(state, task)
+    return Hypothesis(beginning, fit, data, white, held, fit, task.samples).settle(fit)
 
 
 def run_search(state: Hypothesis, task: Task) -> tuple[Hypothesis, tuple[Weighed, ...]]:
