@@ -34,19 +34,19 @@ def kept(folder: Path, minute: int, scans: int, reason: str | None) -> Path:
     return path
 
 
-def test_the_newest_complete_attempt_is_used(tmp_path: Path) -> None:
-    kept(tmp_path, 1, 100, "scans")
-    newest = kept(tmp_path, 2, 100, "time")
-    kept(tmp_path, 3, 300, None)
-    kept(tmp_path, 4, 300, "interrupted by the user")
-    assert choose(read_attempts(tmp_path.iterdir())).path == newest
-
-
-def test_without_a_complete_attempt_the_longest_is_used(tmp_path: Path) -> None:
-    kept(tmp_path, 1, 20, None)
-    longest = kept(tmp_path, 2, 90, "the line was lost")
-    kept(tmp_path, 3, 50, None)
-    assert choose(read_attempts(tmp_path.iterdir())).path == longest
+@pytest.mark.parametrize(
+    ("attempts", "chosen"),
+    [
+        # The newest complete one; without one the longest.
+        ([(100, "scans"), (100, "time"), (300, None), (300, "interrupted by the user")], 1),
+        ([(20, None), (90, "the line was lost"), (50, None)], 1),
+    ],
+)
+def test_the_best_attempt_is_used(
+    attempts: list[tuple[int, str | None]], chosen: int, tmp_path: Path
+) -> None:
+    paths = [kept(tmp_path, minute, *attempt) for minute, attempt in enumerate(attempts)]
+    assert choose(read_attempts(tmp_path.iterdir())).path == paths[chosen]
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,3 @@ def test_what_is_being_recorded_is_left_alone(tmp_path: Path) -> None:
         with pytest.raises(InputError, match="another process is recording into it"):
             read_attempts([path])
     assert len(read_attempts([path])) == 1
-
-
-def test_no_two_attempts_share_a_name(tmp_path: Path) -> None:
-    assert len({new_path(f"{tmp_path}/") for _ in range(100)}) == 100

@@ -164,7 +164,9 @@ def test_whole_scans_lost_are_said_and_move_nothing(kind: str, lost: int) -> Non
     """Without a trace in the bytes, the clock alone tells where."""
     recording = decode_recording(arrivals(kind, lost))
     said = next(note for note in recording.notes if "come late for good" in note)
-    assert float(said.partition("(")[2].partition(" s")[0]) == pytest.approx(0.01 * lost, abs=0.02)
+    assert float(said.partition("(by ")[2].partition(" s")[0]) == pytest.approx(
+        0.01 * lost, abs=0.02
+    )
     assert missing(recording) == 0
     assert np.allclose(np.diff(recording.time_s), 1 / RATE_HZ)
     assert recording.metadata["time_base"] == "nominal"

@@ -78,6 +78,9 @@ def test_a_file_cut_anywhere_opens_with_all_whole_frames(data: st.DataObject) ->
     size = [frame + len(piece) for piece in pieces]
     complete = sum(begin + sum(size[: number + 1]) <= cut for number in range(len(pieces)))
     assert len(raw.arrival_s) == complete
+    short = decode_recording(written(b"\x00\x81" * 5, stopped=False))
+    assert len(short) == 5
+    assert any("cut short" in note for note in short.notes)
 
 
 @given(place=st.integers(0, 10_000), mask=st.integers(1, 255))
@@ -145,9 +148,14 @@ def test_another_file_is_refused_in_one_line(tmp_path: Path, content: bytes) -> 
         read_raw(path)
 
 
-def test_a_missing_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="can't be read"):
-        decode_recording(tmp_path / "nowhere.raw")
+def test_what_holds_no_such_scan_is_refused(tmp_path: Path) -> None:
+    for source, channel, said in (
+        (tmp_path / "nowhere.raw", None, "can't be read"),
+        (written(), None, "no scan was recorded"),
+        (written(b"\x00\x81"), 2, "channel 2 was not recorded"),
+    ):
+        with pytest.raises(InputError, match=said):
+            decode_recording(source, channel)
 
 
 def test_a_lost_scan_is_a_row_and_not_a_join() -> None:
@@ -158,12 +166,6 @@ def test_a_lost_scan_is_a_row_and_not_a_join() -> None:
     assert recording.quality.tolist() == [SUSPECT, MISSING, 0]
     assert recording.values[[0, 2]].tolist() == [0.0, 20 / 4096]
     assert any("1 scans lost at 1 places" in note for note in recording.notes)
-
-
-def test_a_recording_cut_short_says_so() -> None:
-    recording = decode_recording(written(b"\x00\x81" * 5, stopped=False))
-    assert len(recording) == 5
-    assert any("cut short" in note for note in recording.notes)
 
 
 def test_a_damaged_first_frame_moves_nothing() -> None:
@@ -178,16 +180,6 @@ def test_a_damaged_first_frame_moves_nothing() -> None:
     assert recording.quality.tolist() == [MISSING] + [0] * 7
     assert recording.values[1:].tolist() == sound.values[1:].tolist()
     assert any("1 scans are lost" in note for note in recording.notes)
-
-
-def test_nothing_recorded_is_refused() -> None:
-    with pytest.raises(InputError, match="no scan was recorded"):
-        decode_recording(written())
-
-
-def test_a_channel_that_was_not_recorded_is_refused() -> None:
-    with pytest.raises(InputError, match="channel 2 was not recorded"):
-        decode_recording(written(b"\x00\x81"), channel=2)
 
 
 @pytest.mark.parametrize("model", ["DI-2108", "DI-154RS"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,6 +12,7 @@ from scipy.stats import binom, t
 
 from pendpipe.acquisition import decode
 from pendpipe.acquisition.decode import find_delays, measure_rate
+from pendpipe.arrays import FloatArray
 
 
 @given(
@@ -70,18 +73,45 @@ def test_too_few_arrivals_measure_nothing() -> None:
     assert found.rate_hz == 90.0
 
 
-@pytest.mark.parametrize("step_s", [0.02, 0.1])
-def test_a_clock_that_wanders_has_lost_nothing(step_s: float) -> None:
-    """Only a delay that stays, and that the usual steps do not explain, is a loss."""
-    scans = np.arange(10.0, 4000.0)
-    for seed in range(30):
-        steps = np.random.default_rng(seed).normal(0.0, step_s, len(scans) // 20 + 1)
-        arrival = scans / 100.0 + np.repeat(np.cumsum(steps), 20)[: len(scans)]
-        assert find_delays(arrival, scans, 100.0)[0] == []
-    # A second without scans, and many times the usual step, is one.
-    arrival[2000:] += 50.0 * step_s + 1.0
-    (delay,) = find_delays(arrival, scans, 100.0)[0]
-    assert delay.begin <= 2000 <= delay.end
+def steady(scans: FloatArray, rate_hz: float = 100.0) -> FloatArray:
+    return scans / rate_hz + np.random.default_rng(3).exponential(1e-3, len(scans))
+
+
+def slept(scans: FloatArray) -> FloatArray:
+    """A second late, then everything at once."""
+    arrival_s = steady(scans)
+    arrival_s[2000:2100] = arrival_s[2100]
+    return arrival_s
+
+
+def wandering(scans: FloatArray) -> FloatArray:
+    steps = np.random.default_rng(0).normal(0.0, 0.1, len(scans) // 20 + 1)
+    return np.asarray(scans / 100.0 + np.repeat(np.cumsum(steps), 20)[: len(scans)])
+
+
+@pytest.mark.parametrize(
+    ("arrivals", "rise_s", "found"),
+    [
+        (steady, 0.3, True),
+        (steady, 1.0, True),
+        (lambda scans: steady(scans, 102.0), 0.3, True),  # not at the rate that it says
+        (steady, 0.0, False),
+        (slept, 0.0, False),  # a busy host is no loss: nothing stays late
+        (wandering, 0.0, False),  # nor is what the usual steps explain
+        (wandering, 6.0, True),
+    ],
+)
+def test_scans_are_missing_where_the_arrivals_become_late_for_good(
+    arrivals: Callable[[FloatArray], FloatArray], rise_s: float, found: bool
+) -> None:
+    scans = np.arange(1.0, 6001.0)
+    arrival_s = arrivals(scans) + rise_s * (scans > 3000)
+    delays, limit_s = find_delays(arrival_s, scans, 100.0)
+    assert limit_s < 6.0
+    assert len(delays) == found
+    for delay in delays:
+        assert delay.begin <= 3000 <= delay.end
+        assert rise_s - 0.02 - 3.0 * (arrivals is wandering) < delay.late_s < rise_s + 0.02
 
 
 @pytest.mark.parametrize(("drift_s", "chosen"), [(0.006, "nominal"), (0.025, "measured")])

@@ -35,7 +35,7 @@ class Delay:
     begin, end
         The arrivals between which it happened, by their index.
     late_s
-        By how much, in s.
+        By how much at least, in s.
     """
 
     begin: int
@@ -311,7 +311,7 @@ def _notes(
         ),
         (
             delays,
-            f"readings come late for good ({late_s}): scans were lost without a mark where the"
+            f"readings come late for good (by {late_s} at least): scans were lost without a mark where the"
             " quality is 1, and the times behind are early by as much",
         ),
         (
