@@ -57,10 +57,13 @@ def test_recordings_are_read_as_their_fits_are_taken(processes: int) -> None:
     fits.close()  # type: ignore[attr-defined]
 
 
-def test_options_are_those_of_a_fit() -> None:
+def test_options_are_those_of_a_fit_and_a_bar_counts(capsys: pytest.CaptureFixture[str]) -> None:
     (held,) = pp.fit_many([decay(2)], processes=1, fixed={"c": 0.0})
     assert not isinstance(held, pp.InputError)
     assert held["c"].value == 0.0
+    assert not capsys.readouterr().err, "no terminal, no bar"
+    list(pp.fit_many([decay(1)] * 2, processes=1, progress=True))
+    assert "2/2" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("option", "value"), [("processes", 0), ("name", "mine")])
@@ -73,10 +76,3 @@ def test_what_makes_no_sense_is_refused_before_a_recording_is_read(
 
     with pytest.raises(pp.InputError, match=option):
         pp.fit_many(unread(), **{option: value})  # type: ignore[arg-type]
-
-
-def test_a_bar_counts_the_fits(capsys: pytest.CaptureFixture[str]) -> None:
-    assert len(list(pp.fit_many([decay(1)] * 3, processes=1))) == 3
-    assert not capsys.readouterr().err, "no terminal, no bar"
-    list(pp.fit_many([decay(1)] * 3, processes=1, progress=True))
-    assert "3/3" in capsys.readouterr().err

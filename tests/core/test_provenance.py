@@ -28,50 +28,36 @@ def version() -> str:
     return provenance.code_version("pendpipe.stage")
 
 
-@pytest.mark.parametrize(("edited", "changes"), [("used", True), ("stage", True), ("other", False)])
-def test_the_version_follows_the_imports(library: Path, edited: str, changes: bool) -> None:
+BY_NAME = "import importlib\nkind = 'text'\nx = importlib.import_module({})\n"
+OWN = 'import importlib\nfound = [importlib.import_module(f"{__name__}.{n}") for n in ["text"]]\n'
+
+
+@pytest.mark.parametrize(
+    ("stage", "edited", "changes"),
+    [
+        ("", "used.py", True),
+        ("", "stage.py", True),
+        ("", "other.py", False),
+        ("from pendpipe.readers import draw\n", "readers/templates/page.html", True),
+        # Which reader a file needs is known only at run time: each of them counts.
+        (BY_NAME.format('"pendpipe.readers.text"'), "readers/text.py", True),
+        (BY_NAME.format('f"pendpipe.readers.{kind}"'), "readers/text.py", True),
+        # A package that imports its own modules.
+        ("from pendpipe import readers\n", "readers/text.py", True),
+    ],
+)
+def test_the_version_follows_what_is_imported(
+    library: Path, stage: str, edited: str, changes: bool
+) -> None:
+    (library / "readers/templates").mkdir(parents=True)
+    (library / "readers/__init__.py").write_text(OWN if "import readers" in stage else "draw = 1\n")
+    (library / "readers/text.py").write_text("x = 1\n")
+    (library / "readers/templates/page.html").write_text("before")
+    if stage:
+        (library / "stage.py").write_text(stage)
     before = version()
-    (library / f"{edited}.py").write_text("x = y = 2\n")
+    (library / edited).write_text("x = y = 2\n")
     assert (version() != before) == changes
-
-
-def test_a_template_counts_as_code_of_its_package(library: Path) -> None:
-    (library / "stage.py").write_text("from pendpipe.page import draw\n")
-    (library / "page/templates").mkdir(parents=True)
-    (library / "page/__init__.py").write_text("draw = 1\n")
-    template = library / "page/templates/page.html"
-    template.write_text("before")
-    before = version()
-    template.write_text("after")
-    assert version() != before
-
-
-@pytest.mark.parametrize("name", ['"pendpipe.readers.text"', 'f"pendpipe.readers.{kind}"'])
-def test_a_module_imported_by_name_counts(library: Path, name: str) -> None:
-    """Which reader a file needs is known only at run time: each of them counts."""
-    (library / "stage.py").write_text(
-        f"import importlib\nkind = 'text'\nreader = importlib.import_module({name})\n"
-    )
-    (library / "readers").mkdir()
-    (library / "readers/__init__.py").write_text("")
-    reader = library / "readers/text.py"
-    reader.write_text("x = 1\n")
-    before = version()
-    reader.write_text("x = 2\n")
-    assert version() != before
-
-
-def test_a_package_that_imports_its_own_modules_depends_on_each(library: Path) -> None:
-    (library / "stage.py").write_text("from pendpipe import catalogue\n")
-    (library / "catalogue").mkdir()
-    (library / "catalogue/__init__.py").write_text(
-        'import importlib\nfound = [importlib.import_module(f"{__name__}.{n}") for n in "ab"]\n'
-    )
-    entry = library / "catalogue/a.py"
-    entry.write_text("x = 1\n")
-    before = version()
-    entry.write_text("x = 2\n")
-    assert version() != before
 
 
 def test_the_readers_of_files_count() -> None:

@@ -16,6 +16,10 @@ def fails() -> None:
     raise InputError("a.csv", "there is no decay", "record one")
 
 
+def breaks() -> None:
+    raise ZeroDivisionError
+
+
 def test_a_refused_record_leaves_one_line_and_whole_stubs(tmp_path: Path) -> None:
     refused, out = tmp_path / "refused.json", tmp_path / "fit.json"
     run_stage("fit", "x", fails, outputs=[out], refused=refused)
@@ -28,18 +32,15 @@ def test_a_refused_record_leaves_one_line_and_whole_stubs(tmp_path: Path) -> Non
     assert read_json(out)["refused"] == "a.csv: there is no decay; record one"
 
 
-def test_a_refusal_names_no_folder_of_the_machine(tmp_path: Path) -> None:
-    def fails_far_away() -> None:
-        raise InputError("/home/me/data/run7.csv, line 3", "no number", "fix the row")
-
-    refused = tmp_path / "x/refused.json"
-    outputs = [tmp_path / "x/recording.csv"]
-    run_stage("acquire", "x", fails_far_away, outputs=outputs, refused=refused)
-    assert read_json(refused)["reason"] == "run7.csv, line 3: no number; fix the row"
-
-
 @pytest.mark.parametrize(
-    "folder", ["/home/my data", "/home/a,b/c  d (1)", "C:/Users/R. D. P", "/home/été/\u202eabc;"]
+    "folder",
+    [
+        "/home/me/data",
+        "/home/my data",
+        "/home/a,b/c  d (1)",
+        "C:/Users/R. D. P",
+        "/home/été/\u202eabc;",
+    ],
 )
 def test_a_refusal_names_no_folder_however_it_is_called(tmp_path: Path, folder: str) -> None:
     source = Path(folder, "run 7.csv")
@@ -53,38 +54,24 @@ def test_a_refusal_names_no_folder_however_it_is_called(tmp_path: Path, folder: 
     assert read_json(refused)["reason"] == "run 7.csv, line 3: no number; fix run 7.csv"
 
 
-def test_the_stages_after_a_refusal_pass_it_on(tmp_path: Path) -> None:
+def test_the_stages_after_a_refusal_pass_it_on_until_the_record_is_mended(tmp_path: Path) -> None:
     refused, out = tmp_path / "refused.json", tmp_path / "fit.json"
-    run_stage("acquire", "x", fails, outputs=[tmp_path / "recording.csv"], refused=refused)
-
-    def never() -> None:
-        raise AssertionError
-
-    run_stage("fit", "x", never, outputs=[out], refused=refused)
-    assert "no decay" in read_json(out)["refused"]
-
-
-def test_a_mended_record_is_no_longer_refused(tmp_path: Path) -> None:
-    refused, out = tmp_path / "refused.json", tmp_path / "turning_points.csv"
-    run_stage("turning-points", "x", fails, outputs=[out], refused=refused)
     recording = tmp_path / "recording.csv"
+    run_stage("acquire", "x", fails, outputs=[recording], refused=refused)
+    run_stage("fit", "x", breaks, outputs=[out], refused=refused)
+    assert "no decay" in read_json(out)["refused"]
     run_stage("acquire", "x", lambda: write(recording, ""), outputs=[recording], refused=refused)
     assert reason_of(refused) is None
 
 
-def test_without_a_place_for_refusals_the_fault_ends_the_program(tmp_path: Path) -> None:
-    with pytest.raises(InputError):
-        run_stage("fit", "x", fails, outputs=[tmp_path / "fit.json"], refused=None)
-
-
-def test_a_fault_of_the_programs_own_is_never_a_refusal(tmp_path: Path) -> None:
-    def breaks() -> None:
-        raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        run_stage(
-            "fit", "x", breaks, outputs=[tmp_path / "fit.json"], refused=tmp_path / "refused.json"
-        )
+@pytest.mark.parametrize(("fault", "kind"), [("fails", InputError), ("breaks", ZeroDivisionError)])
+def test_what_is_no_refusal_ends_the_program(
+    fault: str, kind: type[Exception], tmp_path: Path
+) -> None:
+    """A fault of the program's own, and one without a place for refusals."""
+    refused = tmp_path / "refused.json" if fault == "breaks" else None
+    with pytest.raises(kind):
+        run_stage("fit", "x", globals()[fault], outputs=[tmp_path / "fit.json"], refused=refused)
     assert not (tmp_path / "refused.json").exists()
 
 

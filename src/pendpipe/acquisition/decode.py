@@ -311,8 +311,8 @@ def _notes(
         ),
         (
             delays,
-            f"readings come late for good (by {late_s} at least): scans were lost without a mark where the"
-            " quality is 1, and the times behind are early by as much",
+            f"readings come late for good (by {late_s} at least): scans were lost without a mark"
+            " where the quality is 1, and the times behind are early by as much",
         ),
         (
             doubtful,
