@@ -12,7 +12,7 @@ from numpy.polynomial import Polynomial
 from scipy.fft import prev_fast_len
 
 from pendpipe.analysis.turning_points.measure import Samples
-from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
 
 _NOISE_RATIOS: Final = tuple(np.linspace(0.04, 0.5, 12))
 """Noise over step, at the values that are tried."""
@@ -55,8 +55,9 @@ class Data:
     anchor
         A time in s near the beginning, and the phase of the readings then, so that whole turns
         are counted the same way for every model.
-    row
-        Of the first reading, in the recording.
+    row, every
+        Of the first reading in the recording, and of how many recorded readings each is one where
+        the others are left out.
     within_rms
         How much the readings of each mean scatter about it, less the motion, over all of them.
     """
@@ -74,6 +75,7 @@ class Data:
     lattice: tuple[float, float] | None = None
     anchor: tuple[float, float] | None = None
     row: int = 0
+    every: int = 1
     within_rms: float = 0.0
 
     def __len__(self) -> int:
@@ -83,6 +85,12 @@ class Data:
     def used(self) -> int:
         """Number of readings that count."""
         return int(np.count_nonzero(self.weight))
+
+    @property
+    def rows(self) -> IntArray:
+        """The rows of the recording that each reading stands for, shape (n, fold)."""
+        first = self.row + self.fold * self.every * np.arange(len(self))
+        return np.asarray(first[:, None] + np.arange(self.fold))
 
     def residual(self, reading: FloatArray) -> FloatArray:
         """Return readings minus model, with the mean rounding error of the model."""
@@ -186,7 +194,7 @@ def with_scatter(data: Data, samples: Samples, model: Callable[[FloatArray], Flo
         return data
     kept = np.flatnonzero(data.weight > 0.0)
     kept = kept[:: max(len(kept) * data.fold // _MOST_SCATTERED, 1)]
-    rows = data.row + data.fold * kept[:, None] + np.arange(data.fold)
+    rows = data.rows[kept]
     time_s = samples.time_s[rows]
     time_s = time_s + (data.time_s[kept] - time_s.mean(axis=1))[:, None]
     left = samples.values[rows] - model(time_s.reshape(-1)).reshape(rows.shape)
@@ -226,7 +234,7 @@ def gather(
         intervals = np.diff(even)
         interval = float(intervals[0])
     uniform = bool(np.all(np.abs(intervals - interval) < _UNEVEN * interval)) and not counts
-    fold = 1
+    fold = every = 1
     if uniform and len(time_s) > most:
         fold = max(1, int(min(len(time_s) // most + 1, period_s / interval / _FEWEST_IN_CYCLE)))
     if fold > 1:
@@ -240,8 +248,8 @@ def gather(
         time_s, values = time_s[:fast], values[:fast]
     elif len(time_s) > _MOST_UNEVEN * most:
         # Means of unevenly spaced readings would mix phases: take every k-th reading.
-        keep = slice(None, None, len(time_s) // (_MOST_UNEVEN * most) + 1)
-        time_s, values = time_s[keep], values[keep]
+        every = len(time_s) // (_MOST_UNEVEN * most) + 1
+        time_s, values = time_s[::every], values[::every]
     return Data(
         time_s,
         values,
@@ -253,4 +261,5 @@ def gather(
         counts,
         noise_rms / fold**0.5,
         fold=fold,
+        every=every,
     )

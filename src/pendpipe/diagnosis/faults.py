@@ -146,7 +146,7 @@ def _applied(finding: Finding, state: Hypothesis, task: Task) -> Applied | None:
         gains = gain + (known.delta_chi2 if known else 0.0)
         found = replace(finding, delta_chi2=finding.delta_chi2 + gains)
         after = replace(state, faults=(*others, found))
-    after = _less(before.values - data.values, before.time_s, after)
+    after = _less(before.values - data.values, data, after)
     return Applied(gain, after.settle(fit, data, noise), finding.summary)
 
 
@@ -187,13 +187,13 @@ def _settled(data: Data, state: Hypothesis, faults: tuple[Finding, ...]) -> Hypo
     return replace(state, faults=faults).settle(fit, data, noise)
 
 
-def _less(taken: FloatArray, time_s: FloatArray, state: Hypothesis) -> Hypothesis:
+def _less(taken: FloatArray, data: Data, state: Hypothesis) -> Hypothesis:
     """Take off the recorded readings, which later tests look at, what was taken off these."""
     samples = state.samples
     if samples is None or not np.any(taken):
         return state
-    row = np.searchsorted(time_s, samples.time_s, side="right") - 1
-    values = samples.values - taken[np.maximum(row, 0)]
+    reading = (np.arange(len(samples)) - data.row) // (data.fold * data.every)
+    values = samples.values - taken[np.clip(reading, 0, len(data) - 1)]
     return replace(state, samples=replace(samples, values=values))
 
 

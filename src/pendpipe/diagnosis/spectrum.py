@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.fft import next_fast_len
 from scipy.ndimage import uniform_filter1d
 
 from pendpipe.arrays import BoolArray, FloatArray
@@ -133,7 +134,7 @@ class ToneScan:
 def tone_scan(data: Data, noise: Noise, basis: FloatArray, decay_s: float, band: Band) -> ToneScan:
     """Prepare a scan: project the model's tangent space out of a tone at each frequency."""
     count, envelope = len(data), np.exp((data.time_s[0] - data.time_s) / decay_s)
-    size = int(2 ** np.ceil(np.log2(_OVERSAMPLING * count)))
+    size = _OVERSAMPLING * next_fast_len(count, real=True)
     frequency = np.asarray(np.fft.rfftfreq(size, data.interval_s)[1:], dtype=np.float64)
     keep = slice(1, len(frequency) + 1)
     cosine = 2.0 * count * data.interval_s * frequency

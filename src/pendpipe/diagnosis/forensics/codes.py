@@ -145,21 +145,6 @@ def spacing_of(distinct: FloatArray) -> float | None:
     return None
 
 
-def whole_readings(data: Data, samples: Samples) -> slice | None:
-    """Return the samples that the data are; None if the data are means of several.
-
-    They have the samples' times, or their values if the times have been corrected.
-    """
-    first = int(np.searchsorted(samples.time_s, data.time_s[0] - 1e-9))
-    part = slice(first, first + len(data))
-    if part.stop > len(samples):
-        return None
-    if np.allclose(samples.time_s[part], data.time_s, rtol=0.0, atol=1e-9):
-        return part
-    same = samples.values[part] == data.values
-    return part if np.count_nonzero(same) > 0.5 * len(data) else None
-
-
 def noise_before_rounding(local: Local, step: float) -> float:
     """Estimate the noise before rounding by maximum likelihood, as a fit does (`best_noise`).
 
@@ -230,11 +215,10 @@ class Raw:
 def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
     """Return the original readings of the data; of very many every second, third, ..."""
     sampled, reading = fit.at.sampled, fit.at.reading
-    part = whole_readings(data, samples)
-    if part is not None:
-        return Raw(samples.values[part], error_of(data, fit), sampled.phase, data.weight > 0.0)
-    first, last = np.searchsorted(samples.time_s, data.time_s[[0, -1]] + [-1e-9, 1e-9]).tolist()
-    index = np.arange(first, last, max(1, (last - first) // _MOST_READINGS))
+    index = data.rows.reshape(-1)
+    if data.fold == 1:
+        return Raw(samples.values[index], error_of(data, fit), sampled.phase, data.weight > 0.0)
+    index = index[:: max(1, len(index) // _MOST_READINGS)]
     when, values = samples.time_s[index], samples.values[index]
     # The model by polynomials through six neighbouring means.
     start = np.clip(np.searchsorted(data.time_s, when) - 3, 0, len(data) - 6)

@@ -20,7 +20,6 @@ from pendpipe.diagnosis.forensics.codes import (
     noise_before_rounding,
     raw_readings,
     read_codes,
-    whole_readings,
 )
 from pendpipe.diagnosis.forensics.local import local_residual
 from pendpipe.diagnosis.forensics.tails import upper_tail
@@ -112,21 +111,12 @@ def _end(raw: Raw, step: float, side: Side, memory: float) -> End:
 
 def _clipped(data: Data, samples: Samples, ends: list[End], step: float) -> tuple[int, BoolArray]:
     """Return how many samples are at the ends, and which readings contain some; shape (n,)."""
-    part = whole_readings(data, samples)
-    if part is None:
-        inside = (samples.time_s >= data.time_s[0]) & (samples.time_s <= data.time_s[-1])
-        index = np.flatnonzero(inside)
-        middle = 0.5 * (data.time_s[1:] + data.time_s[:-1])
-        datum = np.searchsorted(middle, samples.time_s[index])
-    else:
-        index, datum = np.arange(part.start, part.stop), np.arange(len(data))
-    clipped = np.zeros(len(index), dtype=bool)
+    values = samples.values[data.rows]
+    clipped = np.zeros(values.shape, dtype=bool)
     slack = 0.5 * step if step else 1e-9 * abs(ends[0].limit)
     for end in ends:
-        clipped |= _SIGN[end.side] * (samples.values[index] - end.limit) >= -slack
-    mask = np.zeros(len(data), dtype=bool)
-    mask[datum[clipped]] = True
-    return int(np.count_nonzero(clipped)), mask
+        clipped |= _SIGN[end.side] * (values - end.limit) >= -slack
+    return int(np.count_nonzero(clipped)), np.asarray(clipped.any(axis=1))
 
 
 def _described_ends(

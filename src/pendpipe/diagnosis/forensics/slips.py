@@ -6,13 +6,13 @@ whatever varies slowly is fitted beside the steps (level, amplitude, phase and h
 cycles), their sizes are free, and that they come out *whole* is the test.
 """
 
-import itertools
 import math
 from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.half_cycles import find_extremes
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray, scaled_qr
 from pendpipe.diagnosis.data import Data
@@ -38,6 +38,8 @@ _CLEAN: Final = 1.3
 _FEWEST: Final = 4
 _NEIGHBOURS: Final = 11
 _IN_A_HALF_SWING: Final = 12
+_COUNTS: Final = 3.0
+"""Counts that a swing has at least."""
 _BESIDE: Final = 0.055
 """Length of a side about a step of the time, in periods: what a polynomial of the fourth degree
 leaves of a swing there, 1e-6 of it, is less than the noise."""
@@ -284,7 +286,8 @@ def steps_of_the_level(samples: Samples, count: float) -> Confirmation | None:
     """
     from scipy.ndimage import median_filter
 
-    ends = _turns(samples.values)
+    # Where the record begins and ends is no turning point.
+    ends = find_extremes(samples.values, _COUNTS * count)[1:-1].tolist()
     found = [
         _middle_step(samples, ends[first : first + 5]) / count for first in range(len(ends) - 4)
     ]
@@ -356,16 +359,6 @@ def _step_of_time(windows: FloatArray, size: float, floor: float) -> tuple[Float
     more = np.sum(steps * left, axis=0) / square
     rest = (np.sum(left**2, axis=0) - more**2 * square) / (2 * side - _OF_A_STEP - 2)
     return more, np.sqrt(np.maximum(rest, floor**2) / square)
-
-
-def _turns(values: FloatArray) -> list[int]:
-    """Return the rows of the turning points: the extremes between crossings of the middle."""
-    above = values > 0.5 * (np.max(values) + np.min(values))
-    crossed = np.flatnonzero(above[:-1] != above[1:]) + 1
-    return [
-        first + int(np.argmax(np.abs(values[first:last] - values[first])))
-        for first, last in itertools.pairwise(crossed.tolist())
-    ]
 
 
 def _middle_step(samples: Samples, ends: list[int]) -> float:
