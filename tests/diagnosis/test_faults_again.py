@@ -12,6 +12,7 @@ from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.detect import Detection
 from pendpipe.diagnosis.faults import correct
+from pendpipe.diagnosis.forensics import Finder
 from pendpipe.diagnosis.hypothesis import Hypothesis, Task, is_gross
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import white_noise
@@ -79,6 +80,31 @@ def test_a_reading_that_nothing_explains_stays_out_and_is_measured_anew(error: f
     assert state.p_value == fault.p_value
     largest = fault.parameters["largest"].value
     assert largest == pytest.approx(error * NOISE_RAD, abs=2.0 * NOISE_RAD)
+
+
+@pytest.mark.parametrize("gains", [(30.0, 300.0), (300.0, 30.0)])
+def test_the_finding_that_pays_most_is_applied_first_and_one_that_does_not_pay_never(
+    gains: tuple[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The order in which the tests are declared does not matter."""
+    task, begun = blamed(0.0)
+    said: list[str] = []
+    masks = [np.arange(len(TIME_S)) == row for row in (100, 200)]
+    names = ("clipping", "glitches")
+    found = [
+        Finding(name, 1e-9, gain, mask=mask)
+        for name, gain, mask in zip(names, gains, masks, strict=True)
+    ]
+    found.append(Finding("clock-slips", 1e-9, time_s=TIME_S + 1e-5 * TIME_S, price=1e3))
+    finders = tuple(
+        Finder(each.identifier, lambda *_, each=each: each, repeats=True) for each in found
+    )
+    monkeypatch.setattr("pendpipe.diagnosis.faults.FINDERS", finders)
+    state = correct(replace(begun, faults=()), replace(task, progress=said.append))
+    order = sorted(names, key=lambda name: -gains[names.index(name)])
+    assert [fault.identifier for fault in state.faults] == order
+    assert [line.split(":")[0] for line in said] == order
+    assert np.flatnonzero(state.data.weight == 0.0).tolist() == [100, 200, ODD]
 
 
 def test_a_test_that_reports_nothing_counts_by_its_chance() -> None:
