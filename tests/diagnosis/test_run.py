@@ -164,16 +164,6 @@ def test_a_viscous_pendulum_is_consistent_with_a_viscous_baseline() -> None:
     assert abs(linear.value - LINEAR[B]) < 4.0 * linear.sd
 
 
-def test_a_wrong_prediction_of_the_loss_is_corrected_to_the_truth() -> None:
-    """If only b was given, and wrong, b is released and comes out right."""
-    given = {"b": 1.1 * float(TRUTH[B])}
-    outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
-    assert [effect.identifier for effect in outcome.effects] == ["parameter-b"]
-    assert outcome.effects[0].kind == "parameter"
-    found = outcome.improved.parameters["b"]
-    assert abs(found.value - TRUTH[B]) < 4.0 * found.sd
-
-
 def test_a_right_prediction_is_consistent() -> None:
     given = {"a": float(TRUTH[0]), "b": float(TRUTH[B]), "c": float(TRUTH[2])}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)

@@ -27,12 +27,15 @@ def names(outcome: Diagnosis) -> set[str]:
 
 
 @pytest.mark.parametrize("factor", [0.6, 1.25])
-def test_a_wrong_loss_is_not_a_drift_of_it(factor: float) -> None:
+def test_a_wrong_loss_is_no_drift_and_comes_out_right(factor: float) -> None:
     """Of whatever size: to first order a drift or a curve may look the better."""
     given = {"b": factor * float(TRUTH[B])}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
     assert names(outcome) == {"parameter-b"}
+    assert outcome.effects[0].kind == "parameter"
     assert outcome.effects[0].probability > 0.9
+    found = outcome.improved.parameters["b"]
+    assert abs(found.value - TRUTH[B]) < 4.0 * found.sd
 
 
 def test_two_wrong_losses_are_not_an_unnamed_third() -> None:

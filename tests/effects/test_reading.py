@@ -94,7 +94,7 @@ def test_drifts_of_offset_and_gain_relax_or_are_straight(
 @pytest.mark.parametrize(
     "identifier", ["frequency-drift", "damping-drift", "clock-drift", "offset-drift", "gain-drift"]
 )
-def test_a_drift_is_straight_unless_its_relaxation_is_told(identifier: str) -> None:
+def test_a_drift_is_straight_unless_its_relaxation_is_given(identifier: str) -> None:
     assert by_identifier(identifier).parameters[1].default == STRAIGHT_S
 
 

@@ -126,11 +126,11 @@ def test_inspect_prints_the_number_that_column_takes(
 ) -> None:
     (tmp_path / "a.csv").write_text(text(TIME, ANGLE, 900 + 80 * ANGLE, head="t,theta,foo\n"))
     assert main(["inspect", str(tmp_path / "a.csv"), "--column", "foo"]) == 0
-    told = capsys.readouterr().out.splitlines()
-    assert "  channel 2   foo (--column 3)" in told
-    level = float(next(line for line in told if "hangs at" in line).split()[-1])
+    printed = capsys.readouterr().out.splitlines()
+    assert "  channel 2   foo (--column 3)" in printed
+    level = float(next(line for line in printed if "hangs at" in line).split()[-1])
     assert level == pytest.approx(900.0, abs=1.0)
-    assert any(line.endswith("foo, in no known unit") for line in told)
+    assert any(line.endswith("foo, in no known unit") for line in printed)
 
 
 # --- values ----------------------------------------------------------------------------------

@@ -498,7 +498,7 @@ def test_standard_input_and_output(tmp_path: Path) -> None:
     same(read_as(tmp_path, converted, "plain.csv"))
 
 
-def test_forms_are_told(tmp_path: Path) -> None:
+def test_inspect_names_the_format(tmp_path: Path) -> None:
     for content, form in ((matlab(t=TIME, theta=ANGLE), "matlab-v5"), (workbook(a=PAIRS), "excel")):
         (tmp_path / "a").write_bytes(content)
         assert inspect(tmp_path / "a").format == form

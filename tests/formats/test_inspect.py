@@ -134,16 +134,16 @@ def test_why_prints_a_line_a_decision(tmp_path: Path, capsys: pytest.CaptureFixt
     rows = "".join(f"{t:.2f};{x:.5f};21\n" for t, x in zip(TIME, ANGLE, strict=True))
     path.write_text(("t [s];theta;temperature\n" + rows).replace(".", ","))
     assert main(["inspect", "--why", str(path)]) == 0
-    told = [line.strip() for line in capsys.readouterr().out.splitlines()]
-    assert "column 1 't': time, in s" in told
-    assert "column 2 'theta': angle, no unit stated" in told
-    assert "columns separated by semicolons, decimal commas" in told
-    assert any(line.startswith("'theta' is in radians: its period") for line in told)
-    assert told[-1] == "so 2000 readings of theta, in rad"
+    printed = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    assert "column 1 't': time, in s" in printed
+    assert "column 2 'theta': angle, no unit stated" in printed
+    assert "columns separated by semicolons, decimal commas" in printed
+    assert any(line.startswith("'theta' is in radians: its period") for line in printed)
+    assert printed[-1] == "so 2000 readings of theta, in rad"
 
 
 @pytest.mark.parametrize("head", ["Frequency,Amplitude", "f (Hz),Amplitude (rad)"])
-def test_a_spectrum_is_told_as_one(tmp_path: Path, head: str) -> None:
+def test_a_spectrum_is_refused(tmp_path: Path, head: str) -> None:
     path = tmp_path / "a.csv"
     frequency = np.arange(1.0, 200.0) / 50.0
     size = 1.0 / (1.0 + (20.0 * (frequency - 1.0)) ** 2)

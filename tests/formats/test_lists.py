@@ -1,4 +1,4 @@
-"""Lists and signals that are no recordings of a free decay are told what they are."""
+"""Lists and signals that are no recordings of a free decay are reported as what they are."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ LISTS = {
 
 
 @pytest.mark.parametrize("kind", LISTS)
-def test_a_list_is_told_what_it_is_at_inspect_and_convert(
+def test_a_list_is_reported_as_what_it_is_by_inspect_and_convert(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
 ) -> None:
     path = tmp_path / "a.csv"
@@ -131,7 +131,7 @@ SETTINGS = "[Channel 1]\nProbe=10\nScale=0.5\nCoupling=DC\n[Time base]\nScale=0.
         ("a.json", json.dumps({"channel": {"scale": 0.5, "coupling": "DC"}, "mode": "auto"})),
     ],
 )
-def test_a_saved_state_of_an_instrument_is_told_as_that(
+def test_saved_settings_of_an_instrument_are_refused(
     tmp_path: Path, name: str, content: str
 ) -> None:
     path = tmp_path / name
@@ -153,7 +153,7 @@ T = np.arange(3000) / 50.0
         (np.sin(5.0 * T) * np.exp(-0.004 * T), np.sin(5.0 * T) * (T < 9.0), ""),
     ],
 )
-def test_a_steady_or_driven_signal_is_told_as_that(
+def test_a_steady_or_driven_signal_is_reported(
     tmp_path: Path, values: Floats, beside: Floats | None, said: str
 ) -> None:
     columns = [T, values] if beside is None else [T, values, beside]

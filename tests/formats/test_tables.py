@@ -154,10 +154,10 @@ TIMES = {
         + text(ANGLE, decimal=",")
     ),
     **{
-        f"a rate in a remark: {told}": Case(
-            f"Pendulum 3\n{told}\nAngle (deg)\n" + text(DEGREES, digits=3)
+        f"a rate in a remark: {remark}": Case(
+            f"Pendulum 3\n{remark}\nAngle (deg)\n" + text(DEGREES, digits=3)
         )
-        for told in (
+        for remark in (
             "Sampling: 50 Hz",
             "# interval between samples: 20 ms",
             "Abtastrate;50 Hz",

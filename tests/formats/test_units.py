@@ -36,7 +36,7 @@ def test_a_turn_is_two_pi_in_every_unit(tmp_path: Path, unit: str, turn: float) 
 def test_a_clock_that_counts_from_a_date_is_read_in_its_own_unit(
     tmp_path: Path, per_second: int
 ) -> None:
-    """Seconds, milliseconds, microseconds or nanoseconds since 1970: told by their size."""
+    """Seconds, milliseconds, microseconds or nanoseconds since 1970: known by their size."""
     ticks = (
         1_700_000_000 * per_second + np.round(TIME_S * 1000).astype(np.int64) * per_second // 1000
     )

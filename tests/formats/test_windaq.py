@@ -126,7 +126,7 @@ def test_a_file_that_is_cut_short_gives_its_whole_scans(tmp_path: Path) -> None:
         (16, b"\xff\xff", "size of the annotations (65535)", False),
     ],
 )
-def test_damage_of_the_header_is_told_and_refused_if_it_costs_samples(
+def test_damage_of_the_header_is_reported_and_refused_if_it_costs_samples(
     tmp_path: Path, at: int, junk: bytes, said: str, lost: bool
 ) -> None:
     damaged = bytearray(WindaqFile(COUNTS).pack())

@@ -144,7 +144,7 @@ def test_a_day_counted_in_seconds_since_1970_is_kept(tmp_path: Path) -> None:
     assert read(tmp_path / "a.wdh").metadata["recorded_at"].startswith("2026-11-21T06:52:29")
 
 
-def test_a_pause_is_told_by_a_stamp_and_exactly_by_a_comment(tmp_path: Path) -> None:
+def test_a_pause_is_given_by_a_stamp_and_exactly_by_a_comment(tmp_path: Path) -> None:
     recording = volts(SWING)
     time_s = recording.time_s.copy()
     time_s[600:] += 113.25
