@@ -24,6 +24,7 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -110,7 +111,7 @@ class Manifest:
     key: str = ""
     own_damage: Damage | None = None
 
-    @property
+    @cached_property
     def path(self) -> Path:
         """The manifest's own file."""
         return self.home / FOLDER / f"{self.stage}.json"
@@ -135,7 +136,7 @@ class Manifest:
         """
         if self.own_damage:
             return [self.own_damage]
-        since = None if hash_all else _written_ns(self.path)
+        since = None if hash_all or not self.outputs else _written_ns(self.path)
         # (As text: a Path takes longer, and files are many.)
         home = str(self.home)
         compared = (

@@ -166,25 +166,36 @@ def draw_fig07(decay: Decay, recording: Recording, volts_per_radian: float | Non
         Takes the amplitude to the recording's unit; ``None`` where that is rad already.
     """
     scale = volts_per_radian if recording.quantity == "volts" and volts_per_radian else 1.0
-    unit = recording.unit
-    large, large_unit = axis_unit(recording.values[recording.usable], unit)
-    # Every sample is drawn; as pixels, since ten thousand line segments help nobody.
-    samples = f"all {len(recording)} samples of {decay.record}"
-    look: dict[str, Any] = {"width": 0.6, "rasterized": True, "label": plain_text(samples)}
+    samples = plain_text(f"all {len(recording)} samples of {decay.record}")
+    readings = _readings(decay, recording, scale, PALE, label=samples)
     about = {"xlabel": "Time (s)", "xmargin": 0.01, "ymargin": 0.1}
     return figure_of(
         4.4,
-        Panel(
-            [
-                curve(recording.time_s, large * recording.values, PALE, **look),
-                *_fitted(decay, large * scale),
-            ],
-            {"ylabel": f"{'Sensor output' if unit == 'V' else 'Motion'} ({large_unit})"},
-            key=1,
-        ),
-        _residual(decay, about, scale=scale, unit=unit, markersize=2.0),
+        readings._replace(about={"ylabel": readings.about["ylabel"]}, key=1),
+        _residual(decay, about, scale=scale, unit=recording.unit, markersize=2.0),
         shares=RESIDUALS_BELOW,
     )
+
+
+def _readings(
+    decay: Decay, recording: Recording, scale: float = 0.0, colour: str = BLUE, **look: Any
+) -> Panel:
+    """A recording, what was cut of it, and the amplitude of its law, unless the light is red.
+
+    `scale` takes the law to the recording's unit, where that is not the turning points'.
+    """
+    own, unit = axis_unit(recording.values[recording.usable], recording.unit)
+    if recording.unit == decay.points.unit:
+        scale = scale or 1.0
+    # Every sample is drawn; as pixels, since ten thousand line segments help nobody.
+    look = {"rasterized": True, "label": "readings"} | look
+    marks = [stretch_of(cut["start_s"], cut["stop_s"]) for cut in decay.fit.cuts]
+    marks.append(curve(recording.time_s, own * recording.values, colour, width=0.5, **look))
+    if scale and decay.fit.light != "red":
+        marks += _fitted(decay, own * scale)
+    ends = float(recording.time_s[0]), float(recording.time_s[-1])
+    label = f"{quantity_of(recording.unit)} ({unit})"
+    return Panel(marks, {"xlabel": "Time (s)", "xlim": ends, "ylabel": label}, key=2)
 
 
 def _fitted(decay: Decay, factor: float) -> list[Mark]:
@@ -397,19 +408,11 @@ def draw_fit(decay: Decay, recording: Recording) -> Figure:
         Three panels: readings with the fitted amplitude; turning points less the fitted law;
         Q against amplitude, with the Q that the turning points show without a model.
     """
-    unit = decay.points.unit
-    quality = _quality_by_amplitude(decay)
-    own, own_unit = axis_unit(recording.values[recording.usable], recording.unit)
-    time, look = recording.time_s, {"alpha": 0.6, "rasterized": True, "label": "readings"}
-    readings = curve(time, own * recording.values, BLUE, width=0.5, **look)
-    about = {"xlabel": "Time (s)", "xlim": (float(time[0]), float(time[-1]))}
+    readings, quality = _readings(decay, recording), _quality_by_amplitude(decay)
+    about = {name: readings.about[name] for name in ("xlabel", "xlim")}
     return figure_of(
         6.6,
-        Panel(
-            [readings, *(_fitted(decay, own) if recording.unit == unit else ())],
-            about | {"ylabel": f"{quantity_of(recording.unit)} ({own_unit})"},
-            key=2,
-        ),
+        readings,
         _residual(decay, about),
         *quality,
         shares=(1.3, 0.7, 1.0)[: 2 + len(quality)],
@@ -419,14 +422,10 @@ def draw_fit(decay: Decay, recording: Recording) -> Figure:
 
 def draw_readings(axes: Axes, decay: Decay, recording: Recording) -> Figure:
     """Draw a decay with its fitted amplitude on axes that are handed in; return their figure."""
-    own, own_unit = axis_unit(recording.values[recording.usable], recording.unit)
-    look = {"alpha": 0.6, "label": "readings"}
-    marks = [curve(recording.time_s, own * recording.values, BLUE, width=0.5, **look)]
-    if recording.unit == decay.points.unit and decay.fit.light != "red":
-        marks += _fitted(decay, own)
-    for mark in marks:
+    shown = _readings(decay, recording, rasterized=False)
+    for mark in shown.marks:
         mark(axes)
-    axes.set(xlabel="Time (s)", ylabel=f"{quantity_of(recording.unit)} ({own_unit})")
+    axes.set(xlabel=shown.about["xlabel"], ylabel=shown.about["ylabel"])
     axes.legend()
     figure = axes.get_figure(root=True)
     assert isinstance(figure, Figure)
@@ -449,29 +448,9 @@ def draw_sheet(decay: Decay, recording: Recording) -> Figure:
     Figure
         Two panels for one printed sheet.
     """
-    unit = decay.points.unit
     quality = _quality_by_amplitude(decay)
-    own, own_unit = axis_unit(recording.values[recording.usable], recording.unit)
-    time, look = recording.time_s, {"alpha": 0.6, "rasterized": True, "label": "readings"}
-    marks = [curve(time, own * recording.values, BLUE, width=0.5, **look)]
-    marks += [stretch_of(cut["start_s"], cut["stop_s"]) for cut in decay.fit.cuts]
-    if recording.unit == unit and decay.fit.light != "red":
-        marks += _fitted(decay, own)
-    return figure_of(
-        4.9,
-        Panel(
-            marks,
-            {
-                "xlabel": "Time (s)",
-                "xlim": (float(time[0]), float(time[-1])),
-                "ylabel": f"{quantity_of(recording.unit)} ({own_unit})",
-            },
-            key=2,
-        ),
-        *quality,
-        shares=(1.2, 1.0)[: 1 + len(quality)],
-        sharex=False,
-    )
+    panels = (_readings(decay, recording), *quality)
+    return figure_of(4.9, *panels, shares=(1.2, 1.0)[: len(panels)], sharex=False)
 
 
 @styled

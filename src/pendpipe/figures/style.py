@@ -192,7 +192,8 @@ def figure_of(
 
 def quantity_of(unit: str) -> str:
     """Name what has this unit, for an axis."""
-    return {"rad": "Angle", "m": "Displacement"}.get(unit, "Reading")
+    names = {"rad": "Angle", "m": "Displacement", "V": "Sensor output"}
+    return names.get(unit, "Reading")
 
 
 def logarithmic(axis: Literal["x", "y"], span: float | None = None) -> Mark:

@@ -9,20 +9,21 @@ import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from pendpipe.analysis.fit.result import FitResult
 from pendpipe.arguments import Arguments, load
 from pendpipe.configuration.load import Campaign
 from pendpipe.errors import refuse_if
-from pendpipe.estimate import Estimate
 from pendpipe.files import MADE_BY, MARK, read_json, write_whole
 from pendpipe.manifest import job
 from pendpipe.options import OUTPUT, flags
+from pendpipe.report.class_table import Fitted
+from pendpipe.report.class_table import record as row_of
 from pendpipe.stages.results import RecordResult, read_results, record_files
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-_WORDS: Final = ("record", "fluid", "branch", "pendulum", "light", "verdict", "refusal", "unit")
+_OF_THE_TABLE: Final = ("record", "fluid", "branch", "pendulum")
+_WORDS: Final = (*_OF_THE_TABLE, "light", "verdict", "refusal", "unit")
 _NUMBERS: Final = (
     *("T0_s", "T0_sd_s", "Q", "Q_sd", "amplitude"),
     *("a", "a_sd", "b", "b_sd", "c", "c_sd"),
@@ -69,32 +70,16 @@ def records_table(campaign: Campaign) -> pa.Table:
 
 
 def _row(campaign: Campaign, result: RecordResult) -> dict[str, Any]:
-    record = result.record
-    row: dict[str, Any] = {
-        "record": record.record,
-        "fluid": record.fluid or None,
-        "branch": record.branch or None,
-        "pendulum": record.pendulum or None,
-        "refusal": result.refused,
-    }
+    """The numbers of a fit; of a law that contradicts the decay only what needs no law."""
+    record, fit = result.record, result.fit
+    row: dict[str, Any] = {name: getattr(record, name) or None for name in _OF_THE_TABLE}
+    row["refusal"] = result.refused
     if campaign.configuration.diagnose.enabled:
         diagnosis = read_json(campaign.folder / record.record / "diagnosis" / "diagnosis.json")
         row["verdict"] = diagnosis["verdict"]
-    return row if result.fit is None else row | _of_fit(result.fit)
-
-
-def _of_fit(fit: FitResult) -> dict[str, Any]:
-    """The numbers of a fit; of a law that contradicts the decay only what needs no law."""
-    row: dict[str, Any] = {"light": fit.light, "unit": fit["amplitude"].unit}
-    numbers: dict[str, Estimate] = {"T0": fit.period}
-    for each in fit.quality_factors[:1]:
-        row["amplitude"], numbers["Q"] = each.amplitude_rad, each.quality_factor
-    if fit.light != "red":
-        numbers |= {name: fit[name] for name in "abc"}
-    for name, estimate in numbers.items():
-        end = "_s" if name == "T0" else ""
-        row |= {f"{name}{end}": estimate.value, f"{name}_sd{end}": estimate.sd}
-    return row
+    if fit is not None:
+        row |= row_of(Fitted(record.record, fit)) | {"unit": fit["amplitude"].unit}
+    return {name: row.get(name) for name in COLUMNS}
 
 
 def _parquet(table: pa.Table) -> bytes:
