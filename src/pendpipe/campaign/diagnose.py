@@ -432,9 +432,6 @@ def campaign_diagnosis(
         next_measurements(found.leader, [rival for rival, _ in found.rivals])
         for found in search.found
     ]
-    before, _ = held_out(search.baseline)
-    after, pulls = held_out(search.improved)
-    gain = after - before
     left = chi_square_p_value(search.improved.chi2, search.improved.degrees_of_freedom)
     effects = [
         _effect(search, found, runs) for found, runs in zip(search.found, ranked, strict=True)
@@ -449,19 +446,10 @@ def campaign_diagnosis(
         "p_value": search.p_value,
         "effects": effects,
         "improved": _fit(search.improved),
-        "held_out": {
-            "log_density_before": float(before.sum()),
-            "log_density_after": float(after.sum()),
-            "gain": float(gain.sum()),
-            "gain_sd": float(np.sqrt(len(gain) * gain.var())),
-        },
+        **_predicted(search),
         "unexplained": {"residual_rms_rad": None, "p_value": left},
         "excluded": search.excluded,
         "patterns": causes(search),
-        "records": [
-            {"record": run.record, "pull_from_the_others": float(pull)}
-            for run, pull in zip(search.improved.design.runs, pulls, strict=True)
-        ],
         "left_out": [far._asdict() for far in search.left_out],
         "numbers": {name: _shown(fit) for name, fit in _with_and_without(search).items()},
         "priors": {
@@ -472,6 +460,25 @@ def campaign_diagnosis(
         "figures": [],
         "warnings": copies,
         "provenance": provenance,
+    }
+
+
+def _predicted(search: CampaignSearch) -> dict[str, Any]:
+    """How well each record is predicted from the others, before and after."""
+    before, _ = held_out(search.baseline)
+    after, pulls = held_out(search.improved)
+    gain, runs = after - before, search.improved.design.runs
+    return {
+        "held_out": {
+            "log_density_before": float(before.sum()),
+            "log_density_after": float(after.sum()),
+            "gain": float(gain.sum()),
+            "gain_sd": float(np.sqrt(len(gain) * gain.var())),
+        },
+        "records": [
+            {"record": run.record, "pull_from_the_others": float(pull)}
+            for run, pull in zip(runs, pulls, strict=True)
+        ],
     }
 
 

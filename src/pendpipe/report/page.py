@@ -10,7 +10,7 @@ import math
 import os
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from html import escape, unescape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -175,26 +175,18 @@ def render(
         if (svg := room.drawing(figures / f"{name}.svg", name, words.title, words.shows))
     }
     asked = configuration.get("diagnose") or {}
-    enabled = asked.get("enabled", True)
     for line in lines:
+        enabled = asked.get("enabled", True)
         line["diagnosis"] = _diagnosis(folder / line["name"]) if enabled else None
     title = comparison.get("title") or "A campaign of free decays"
     below = home is not None and folder.absolute().is_relative_to(home.absolute().parent)
     links = Links(folder, home.absolute().parent if home is not None and below else None)
-    shared = {
-        "captions": CAPTIONS,
-        "compact": compact,
-        "formula": formula,
-        "number": number,
-        "without_folders": without_folders,
-        **own_files(),
-    }
+    shared = _FOR_TEMPLATES | own_files()
     _draw_records(folder, lines, room, links)
     for line in lines:
         if own_page is not None and below and not line["refused"] and not line["zoom"]:
             line["page"] = links.to(line["name"], OWN_PAGE)
             own_page(line["name"], _own_page(folder, line, home, title, shared))
-    for line in lines:
         line["link"] = f"#{line['anchor']}" if line["drawn"] else line["page"]
     return fill_template(
         "pendpipe.report",
@@ -219,14 +211,30 @@ def render(
         **({"fits": ()} if has_theory else _fits(folder, lines)),
         equations=EQUATIONS,
         glossary=GLOSSARY,
-        error=error,
-        with_error=with_error,
         provenance=comparison.get("provenance") or {},
         numbers=base64.b64encode(json.dumps(summary, indent=1).encode()).decode(),
         findings=findings(comparison),
         warned=grouped_warnings(entries),
         **shared,
     )
+
+
+def formula(latex: str) -> Markup:
+    """A formula as MathML, which browsers draw by themselves."""
+    from latex2mathml.converter import convert
+
+    return Markup(convert(latex))
+
+
+_FOR_TEMPLATES: Final[dict[str, Any]] = {
+    "captions": CAPTIONS,
+    "compact": compact,
+    "error": error,
+    "formula": formula,
+    "number": number,
+    "with_error": with_error,
+    "without_folders": without_folders,
+}
 
 
 def _fits(folder: Path, lines: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -265,13 +273,6 @@ class Links(NamedTuple):
         """Names and links of those of a record's (or the campaign's) files that there are."""
         there = [name for name in names if (self.folder / record / name).is_file()]
         return [(name, link) for name in there if (link := self.to(record, name))]
-
-
-def formula(latex: str) -> Markup:
-    """A formula as MathML, which browsers draw by themselves."""
-    from latex2mathml.converter import convert
-
-    return Markup(convert(latex))
 
 
 def _draw_records(folder: Path, lines: list[dict[str, Any]], room: Room, links: Links) -> None:
@@ -432,14 +433,6 @@ def render_recording(
         from pendpipe.figures.diagnosis import draw_each
 
         drawings += list(draw_each(outcome))
-    figures = [
-        {
-            "svg": _inlined(figure, f"figure-{key}", OF_A_RECORDING[key]),
-            "caption": OF_A_RECORDING[key],
-        }
-        for key, figure in drawings
-    ]
-    unit = result["amplitude"].unit
     return fill_template(
         "pendpipe.report",
         "recording.html",
@@ -449,26 +442,30 @@ def render_recording(
         heading=heading(result, name).partition(": ")[2],
         advice=sentence(result),
         facts=list(facts(result)),
-        table=[
-            (
-                size(each.amplitude_rad, unit),
-                with_error(each.quality_factor.value, each.quality_factor.sd),
-                f"{each.period_s:.5g} s",
-                cause(each),
-            )
-            for each in result.quality_factors
-            if math.isfinite(each.period_s)
-        ],
+        table=list(_qualities(result)),
         sheet=_inlined(draw_sheet(decay, recording), "sheet", _SHEET),
         diagnosis=None if outcome is None else outcome.summary,
         details="" if outcome is None else outcome.details,
         numbers=[(title, str(each)) for title, each in result.numbers().items()],
-        figures=figures,
+        figures=[
+            {"svg": _inlined(figure, f"figure-{key}", caption), "caption": caption}
+            for key, figure in drawings
+            for caption in [OF_A_RECORDING[key]]
+        ],
         cuts=result.cuts,
         guesses=(*recording.weak_guesses, *recording.notes),
         warnings=result.warnings,
         provenance=result.provenance,
     )
+
+
+def _qualities(result: FitResult) -> Iterator[tuple[str, ...]]:
+    """Amplitude, Q, period and what loses most, where there is a period."""
+    for each in result.quality_factors:
+        if math.isfinite(each.period_s):
+            quality = with_error(each.quality_factor.value, each.quality_factor.sd)
+            amplitude = size(each.amplitude_rad, result["amplitude"].unit)
+            yield amplitude, quality, f"{each.period_s:.5g} s", cause(each)
 
 
 _SHEET: Final = Caption(

@@ -102,11 +102,8 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool, accept_sho
         choose,
         decode_attempt,
         kept_in,
-        new_path,
         read_attempts,
-        refuse_lost,
     )
-    from pendpipe.acquisition.recorder import record as record_from
 
     refuse_if(
         record.channel and not record.channel.isdecimal(),
@@ -120,32 +117,13 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool, accept_sho
     if attempts and accept_short and not anew and choose(attempts).lost_line:
         accept(choose(attempts))
         attempts = read_attempts(folder.glob("*.raw"))
-    whole = [attempt for attempt in attempts if not attempt.lost_line]
     if not attempts and not anew and _is_recording(out):
         print(f"{record.record}: {out.name} is kept as it is, without a raw file; {again}")
         return
-    if anew or not whole:
-        if record.stop_s is None:
-            raise InputError(
-                f"record {record.record}", "its length is unknown", "give stop_s in seconds"
-            )
-        port = record.source.removeprefix("dataq:")
-        raw_path = new_path(f"{folder}/")
-        record_from(
-            port,
-            channels=[channel or 1],
-            rate_hz=RATE_HZ,
-            duration_s=record.stop_s,
-            raw_path=raw_path,
-        )
-        (newest,) = read_attempts([raw_path])
-        if accept_short and newest.lost_line:
-            accept(newest)
-        else:
-            refuse_lost(newest, "the next run records anew; --accept-short takes what is kept")
+    if anew or all(attempt.lost_line for attempt in attempts):
+        _record(record, folder, channel or 1, accept_short=accept_short)
         attempts = read_attempts(folder.glob("*.raw"))
-        whole = [attempt for attempt in attempts if not attempt.lost_line]
-    used = choose(whole)
+    used = choose([attempt for attempt in attempts if not attempt.lost_line])
     recording = decode_attempt(used.path, out.parent, channel)
     # What was made from one of the raw files can be made from it again.
     kept = {str(attempt.header["recorded_at"]) for attempt in attempts}
@@ -158,6 +136,26 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool, accept_sho
         f"recorded {used.header['recorded_at']}{others}{notes}"
         + ("" if used.is_complete else f"; {again}")
     )
+
+
+def _record(record: Record, folder: Path, channel: int, *, accept_short: bool) -> None:
+    """Record from the instrument into a new raw file."""
+    from pendpipe.acquisition.attempts import accept, new_path, read_attempts, refuse_lost
+    from pendpipe.acquisition.recorder import record as record_from
+
+    if record.stop_s is None:
+        raise InputError(
+            f"record {record.record}", "its length is unknown", "give stop_s in seconds"
+        )
+    port, raw_path = record.source.removeprefix("dataq:"), new_path(f"{folder}/")
+    record_from(
+        port, channels=[channel], rate_hz=RATE_HZ, duration_s=record.stop_s, raw_path=raw_path
+    )
+    (newest,) = read_attempts([raw_path])
+    if accept_short and newest.lost_line:
+        accept(newest)
+    else:
+        refuse_lost(newest, "the next run records anew; --accept-short takes what is kept")
 
 
 def _recorded_at(out: Path) -> str | None:
