@@ -7,8 +7,8 @@
 Records are files of 2,048 readings. CPU seconds count, since others may use the machine; on a
 cluster those of the jobs are not seen, and the clock stands for them. The second plan is that after
 one more record; where a number of records is planned only, what its stages would have left is
-pretended. The table is written into docs/scale.md after each row, with the rows of earlier calls
-that are kept in ``.evidence`` for as long as the code is the same: a stopped run goes on.
+pretended. Each row is written into the table of docs/scale.md when it is there, and kept in
+``.evidence`` for as long as the code is the same: a stopped run goes on.
 """
 
 from __future__ import annotations
@@ -164,20 +164,24 @@ def measure(records: int, *, diagnosed: bool, to_end: bool, profile: str) -> lis
 
 
 def write_page(rows: list[list[str]], profile: str) -> None:
-    """Write the rows as a table of Markdown into the page."""
+    """Write the rows into the page's table; what was not measured again stays."""
     head = (
         *("records", "diagnosis", "first plan, CPU s", "MB", "run, CPU s", "a record"),
-        *("clock, s", "largest process, MB", "plan after one more, CPU s", "page, MB", "load"),
+        *("clock, s", "largest process, MB", "plan after one more, CPU s", "page, MB"),
+        *("load", "commit"),
     )
-    lines = [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
-    machine = f"{platform.python_version()}, {os.cpu_count()} cores, {platform.machine()}"
-    lines += ["", f"{machine}, {journal.commit()}."]
     begin, end = f"<!-- {profile}: begin -->", f"<!-- {profile}: end -->"
     page = PAGE.read_text(encoding="utf-8")
     before, _, rest = page.partition(begin)
-    _, _, after = rest.partition(end)
-    text = "\n".join(lines)
-    PAGE.write_text(f"{before}{begin}\n\n{text}\n\n{end}{after}", encoding="utf-8")
+    old, _, after = rest.partition(end)
+    kept = [[cell.strip() for cell in line.split("|")[1:-1]] for line in old.split("\n")]
+    all_rows = [row for row in kept if row and row[0].replace(",", "").isdigit()] + rows
+    # By what was run: the last of each counts.
+    found = {(row[1], row[6] == "", int(row[0].replace(",", ""))): row for row in all_rows}
+    table = [head, ["---"] * len(head), *(found[what] for what in sorted(found))]
+    text = "\n".join(f"| {' | '.join(cells)} |" for cells in table)
+    machine = f"{platform.python_version()}, {os.cpu_count()} cores, {platform.machine()}."
+    PAGE.write_text(f"{before}{begin}\n\n{text}\n\n{machine}\n\n{end}{after}", encoding="utf-8")
 
 
 def main() -> None:
@@ -200,7 +204,7 @@ def main() -> None:
                 row = measure(
                     records, diagnosed=diagnosed, to_end=to_end, profile=arguments.profile
                 )
-                kept[what] = [*row, f"{os.getloadavg()[0]:.0f}"]
+                kept[what] = [*row, f"{os.getloadavg()[0]:.0f}", journal.commit()]
                 journal.keep(name, kept, GUARDS)
             print(f"| {' | '.join(kept[what])} |", flush=True)
             write_page(list(kept.values()), arguments.profile)
