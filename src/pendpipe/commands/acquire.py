@@ -242,49 +242,40 @@ def _view(arguments: Arguments, raw: Path) -> AbstractContextManager[None]:
 
 def _from_device(arguments: Arguments, raw: Path) -> None:
     """Record into a raw file."""
-    from pendpipe.acquisition.recorder import (
-        ProgressLine,
-        acquire_simulated,
-        example_signal,
-        record,
-    )
+    from pendpipe import api
+    from pendpipe.acquisition.recorder import ProgressLine, example_signal
 
-    options = {
-        "channels": (arguments.channel or 1,),
-        "rate_hz": arguments.rate,
-        "duration_s": arguments.duration,
-        "raw_path": raw,
-        "progress": ProgressLine(sys.stderr, arguments.duration),
-        "range_volts": arguments.range_volts,
-        "reconnect_s": arguments.reconnect,
-    }
-    if arguments.device:
-        where, _, kind = arguments.device.partition(":")
-        refuse_if(
-            where != "simulated" or not kind,
-            f"--device {arguments.device}",
-            "only simulated devices go here",
-            "give simulated:di2108",
-        )
+    device, where = arguments.device, arguments.device or arguments.port
+    refuse_if(
+        not where,
+        "acquire",
+        "no instrument is named",
+        "give --port PORT or --device simulated:di2108",
+    )
+    refuse_if(
+        device and not device.startswith("simulated:"),
+        f"--device {device}",
+        "only simulated devices go here",
+        "give simulated:di2108",
+    )
+    options: dict[str, Any] = {"volts_per_radian": arguments.volts_per_radian}
+    if device:
         constant = arguments.volts_per_radian or 3.85
-        acquire_simulated(
-            kind,
-            example_signal(arguments.seed, constant),
-            clock_scale=arguments.clock_scale,
-            volts_per_radian=constant,
-            **options,
-        )
-    elif arguments.port:
-        record(
-            arguments.port,
-            arguments.model,
-            volts_per_radian=arguments.volts_per_radian,
-            **options,
-        )
-    else:
-        raise InputError(
-            "acquire", "no instrument is named", "give --port PORT or --device simulated:di2108"
-        )
+        signal_volts = example_signal(arguments.seed, constant)
+        options = {"volts_per_radian": constant, "signal": signal_volts}
+        options["clock_scale"] = arguments.clock_scale
+    api.acquire(
+        where,
+        model=arguments.model,
+        channel=arguments.channel or 1,
+        rate_hz=arguments.rate,
+        duration_s=arguments.duration,
+        raw_path=raw,
+        progress=ProgressLine(sys.stderr, arguments.duration),
+        range_volts=arguments.range_volts,
+        reconnect_s=arguments.reconnect,
+        **options,
+    )
 
 
 def _serve(arguments: Arguments) -> None:

@@ -6,6 +6,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from pendpipe.acquisition.devices.simulated import Dialect, marked
+from pendpipe.acquisition.models import CDC
 from pendpipe.arrays import IntArray
 
 
@@ -142,21 +143,18 @@ class SimulatedDI2108(
         return (np.asarray(codes) * (1 << (16 - self.bits))).astype("<i2").tobytes()
 
 
-_SIX_RANGES: Final = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
-_WITHOUT_DEC: Final = SimulatedDI2108.limits | {"dec": (1, 1)}
-MODELS: Final[dict[str, dict[str, object]]] = {
-    "DI-1100": {"bits": 12, "limits": _WITHOUT_DEC | {"srate": (1500, 65535)}},
-    "DI-1110": {"bits": 12, "limits": _WITHOUT_DEC},
-    "DI-1120": {"bits": 14, "full_scales": _SIX_RANGES},
-    "DI-4108": {"full_scales": (10.0, 5.0, 2.0, 1.0, 0.5, 0.2)},
-    "DI-2108-P": {
-        "full_scales": (10.0, 5.0, 2.5),
-        "limits": SimulatedDI2108.limits | {"deca": (1, 1)},
-    },
-    "DI-4208": {"full_scales": _SIX_RANGES},
-    "DI-4718B": {"full_scales": (5.0,)},
-}
-"""The boxes that differ from the DI-2108 in figures only."""
-
-for _model, _figures in MODELS.items():
-    type(f"Simulated{_model}", (SimulatedDI2108,), {}, model=_model, **_figures)
+for _model, _figures in CDC.items():
+    _limits = SimulatedDI2108.limits | {
+        "srate": _figures.get("divisors", (375, 65535)),
+        "dec": (1, _figures.get("decimations", 512)),
+        "deca": (1, _figures.get("further_decimations", 40000)),
+    }
+    type(
+        f"Simulated{_model}",
+        (SimulatedDI2108,),
+        {},
+        model=_model,
+        bits=_figures.get("bits", 16),
+        full_scales=_figures.get("ranges", (10.0,)),
+        limits=_limits,
+    )

@@ -11,6 +11,7 @@ from typing import ClassVar, Final
 
 from pendpipe.acquisition.drivers.base import Driver, Identity
 from pendpipe.acquisition.drivers.streams import plain_scans
+from pendpipe.acquisition.models import CDC
 from pendpipe.errors import InputError
 
 _DI149_HZ: Final = 750_000
@@ -140,18 +141,5 @@ class DI2108(
         return divisor, decimation, further
 
 
-_RANGES: Final = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
-MODELS: Final[dict[str, dict[str, object]]] = {
-    "DI-1100": {"bits": 12, "channels": 4, "divisors": (1500, 65535), "decimations": 1},
-    "DI-1110": {"bits": 12, "decimations": 1},
-    "DI-1120": {"bits": 14, "channels": 4, "ranges": _RANGES},
-    "DI-4108": {"ranges": (10.0, 5.0, 2.0, 1.0, 0.5, 0.2)},
-    # Its ranges from 0 V up are not used: a pendulum swings about its rest. It knows no deca.
-    "DI-2108-P": {"ranges": (10.0, 5.0, 2.5), "further_decimations": 1},
-    "DI-4208": {"ranges": _RANGES},
-    "DI-4718B": {"range_volts": 5.0, "ranges": (5.0,)},  # behind its amplifiers
-}
-"""The boxes that differ from the DI-2108 in figures only; 12 and 14 bits stand at the top."""
-
-for _model, _figures in MODELS.items():
+for _model, _figures in CDC.items():
     type(_model.replace("-", ""), (DI2108,), {}, model=_model, **_figures)
