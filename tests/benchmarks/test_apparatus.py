@@ -187,7 +187,7 @@ def test_a_class_that_holds_the_truth_is_right_whichever_of_its_names_leads() ->
 
 
 def test_confident_means_the_same_in_both_proofs() -> None:
-    measures = pytest.importorskip("pendpipe_challenge.measures")
+    measures = pytest.importorskip("pendpipe_challenge.score")
     assert measures.CONFIDENT == scores.CONFIDENT
     names = scores.catalogue()
     at_limit, above = (

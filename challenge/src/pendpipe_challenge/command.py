@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _set(opened, sealed=True)
     score = actions.add_parser("score", help="score an opened set")
     _set(score, sealed=False)
-    score.add_argument("--out", type=Path, required=True, metavar="DIR", help="scores, figures")
+    score.add_argument("--out", type=Path, required=True, metavar="DIR", help="scores")
     score.add_argument("--page", type=Path, metavar="MD", help="write the page here")
 
 
@@ -90,31 +90,17 @@ def _open(arguments: argparse.Namespace) -> int:
 def _score(arguments: argparse.Namespace) -> int:
     from pendpipe.errors import InputError
     from pendpipe.files import read_json, replaced, write_json
-    from pendpipe_challenge.answers import read_items
-    from pendpipe_challenge.figures import draw, draw_cases
-    from pendpipe_challenge.page import page
-    from pendpipe_challenge.peers import sindy_scores
     from pendpipe_challenge.recordings import intervals_s
-    from pendpipe_challenge.score import score
+    from pendpipe_challenge.score import page, score
 
     path = arguments.set / "opened.json"
     if not path.exists():
         raise InputError(path, "this set is not opened", "run pendpipe challenge open first")
     opened = read_json(path)
     scores = score(opened, intervals_s(arguments.set, opened["items"]))
-    scores["peers"]["pysindy"] = sindy_scores(read_items(opened), arguments.set)
-    place = arguments.out / "figures"
-    cases = draw_cases(opened, arguments.set, place)
-    for row, drawn in zip(scores["six_cases"], cases, strict=True):
-        row.update(drawn)
-    figures = draw(scores, place)
     write_json(arguments.out / "scores.json", scores)
-    text = page(scores, figures, "proof")
-    target = arguments.page or arguments.out / "proof.md"
-    with replaced(target) as stream:
+    text = page(scores)
+    with replaced(arguments.page or arguments.out / "proof.md") as stream:
         stream.write(text)
-    for name in [*figures, *(row["figure"] for row in cases if row["figure"])]:
-        with replaced(target.parent / "proof" / name, "wb") as stream:
-            stream.write((place / name).read_bytes())
     print(text)
     return 0
