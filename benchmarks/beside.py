@@ -25,7 +25,8 @@ GOOD: Final = ("circular", "detected", "first", "a hidden", "class", "both", "ou
 def answers(journal: Path) -> dict[tuple[str, int], dict[str, Any]]:
     """A journal's answers by set and number."""
     kept = map(json.loads, journal.read_text("utf-8").splitlines())
-    return {(each["set"], each["number"]): each for each in kept}
+    answered = (each.get("answer", each) for each in kept)
+    return {(each["set"], each["number"]): each for each in answered}
 
 
 def main() -> None:

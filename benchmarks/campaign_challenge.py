@@ -13,11 +13,8 @@ table are in docs/paper-case.md.
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import time
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -25,7 +22,10 @@ import yaml
 from numpy.typing import NDArray
 from scipy.special import kv
 
-ROOT: Final = Path(__file__).resolve().parents[1]
+from benchmarks import journal
+from benchmarks.journal import ROOT
+from benchmarks.table import share
+
 Array = NDArray[np.float64]
 RELATIVE_SD_B: Final = {"water": 1e-3, "air": 1.5e-4}
 RELATIVE_SD_F: Final = 3e-6
@@ -347,8 +347,9 @@ def pull(estimate: Any, truth: float) -> float:
     return float((estimate.value - truth) / estimate.sd)
 
 
-def draw(maker: Generator, number: int) -> dict[str, Any]:
+def draw(number: int) -> dict[str, Any]:
     """One campaign: drawn, judged, and beside it the oracle."""
+    maker = Generator()
     random = np.random.default_rng([24, number])
     count = len(maker.nuisances)
     theta = np.zeros(count + len(CAUSES))
@@ -384,15 +385,6 @@ def draw(maker: Generator, number: int) -> dict[str, Any]:
 
 def table(results: list[dict[str, Any]]) -> str:
     """The figures, line by line."""
-    from scipy.stats import beta
-
-    def share(hits: int, of: int) -> str:
-        if not of:
-            return "none"
-        low = beta.ppf(0.025, hits, of - hits + 1) if hits else 0.0
-        high = beta.ppf(0.975, hits + 1, of - hits) if hits < of else 1.0
-        return f"{hits} of {of} ({hits / of:.1%}; {low:.1%} to {high:.1%})"
-
     plain = [one for one in results if one["cause"] is None]
     hidden = [one for one in results if one["cause"]]
     sure = [one for one in hidden if one["oracle"]["gain"] >= COULD_SAY]
@@ -460,24 +452,16 @@ def table(results: list[dict[str, Any]]) -> str:
 
 def main() -> None:
     """Draw, judge, print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--campaigns", type=int, default=300)
-    parser.add_argument("--journal", type=Path, help="a line a campaign; goes on where it ended")
+    parser = journal.judge_parser(__doc__, "campaign_challenge", 300)
+    parser.add_argument("--campaigns", type=int, dest="number", help="the same as --number")
+    parser.set_defaults(number=300)
     arguments = parser.parse_args()
-    maker = Generator()
-    results: list[dict[str, Any]] = []
-    if arguments.journal and arguments.journal.exists():
-        results = [json.loads(line) for line in arguments.journal.read_text().splitlines()]
-    done = {one["number"] for one in results}
-    for number in range(arguments.campaigns):
-        if number in done:
-            continue
-        results.append(draw(maker, number))
-        if arguments.journal:
-            with arguments.journal.open("a") as stream:
-                stream.write(json.dumps(results[-1]) + "\n")
-        if number % 20 == 0:
-            print(number, results[-1]["cause"], results[-1]["class"], file=sys.stderr, flush=True)
+    sources = ("src/pendpipe/**/*.py", "benchmarks/campaign_challenge.py", "config/*")
+    results = []
+    for one in journal.answers(arguments, range(arguments.number), draw, sources):
+        results.append(one)
+        if one["number"] % 20 == 0:
+            print(one["number"], one["cause"], one["class"], file=sys.stderr, flush=True)
     print(table(results))
 
 

@@ -3,7 +3,7 @@
     python -m benchmarks.consistency [--number 200] [--seed N] [--fits] [--jobs 2]
     python -m benchmarks.consistency --fits-only 3000
 
-The recordings are integrated by `benchmarks.apparatus.motion`, which shares no code with the
+The recordings are integrated by `pendpipe_challenge.motion`, which shares no code with the
 library: pendulums (sin x, angles) and every fourth a spring (x, displacements), Q 5 to 5000 at the
 first amplitude, 0.01 to 2.5 rad, white noise of 1e-6 to 1e-2 of that amplitude, 12 to 1000 readings
 a cycle, 5 to 1000 cycles; each loss alone and all together, the drag in the paper's energy form or
@@ -30,18 +30,16 @@ import numpy as np
 
 import pendpipe as pp
 from benchmarks import journal
-from benchmarks.apparatus.motion import PARAMETERS, TIMES, Array, P, T, integrate
 from pendpipe.analysis.fit.goodness import LEVEL
+from pendpipe.arrays import FloatArray as Array
 from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian
 from pendpipe.errors import InputError
+from pendpipe_challenge.motion import Motion
+from pendpipe_challenge.torques import of_rates
 
-CODE: Final = ("pendpipe.api", "benchmarks/consistency.py", "benchmarks/apparatus/motion.py")
+CODE: Final = ("pendpipe.api", "benchmarks/consistency.py", "challenge/src/*/motion.py")
 MOST_READINGS: Final = 300_000
 FEWEST_CYCLES: Final = 5.0
-_PIECE: Final = 1 << 17
-"""Steps of the integrator that are in memory at a time."""
-_BIAS: Final = 0.02
-"""Standard deviations of the frequency by which the integrator may be off."""
 KINDS: Final = ("a", "b hysteretic", "b viscous", "c", "all")
 QUANTITIES: Final = ("T0", "Q", "a", "b", "c")
 REFUTED: Final = 0.003
@@ -138,33 +136,11 @@ def recorded(truth: Truth, seed: int) -> tuple[Array, Array]:
     period = 2.0 * math.pi / truth.omega
     interval = period / truth.per_cycle
     count = max(int(truth.cycles * truth.per_cycle), 24)
-    bias = math.sqrt(6.0 / count) * truth.noise / truth.amplitude / (math.pi * truth.cycles)
-    wide = 1.0 + truth.amplitude**2 if truth.sine else 1.0
-    finest = (120.0 * _BIAS * bias) ** 0.25 / wide
-    fine = max(math.ceil(interval * truth.omega / min(finest, 0.05)), 1)
-    k = np.zeros(PARAMETERS)
-    k[P.OMEGA], k[P.SINE], k[P.A], k[P.C] = truth.omega, float(truth.sine), truth.a, truth.c
-    k[P.B_VISCOUS], k[P.B_HYSTERETIC] = truth.viscous, truth.hysteretic
-    k[P.VELOCITY_FORM] = float(truth.speed)
-    state = np.array([truth.amplitude, 0.0, 0.0, 0.0, 0.0])
-    h, angles = interval / fine, []
-    # Up to the first reading, then from reading to reading.
-    begun = round(truth.phase * period / h)
-    left = begun + (count - 1) * fine
-    done = 0
-    while left > 0:
-        steps = min(left, _PIECE)
-        times = np.zeros((2 * steps + 1, TIMES))
-        times[:, T.STIFF] = times[:, T.LOSS] = 1.0
-        states, _ = integrate(state, h, k, 0, times, np.zeros(steps + 1))
-        index = np.arange(done, done + steps)
-        wanted = (index >= begun) & ((index - begun) % fine == 0)
-        angles.append(states[:-1, 0][wanted])
-        state, done, left = states[-1].copy(), done + steps, left - steps
-    angles.append(state[:1])
-    values = np.concatenate(angles)[:count] + truth.offset
-    time_s = h * (begun + fine * np.arange(len(values)))
-    return time_s, values + truth.noise * rng.standard_normal(len(values))
+    rates = (truth.omega, truth.a, truth.viscous, truth.hysteretic, truth.c)
+    law = of_rates(*rates, speed=truth.speed) | {"sine": float(truth.sine), "step_phase": 0.05}
+    time_s = truth.phase * period + interval * np.arange(count)
+    angle = Motion(law, truth.amplitude).run(np.r_[0.0, time_s]).angle_rad[1:] + truth.offset
+    return time_s, angle + truth.noise * rng.standard_normal(count)
 
 
 def cramer_rao_of_quality(truth: Truth, time_s: Array) -> float:

@@ -15,13 +15,13 @@ neighbouring rows. Beside what was left by hand stands what names leave of the s
 
 from __future__ import annotations
 
-import argparse
 import csv
 import json
 import re
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 from statistics import median
@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from benchmarks.null_families import ROOT, code_digest
+from benchmarks.journal import ROOT, answers, judge_parser
 from pendpipe.files import without_folders
 
 RECORDINGS: Final = ROOT.parent / "shared/recordings"
@@ -387,31 +387,18 @@ def summary(judged: list[tuple[Mapping[str, str], dict[str, Any]]]) -> str:
 
 def main() -> None:
     """Ask what has not been asked yet of this code, and print a row a recording."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser = judge_parser(__doc__, "known_physics", 0)
     parser.add_argument("--only", action="append", default=[], help="part of a name; repeatable")
     parser.add_argument("--limit", type=float, default=200.0, help="CPU seconds a command")
-    parser.add_argument("--journal", type=Path, default=ROOT / ".evidence/known_physics.jsonl")
     arguments = parser.parse_args()
-    rows = table()
     wanted = arguments.only or [""]
-    rows = [row for row in rows if any(each in row["record"] for each in wanted)]
-    code, known = code_digest(), {}
-    arguments.journal.parent.mkdir(parents=True, exist_ok=True)
-    if arguments.journal.exists():
-        for text in arguments.journal.read_text("utf-8").splitlines():
-            kept = json.loads(text) if text.endswith("}") else {}
-            if kept.get("code") == code:
-                known[kept["record"]] = kept
+    rows = [row for row in table() if any(each in row["record"] for each in wanted)]
     print(HEAD, flush=True)
     judged = []
-    for row in rows:
-        name = row["record"]
-        if name not in known:
-            known[name] = ask(row, arguments.limit)
-            with arguments.journal.open("a", encoding="utf-8") as stream:
-                stream.write(json.dumps(known[name] | {"code": code}) + "\n")
-        judged.append((row, judge(row, known[name])))
-        print(line(row, known[name], judged[-1][1]), flush=True)
+    asked = answers(arguments, rows, partial(ask, limit_s=arguments.limit))
+    for row, kept in zip(rows, asked, strict=True):
+        judged.append((row, judge(row, kept)))
+        print(line(row, kept, judged[-1][1]), flush=True)
     print("", summary(judged), sep="\n")
 
 

@@ -69,6 +69,17 @@ class Mutation(NamedTuple):
         return str(found)
 
 
+def changed_line(tree: Path, mutation: Mutation) -> str:
+    """The first line that a mutation changes, before and after."""
+    pairs = zip(
+        (tree / mutation.path).read_text("utf-8").splitlines(),
+        mutation.applied(tree).splitlines(),
+        strict=False,
+    )
+    before, after = next(((old, new) for old, new in pairs if old != new), ("", ""))
+    return f"`{before.strip()}` → `{after.strip()}`".replace("|", "\\|")
+
+
 def listed(tree: Path, session: Path) -> list[Mutation]:
     """All that the tool knows of a tree, in order."""
     from cosmic_ray.work_db import WorkDB, use_db
@@ -232,10 +243,10 @@ def main() -> None:
     left = [each for each in chosen if not known[f"{each} near"]]
     for mutation in [] if arguments.near else left:
         meets(mutation, ["-n", str(arguments.workers), "--dist", "worksteal", "tests"], "all")
-    print("\n| mutation | noticed by |\n|---|---|")
+    print("\n| mutation | change | noticed by |\n|---|---|---|")
     for mutation in chosen:
         by = known[f"{mutation} near"] or known.get(f"{mutation} all", "")
-        print(f"| {mutation} | {by or '**nothing**'} |")
+        print(f"| {mutation} | {changed_line(first, mutation)} | {by or '**nothing**'} |")
     missed = sum(not (known[f"{m} near"] or known.get(f"{m} all")) for m in chosen)
     print(f"\n{len(chosen) - missed} of {len(chosen)} caught at {commit[:12]}")
 

@@ -3,43 +3,32 @@
     python -m benchmarks.null_families --number 300 [--family red] [--journal FILE] [--processes 2]
 
 Each recording is a solution of Eq. 8 and noise, nothing else: every name, and every curve, is
-false. Motion and noise are made here, with numpy and scipy and no code of the library, so that
+false. The noise is made here, with numpy and scipy and no code of the library, so that
 the library's own idea of noise is not what it is tried with. A recording is the function of its
 family and its number.
 
-The motion is solved by half cycles. With x = r cos(psi), v = -omega r sin(psi) and the loss
-G = -(f(r) + 2 b_v omega r sin(psi)), f(r) = (pi/2) (c omega + b_h omega r + a omega r^2), while
-v < 0 (the other half is its mirror image),
-
-    dr/dt = G sin(psi)/omega,    dpsi/dt = omega + G cos(psi)/(omega r),
-
-both analytic in psi from 0 to pi: Picard's iteration on Chebyshev nodes converges to rounding.
-a, b = b_v + b_h and c are the rates of Eq. 13. How the loss of a smoothed recording changes the
-motion itself is a measurement effect of its own; here smoothing acts on the noise alone.
+The motion is the challenge's own. How the loss of a smoothed recording changes the motion itself is
+a measurement effect of its own; here smoothing acts on the noise alone.
 """
 
 from __future__ import annotations
 
-import argparse
-import hashlib
-import json
 import time
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from statistics import median
 from typing import Any, Final
 from zlib import crc32
 
 import numpy as np
-from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
-from scipy import signal, stats
+from scipy import signal
 
-Array = NDArray[np.float64]
-ROOT: Final = Path(__file__).parents[1]
-NODES: Final = 24
+from benchmarks import journal
+from benchmarks.table import share
+from pendpipe.arrays import FloatArray as Array
+from pendpipe_challenge.motion import Motion
+from pendpipe_challenge.torques import of_rates
+
 RATES: Final = ("a", "b", "c", "frequency")
 STATED: Final = frozenset({"coloured-noise"})
 """Effects that say what the noise is, and name no cause."""
@@ -74,53 +63,14 @@ class Law:
         return dict(zip(RATES, found, strict=True))
 
 
-def _nodes() -> tuple[Array, Array, Array]:
-    """Phases from 0 to pi, values to coefficients, and values to integrals from 0."""
-    u = -np.cos(np.pi * np.arange(NODES) / (NODES - 1))
-    to_series = np.linalg.inv(chebyshev.chebvander(u, NODES - 1))
-    summed = np.array([chebyshev.chebint(c, lbnd=-1) for c in to_series.T]).T
-    integral = np.pi / 2 * chebyshev.chebvander(u, NODES) @ summed
-    return np.pi / 2 * (1 + u), to_series, integral
-
-
-PSI, SERIES, INTEGRAL = _nodes()
-
-
-def half_cycle(law: Law, amplitude: float) -> tuple[Array, Array]:
-    """Amplitude r and time at the phases `PSI`, from rest at a turning point."""
-    omega = 2 * np.pi * law.frequency_hz
-    sine, cosine = np.sin(PSI), np.cos(PSI)
-    r = np.full(NODES, amplitude)
-    for _ in range(60):
-        dry = np.pi / 2 * omega * (law.coulomb + (law.hysteretic + law.quadratic * r) * r)
-        loss = -(dry + 2 * law.viscous * omega * r * sine)
-        pace = omega + loss * cosine / (omega * r)
-        again = amplitude + INTEGRAL @ (loss * sine / (omega * pace))
-        change = np.abs(again - r).max()
-        r = again
-        if change < 1e-15 * amplitude:
-            return r, INTEGRAL @ (1 / pace)
-    raise ArithmeticError(f"the half cycle from {amplitude:g} rad does not converge: {law}")
-
-
 def motion(law: Law, amplitude: float, time_s: Array) -> tuple[Array, Array]:
     """Angle and amplitude r at the given times after a release from rest at ``amplitude``."""
-    angle, level = np.empty_like(time_s), np.empty_like(time_s)
-    start, side, at = 0.0, 1.0, 0
-    while at < len(time_s):
-        r, clock = half_cycle(law, amplitude)
-        end = int(np.searchsorted(time_s, start + clock[-1]))
-        if end > at:
-            wanted = time_s[at:end] - start
-            to_clock, to_level = SERIES @ clock, SERIES @ r
-            slope = chebyshev.chebder(to_clock)
-            u = 2 * wanted / clock[-1] - 1
-            for _ in range(6):
-                u -= (chebyshev.chebval(u, to_clock) - wanted) / chebyshev.chebval(u, slope)
-            level[at:end] = chebyshev.chebval(u, to_level)
-            angle[at:end] = side * level[at:end] * np.cos(np.pi / 2 * (1 + u))
-        amplitude, side, start, at = r[-1], -side, start + clock[-1], end
-    return angle, level
+    omega = 2 * np.pi * law.frequency_hz
+    rates = (law.quadratic, law.viscous, law.hysteretic, law.coulomb)
+    moving = Motion(of_rates(omega, *rates) | {"step_phase": 0.08}, amplitude)
+    track = moving.run(np.r_[0.0, time_s])
+    angle, rate = track.angle_rad[1:], track.rate_rad_s[1:]
+    return angle, np.hypot(angle, rate / omega)
 
 
 # ---------------------------------------------------------------- the noise
@@ -352,45 +302,6 @@ def answer(key: tuple[str, int]) -> dict[str, Any]:
     }
 
 
-def code_digest() -> str:
-    """Of the library and of this file: an answer belongs to both."""
-    digest = hashlib.sha256(Path(__file__).read_bytes())
-    for path in sorted((ROOT / "src").rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]
-
-
-def read_journal(journal: Path, code: str) -> dict[tuple[str, int], dict[str, Any]]:
-    """Answers of this code; a last line that was cut off counts as none."""
-    found = {}
-    lines = journal.read_text("utf-8").splitlines() if journal.exists() else []
-    for line in lines:
-        try:
-            kept = json.loads(line)
-        except ValueError:
-            continue
-        if kept["code"] == code:
-            found[kept["family"], kept["number"]] = kept
-    return found
-
-
-def ask(wanted: Iterable[tuple[str, int]], processes: int) -> Iterator[dict[str, Any]]:
-    """Answers as they come."""
-    if processes == 1:
-        yield from map(answer, wanted)
-        return
-    with ProcessPoolExecutor(processes) as pool:
-        yield from pool.map(answer, wanted)
-
-
-def wilson(hits: int, trials: int) -> str:
-    """A share in percent with its 95 % interval (Wilson's score interval)."""
-    if not trials:
-        return "-"
-    low, high = stats.binomtest(hits, trials).proportion_ci(method="wilson")
-    return f"{100 * hits / trials:.1f} ({100 * low:.1f} to {100 * high:.1f})"
-
-
 def false_names(kept: dict[str, Any]) -> list[str]:
     """Names and curves that are not there."""
     true = STATED | TRUE_NAMES.get(kept["family"], frozenset())
@@ -415,10 +326,10 @@ def row(title: str, kept: list[dict[str, Any]]) -> str:
         title,
         f"{len(kept)}",
         f"{len(kept) - len(answered)}",
-        f"{len(wrong)}: {wilson(len(wrong), len(answered))}",
+        share(len(wrong), len(answered)),
         f"{stated}",
         *covers,
-        wilson(sum(every), len(every)),
+        share(sum(every), len(every)),
         f"{median(chi2):.2f}, {max(chi2):.2f}" if chi2 else "-",
         f"{median(cpu_s):.1f}, {max(cpu_s):.1f}",
         shown,
@@ -432,30 +343,24 @@ HEAD: Final = (
 )
 
 
+SOURCES: Final = (
+    *("src/pendpipe/**/*.py", "benchmarks/null_families.py"),
+    "challenge/src/pendpipe_challenge/[mt]o*.py",
+)
+
+
 def main() -> None:
     """Ask what has not been asked yet, and print a line a family."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--number", type=int, default=300, help="recordings a family")
+    parser = journal.judge_parser(__doc__, "null_families", 300)
     parser.add_argument("--family", action="append", choices=FAMILIES, help="repeatable")
-    parser.add_argument("--journal", type=Path, default=ROOT / ".evidence/null_families.jsonl")
-    parser.add_argument("--processes", type=int, choices=(1, 2), default=1)
     arguments = parser.parse_args()
-    families, code = arguments.family or list(FAMILIES), code_digest()
-    known = read_journal(arguments.journal, code)
-    arguments.journal.parent.mkdir(parents=True, exist_ok=True)
     print(HEAD, flush=True)
     pooled = []
-    for family in families:
+    for family in arguments.family or FAMILIES:
         keys = [(family, number) for number in range(arguments.number)]
-        left = [key for key in keys if key not in known]
-        with arguments.journal.open("a", encoding="utf-8") as stream:
-            for kept in ask(left, arguments.processes):
-                stream.write(json.dumps(kept | {"code": code}) + "\n")
-                stream.flush()
-                known[kept["family"], kept["number"]] = kept
-        answers = [known[key] for key in keys]
-        pooled += answers
-        print(row(family, answers), flush=True)
+        kept = list(journal.answers(arguments, keys, answer, SOURCES))
+        pooled += kept
+        print(row(family, kept), flush=True)
     print(row("pooled", pooled))
 
 

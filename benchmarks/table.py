@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from scipy.stats import binomtest
+
 _PEERS = ("numpy", "scipy", "numba", "heyoka", "lmfit")
 
 
@@ -51,6 +53,14 @@ def within(what: str, values: Sequence[float], about: float, slack: float) -> Ro
     shown = ", ".join(f"{value:.1f}" for value in values)
     met = all(abs(value - about) <= slack for value in values)
     return Row(what, shown, f"{about:g} +- {slack:g}", met)
+
+
+def share(hits: int, of: int) -> str:
+    """How many of how many, and the share in percent with its exact 95 % interval."""
+    if not of:
+        return "none"
+    low, high = binomtest(hits, of).proportion_ci()
+    return f"{hits} of {of}: {100 * hits / of:.1f} ({100 * low:.1f} to {100 * high:.1f})"
 
 
 def lower_quartile(values: list[float]) -> float:

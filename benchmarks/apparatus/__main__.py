@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import argparse
-import hashlib
 import json
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from benchmarks.apparatus.draw import Item, draw
 from benchmarks.apparatus.scores import line, table
-from benchmarks.null_families import ROOT, code_digest
+from benchmarks.journal import answers, judge_parser
 
 
 def truth_of(item: Item) -> dict[str, Any]:
@@ -24,10 +20,11 @@ def truth_of(item: Item) -> dict[str, Any]:
     return truth | {"near": sorted(item.near), "allowed": sorted(item.allowed)}
 
 
-def answer(name: str, number: int) -> dict[str, Any]:
+def answer(key: tuple[str, int]) -> dict[str, Any]:
     """Make an item, hand the library its file, and keep what is needed of the answer."""
     import pendpipe as pp
 
+    name, number = key
     item = draw(name, number)
     kept: dict[str, Any] = {"set": name, "number": number, "truth": truth_of(item), "effects": []}
     with tempfile.TemporaryDirectory() as folder:
@@ -53,51 +50,29 @@ def answer(name: str, number: int) -> dict[str, Any]:
     return kept | {"p_value": content["p_value"], "over_noise": over}
 
 
-def digest() -> str:
-    """Of the library and of the generator."""
-    found = hashlib.sha256(code_digest().encode())
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        if path.name != "scores.py":
-            found.update(path.read_bytes())
-    return found.hexdigest()[:12]
+SOURCES = (
+    *("src/pendpipe/**/*.py", "benchmarks/apparatus/[cdw]*.py", "benchmarks/null_families.py"),
+    "challenge/src/pendpipe_challenge/[mt]o*.py",
+)
 
 
 def main() -> None:
     """Answer what has not been answered yet by this code, and print the scores."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = judge_parser(__doc__, "apparatus", 60)
     parser.add_argument("--set", default="trial", help="name of the set, its seed")
-    parser.add_argument("--number", type=int, default=60, help="items")
-    parser.add_argument("--journal", type=Path, default=ROOT / ".evidence/apparatus.jsonl")
-    parser.add_argument("--processes", type=int, choices=(1, 2), default=1)
     parser.add_argument("--list", action="store_true", help="print each item")
     parser.add_argument("--export", type=Path, metavar="DIR", help="only write files and truths")
     arguments = parser.parse_args()
-    name, code = arguments.set, digest()
+    name = arguments.set
+    keys = [(name, number) for number in range(arguments.number)]
     if arguments.export:
         arguments.export.mkdir(parents=True, exist_ok=True)
-        for number in range(arguments.number):
-            item, path = draw(name, number), arguments.export / f"{name}-{number:04d}.csv"
+        for key in keys:
+            item, path = draw(*key), arguments.export / f"{name}-{key[1]:04d}.csv"
             item.write(path)
             path.with_suffix(".json").write_text(json.dumps(truth_of(item)), encoding="utf-8")
         return
-    known = {}
-    arguments.journal.parent.mkdir(parents=True, exist_ok=True)
-    if arguments.journal.exists():
-        for text in arguments.journal.read_text("utf-8").splitlines():
-            kept = json.loads(text) if text.endswith("}") else {}
-            if kept.get("code") == code and kept["set"] == name:
-                known[kept["number"]] = kept
-    left = [number for number in range(arguments.number) if number not in known]
-    ask = partial(answer, name)
-    with (
-        arguments.journal.open("a", encoding="utf-8") as stream,
-        ProcessPoolExecutor(arguments.processes) as pool,
-    ):
-        for kept in pool.map(ask, left):
-            stream.write(json.dumps(kept | {"code": code}) + "\n")
-            stream.flush()
-            known[kept["number"]] = kept
-    answered = [json.loads(json.dumps(known[number])) for number in range(arguments.number)]
+    answered = list(answers(arguments, keys, answer, SOURCES))
     if arguments.list:
         print(
             "| item | apparatus | there | answer | wrong | over noise | CPU s |",

@@ -8,12 +8,14 @@ law: its name is no error.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from benchmarks.apparatus.motion import Array, Law, P, T
 from benchmarks.apparatus.world import Apply, Scene, Seen, World
+from pendpipe.arrays import FloatArray as Array
+from pendpipe_challenge.torques import BOOK
 
 Rng = np.random.Generator
 
@@ -67,116 +69,143 @@ def _instant(rng: Rng, scene: Scene) -> float:
     return float(rng.uniform(0.15, 0.85) * scene.duration_s)
 
 
-def _half_steps(world: World) -> Array:
-    return np.linspace(world.grid[0], world.grid[-1], len(world.times))
+def _course(rng: Rng, scene: Scene) -> tuple[float, float]:
+    """Time constant and rate of a course from 0 at the first reading to 1 at the last.
 
-
-def _course(rng: Rng, scene: Scene) -> Callable[[Array], Array]:
-    """From 0 at the first reading to 1 at the last: straight, or levelling off."""
+    It is straight (0), or levels off.
+    """
     span = scene.duration_s
-    tau = span * (1e3 if rng.integers(2) else _log(rng, 0.3, 2.0))
-
-    def course(t: Array) -> Array:
-        return (1 - np.exp(-np.maximum(t, 0) / tau)) / (1 - np.exp(-span / tau))
-
-    return course
+    tau = 0.0 if rng.integers(2) else span * _log(rng, 0.3, 2.0)
+    return tau, 1 / span if tau == 0.0 else 1 / (tau * (1 - np.exp(-span / tau)))
 
 
 # ------------------------------------------------------------ the motion
 
-
-def _law_parameter(name: str, size: float, most: float, place: P, power: int) -> None:
-    """A parameter that is its size over a power of the amplitude."""
-
-    def draw(rng: Rng, scene: Scene) -> Apply:
-        def apply(world: World, size: float) -> None:
-            world.k[place] += size / scene.amplitude**power
-
-        return apply
-
-    CATALOGUE[name] = Kind(draw, size, most, signed=True)
+Motion = Callable[[Rng, Scene], tuple[str, float, dict[str, float]]]
+"""A parameter of the motion, its value at size 1, and what else is set."""
 
 
-_law_parameter("cubic-stiffness", 0.01, 0.3, P.K3, 2)
-_law_parameter("quadratic-stiffness", 0.01, 0.2, P.K2, 1)
-_law_parameter("amplitude-linear-stiffness", 0.01, 0.3, P.K_ABS, 1)
+def _enter_motion(
+    table: dict[str, Kind], name: str, size: float, most: float, draw: Motion, *, near: str = ""
+) -> None:
+    """Enter an effect whose size is a parameter of the motion; a negative size is signed."""
+
+    def drawn(rng: Rng, scene: Scene) -> Apply:
+        parameter, unit, details = draw(rng, scene)
+        return lambda world, size: world.add(parameter, unit * size, **details)
+
+    table[name] = Kind(drawn, abs(size), most, size < 0, frozenset(near.split()))
 
 
-@_enter(CATALOGUE, "circular-error", 1.0, 1.0)
-def circular(rng: Rng, scene: Scene) -> Apply:
-    def apply(world: World, size: float) -> None:
-        world.k[P.SINE] = size
+def _power_law(rng: Rng, s: Scene) -> tuple[str, float, dict[str, float]]:
+    n = float(rng.choice([0.5, 1.5, 2.5, 3.0]))
+    return "power", 2 * s.loss_rate * s.fastest ** (1 - n), {"power_exponent": n}
 
-    return apply
+
+def _drive(rng: Rng, s: Scene) -> tuple[str, float, dict[str, float]]:
+    ratio = float(rng.choice([rng.uniform(0.3, 0.9), rng.uniform(1.1, 2.8)]))
+    details = {"drive_omega": ratio * s.omega, "drive_phase": rng.uniform(0, 2 * np.pi)}
+    return "drive", _torque(s), details
+
+
+def _parametric(rng: Rng, s: Scene) -> tuple[str, float, dict[str, float]]:
+    pace = 2 * s.omega * rng.uniform(0.96, 1.04)
+    return "parametric", 1.0, {"parametric_omega": pace, "parametric_phase": rng.uniform(0, 6.28)}
+
+
+def _drift(parameter: str, unit: Callable[[Scene], float]) -> Motion:
+    def draw(rng: Rng, s: Scene) -> tuple[str, float, dict[str, float]]:
+        tau, rate = _course(rng, s)
+        return parameter, unit(s) * rate, {f"{parameter}_time": tau}
+
+    return draw
+
+
+def _jump(parameter: str, unit: Callable[[Scene], float]) -> Motion:
+    return lambda rng, s: (parameter, unit(s), {f"{parameter}_at": _instant(rng, s)})
+
+
+def _vortex(rng: Rng, s: Scene) -> tuple[str, float, dict[str, float]]:
+    above = rng.uniform(0.3, 0.7) * s.amplitude
+    return "shedding", 11.8 * s.omega * s.loss_rate, {"shedding_amplitude": above}
+
+
+def _loss(scene: Scene) -> float:
+    return scene.loss_rate
+
+
+def _torque(scene: Scene) -> float:
+    return scene.omega**2 * scene.amplitude
+
+
+_MOTIONS: Final[dict[str, tuple[float, float, Motion]]] = {
+    "circular-error": (1.0, 1.0, lambda rng, s: ("sine", 1.0, {})),
+    "cubic-stiffness": (-0.01, 0.3, lambda rng, s: ("cubic", s.amplitude**-2, {})),
+    "quadratic-stiffness": (-0.01, 0.2, lambda rng, s: ("square", 1 / s.amplitude, {})),
+    "amplitude-linear-stiffness": (-0.01, 0.3, lambda rng, s: ("sided", 1 / s.amplitude, {})),
+    "power-law-damping": (0.3, 2.0, _power_law),
+    "cubic-damping": (
+        *(0.3, 3.0),
+        lambda rng, s: ("rayleigh", 8 / 3 * s.loss_rate / s.fastest**2, {}),
+    ),
+    "stribeck-friction": (
+        *(0.2, 2.0),
+        lambda rng, s: (
+            *("stribeck", s.loss_rate * s.fastest),
+            {"stribeck_speed": _log(rng, 0.05, 0.4) * s.fastest},
+        ),
+    ),
+    "presliding-friction": (
+        *(1e-3, 0.05),
+        lambda rng, s: ("dahl", 1.0, {"dahl_reach": _log(rng, 0.02, 0.3) * s.amplitude}),
+    ),
+    "backlash": (0.005, 0.1, lambda rng, s: ("play", 0.5 * s.amplitude, {})),
+    "vortex-shedding": (0.3, 3.0, _vortex),
+    "periodic-drive": (1e-3, 0.05, _drive),
+    "parametric-drive": (1e-3, 0.05, _parametric),
+    "frequency-drift": (-1e-4, 0.02, _drift("omega_drift", lambda s: 1.0)),
+    "damping-drift": (0.1, 1.5, _drift("gamma_drift", lambda s: 2 * s.loss_rate)),
+    "release-transient": (
+        *(0.3, 5.0),
+        lambda rng, s: (
+            *("release", 2 * s.loss_rate),
+            {"release_time": _log(rng, 0.03, 0.15) * s.duration_s},
+        ),
+    ),
+    "equilibrium-creep": (
+        *(-1e-3, 0.1),
+        lambda rng, s: (
+            *("creep_log", s.amplitude),
+            {"creep_log_time": _log(rng, 0.05, 0.5) * s.duration_s},
+        ),
+    ),
+    "equilibrium-step": (-1e-3, 0.1, _jump("rest_jump", lambda s: s.amplitude)),
+    "frequency-step": (-1e-4, 0.02, _jump("omega_jump", lambda s: 1.0)),
+    "damping-step": (0.1, 1.5, _jump("gamma_jump", lambda s: 2 * s.loss_rate)),
+    "impulse": (-1e-3, 0.1, _jump("impulse", lambda s: s.fastest)),
+}
+for _name, (_size, _most, _draw) in _MOTIONS.items():
+    _enter_motion(CATALOGUE, _name, _size, _most, _draw)
 
 
 @_enter(CATALOGUE, "drag-form", 1.0, 1.0)
 def drag_form(rng: Rng, scene: Scene) -> Apply:
     def apply(world: World, size: float) -> None:
-        world.k[P.VELOCITY_FORM] = size
+        moved = size * 0.5 * np.pi * scene.rates[0] / scene.omega
+        world.add("quadratic", -moved)
+        world.add("drag", 1.5 * moved)
 
     return apply
 
 
-@_enter(CATALOGUE, "power-law-damping", 0.3, 2.0)
-def power_law(rng: Rng, scene: Scene) -> Apply:
-    exponent = float(rng.choice([0.5, 1.5, 2.5, 3.0]))
-    fastest = scene.omega * scene.amplitude
-
-    def apply(world: World, size: float) -> None:
-        world.k[P.EXPONENT] = exponent
-        world.k[P.POWER] = size * 2 * scene.loss_rate * fastest * (0.1 / fastest) ** exponent
-
-    return apply
-
-
-@_enter(CATALOGUE, "cubic-damping", 0.3, 3.0)
-def cubic_damping(rng: Rng, scene: Scene) -> Apply:
-    def apply(world: World, size: float) -> None:
-        world.k[P.CUBIC] = size * 8 * scene.loss_rate / scene.amplitude**2
-
-    return apply
-
-
-@_enter(CATALOGUE, "stribeck-friction", 0.2, 2.0)
-def stribeck(rng: Rng, scene: Scene) -> Apply:
-    slow = _log(rng, 0.05, 0.4)
-
-    def apply(world: World, size: float) -> None:
-        fastest = scene.omega * scene.amplitude
-        world.k[P.STRIBECK] = size * scene.loss_rate * fastest
-        world.k[P.STRIBECK_V] = slow * fastest
-
-    return apply
-
-
-@_enter(CATALOGUE, "presliding-friction", 1e-3, 0.05)
-def presliding(rng: Rng, scene: Scene) -> Apply:
-    depth = _log(rng, 0.02, 0.3) * scene.amplitude
-
-    def apply(world: World, size: float) -> None:
-        world.k[P.DAHL], world.k[P.DAHL_Z] = size, depth
-        world.start[4] = depth
-
-    return apply
-
-
-@_enter(CATALOGUE, "backlash", 0.005, 0.1)
-def backlash(rng: Rng, scene: Scene) -> Apply:
-    def apply(world: World, size: float) -> None:
-        world.k[P.PLAY] = max(size, 0) * scene.amplitude
-
-    return apply
-
-
-@_enter(CATALOGUE, "vortex-shedding", 0.3, 3.0)
-def vortex(rng: Rng, scene: Scene) -> Apply:
-    above = rng.uniform(0.3, 0.7) * scene.amplitude
-
-    def apply(world: World, size: float) -> None:
-        world.k[P.VORTEX], world.k[P.VORTEX_FROM] = size * scene.loss_rate, above
-
-    return apply
+def _second_plane(world: World, scene: Scene, beats: float, swing: float, phase: float) -> None:
+    """Let the other plane swing, a little faster or slower."""
+    detuned = scene.omega + 2 * np.pi * beats / scene.duration_s
+    world.motion = replace(
+        world.motion,
+        second_rad=swing * np.cos(phase),
+        second_rate_rad_s=swing * scene.omega * np.sin(phase),
+    ).changed(second=1.0, second_omega=detuned, second_gamma=2 * scene.loss_rate)
 
 
 @_enter(CATALOGUE, "plane-coupling", 0.01, 0.3)
@@ -184,22 +213,8 @@ def plane(rng: Rng, scene: Scene) -> Apply:
     phase, beats = rng.uniform(0, 2 * np.pi), _log(rng, 1.0, 8.0) * rng.choice([-1, 1])
 
     def apply(world: World, size: float) -> None:
-        world.k[P.PLANE_DETUNING] = 2 * np.pi * beats / scene.duration_s
-        world.start[2] = size * scene.amplitude * np.cos(phase)
-        world.start[3] = size * scene.amplitude * scene.omega * np.sin(phase)
+        _second_plane(world, scene, beats, size * scene.amplitude, phase)
         world.readings.append(lambda seen, y: y + seen.p)
-
-    return apply
-
-
-@_enter(CATALOGUE, "periodic-drive", 1e-3, 0.05)
-def drive(rng: Rng, scene: Scene) -> Apply:
-    ratio = float(rng.choice([rng.uniform(0.3, 0.9), rng.uniform(1.1, 2.8)]))
-    phase = rng.uniform(0, 2 * np.pi)
-
-    def apply(world: World, size: float) -> None:
-        at = ratio * scene.omega * _half_steps(world) + phase
-        world.times[:, T.PUSH] += size * scene.omega**2 * scene.amplitude * np.cos(at)
 
     return apply
 
@@ -209,95 +224,18 @@ def broadband(rng: Rng, scene: Scene) -> Apply:
     seed = int(rng.integers(2**31))
 
     def apply(world: World, size: float) -> None:
-        steps = np.random.default_rng(seed).normal(size=len(world.kicks))
-        random = size * scene.omega**2 * scene.amplitude * np.repeat(steps, 2)[: len(world.times)]
-        world.times[:, T.PUSH] += random
-
-    return apply
-
-
-@_enter(CATALOGUE, "parametric-drive", 1e-3, 0.05)
-def parametric(rng: Rng, scene: Scene) -> Apply:
-    pace, phase = 2 * scene.omega * rng.uniform(0.96, 1.04), rng.uniform(0, 2 * np.pi)
-
-    def apply(world: World, size: float) -> None:
-        world.times[:, T.STIFF] += size * np.cos(pace * _half_steps(world) + phase)
-
-    return apply
-
-
-@_enter(CATALOGUE, "frequency-drift", 1e-4, 0.02, signed=True)
-def frequency_drift(rng: Rng, scene: Scene) -> Apply:
-    course = _course(rng, scene)
-
-    def apply(world: World, size: float) -> None:
-        world.times[:, T.STIFF] += 2 * size * course(_half_steps(world))
-
-    return apply
-
-
-@_enter(CATALOGUE, "damping-drift", 0.1, 1.5)
-def damping_drift(rng: Rng, scene: Scene) -> Apply:
-    course = _course(rng, scene)
-
-    def apply(world: World, size: float) -> None:
-        world.times[:, T.BRAKE] += size * scene.loss_rate * course(_half_steps(world))
-
-    return apply
-
-
-@_enter(CATALOGUE, "release-transient", 0.3, 5.0)
-def release(rng: Rng, scene: Scene) -> Apply:
-    tau = _log(rng, 0.03, 0.15) * scene.duration_s
-
-    def apply(world: World, size: float) -> None:
-        since = np.maximum(_half_steps(world), 0)
-        world.times[:, T.BRAKE] += size * scene.loss_rate * np.exp(-since / tau)
-
-    return apply
-
-
-@_enter(CATALOGUE, "equilibrium-creep", 1e-3, 0.1, signed=True)
-def creep(rng: Rng, scene: Scene) -> Apply:
-    tau = _log(rng, 0.05, 0.5) * scene.duration_s
-
-    def apply(world: World, size: float) -> None:
-        since = np.maximum(_half_steps(world), 0)
-        world.times[:, T.REST] += size * scene.amplitude * np.log1p(since / tau)
-
-    return apply
-
-
-def _step_in(name: str, size: float, most: float, row: T, factor: float, of_swing: bool) -> None:
-    def draw(rng: Rng, scene: Scene) -> Apply:
-        at = _instant(rng, scene)
-
-        def apply(world: World, size: float) -> None:
-            height = factor * size * (scene.amplitude if of_swing else 1.0)
-            world.times[:, row] += height * (_half_steps(world) >= at)
-
-        return apply
-
-    CATALOGUE[name] = Kind(draw, size, most, signed=row != T.LOSS)
-
-
-_step_in("equilibrium-step", 1e-3, 0.1, T.REST, 1.0, of_swing=True)
-_step_in("frequency-step", 1e-4, 0.02, T.STIFF, 2.0, of_swing=False)
-_step_in("damping-step", 0.1, 1.5, T.LOSS, 1.0, of_swing=False)
-
-
-@_enter(CATALOGUE, "impulse", 1e-3, 0.1, signed=True)
-def impulse(rng: Rng, scene: Scene) -> Apply:
-    at = _instant(rng, scene)
-
-    def apply(world: World, size: float) -> None:
-        place = int(np.searchsorted(world.grid, at))
-        world.kicks[place] += size * scene.omega * scene.amplitude
+        drawn = np.random.default_rng(seed).normal(size=len(world.grid) - 1)
+        kicks = size * _torque(scene) * (world.grid[1] - world.grid[0]) * drawn
+        world.motion = replace(world.motion, kicks_rad_s=kicks)
 
     return apply
 
 
 # ------------------------------------------------------------ the sensor
+
+
+def _curve(tau: float, rate: float) -> Callable[[Array], Array]:
+    return lambda t: rate * (t if tau == 0.0 else -tau * np.expm1(-t / tau))
 
 
 def _read(function: Callable[[Seen, Array, float], Array]) -> Apply:
@@ -378,13 +316,13 @@ def shutter(rng: Rng, scene: Scene) -> Apply:
 
 @_enter(CATALOGUE, "offset-drift", 1e-3, 0.1, signed=True)
 def offset_drift(rng: Rng, scene: Scene) -> Apply:
-    course = _course(rng, scene)
+    course = _curve(*_course(rng, scene))
     return _read(lambda seen, y, size: y + size * scene.amplitude * course(seen.time_s))
 
 
 @_enter(CATALOGUE, "gain-drift", 1e-3, 0.3, signed=True)
 def gain_drift(rng: Rng, scene: Scene) -> Apply:
-    course = _course(rng, scene)
+    course = _curve(*_course(rng, scene))
     return _read(lambda seen, y, size: y * (1 + size * course(seen.time_s)))
 
 
@@ -459,106 +397,77 @@ def widths(rng: Rng, scene: Scene) -> Apply:
 # ------------------------------------------------------------ out of the catalogue
 
 
-def _book(
-    name: str,
-    law: Law,
-    size: float,
-    most: float,
-    shapes: Callable[[Rng, Scene], tuple[float, float]] = lambda rng, scene: (1.0, 1.0),
-    scale: Callable[[Scene], float] = lambda scene: 1.0,
-    near: str = "",
-) -> None:
-    """A law of `Law`: its size in units of `scale`, and its two shapes."""
+_Shapes = Callable[[Rng, Scene], tuple[float, float]]
 
-    def draw(rng: Rng, scene: Scene) -> Apply:
+
+def _of_swing(low: float, high: float) -> _Shapes:
+    return lambda rng, s: (rng.uniform(low, high) * s.amplitude, 1.0)
+
+
+def _of_speed(low: float, high: float) -> _Shapes:
+    return lambda rng, s: (rng.uniform(low, high) * s.fastest, 1.0)
+
+
+def _one(scene: Scene) -> float:
+    return 1.0
+
+
+def _none(rng: Rng, scene: Scene) -> tuple[float, float]:
+    return 1.0, 1.0
+
+
+def _beside(low: float, high: float, least: float) -> _Shapes:
+    """Frequency and damping of a second oscillator, relative."""
+    return lambda rng, s: (rng.uniform(low, high), rng.uniform(least, 0.05))
+
+
+_BOOKS: Final[dict[str, tuple[float, float, Callable[[Scene], float], _Shapes, str]]] = {
+    "winding-string": (0.01, 0.2, _one, _none, "quadratic-stiffness"),
+    "rolling-edge": (0.01, 0.3, _one, _none, "cubic-stiffness"),
+    "magnet-below": (
+        *(0.005, 0.1, _one, _of_swing(0.1, 0.35)),
+        "presliding-friction unnamed-restoring",
+    ),
+    "eddy-peak": (0.5, 4.0, _loss, _of_speed(0.15, 0.5), "stribeck-friction power-law-damping"),
+    "local-brake": (0.5, 6.0, _loss, _of_swing(0.1, 0.4), "power-law-damping"),
+    "bumper": (0.05, 2.0, _one, _of_swing(0.5, 0.85), ""),
+    "wind": (0.2, 1.5, lambda s: s.loss_rate / s.fastest, _of_speed(0.1, 0.4), "drag-form"),
+    "one-way-drag": (0.3, 3.0, _loss, _none, ""),
+    "ageing-friction": (
+        *(0.05, 1.0, lambda s: s.loss_rate * s.fastest, _of_swing(0.03, 0.3)),
+        "stribeck-friction presliding-friction vortex-shedding",
+    ),
+    "cable-hysteresis": (
+        *(1e-3, 0.05, _one, _of_swing(0.2, 0.8)),
+        "presliding-friction complex-modulus",
+    ),
+    "elastic-string": (0.3, 1.0, _one, _beside(2.2, 4.5, 0.005), "cubic-stiffness"),
+    "sloshing-bob": (
+        *(1e-3, 0.05, _one, _beside(1.06, 1.6, 0.01)),
+        "second-mode plane-coupling release-transient",
+    ),
+    "slipping-arm": (3e-3, 0.2, _torque, _of_swing(0.4, 0.75), "vortex-shedding"),
+    "cogging": (
+        *(1e-3, 0.05, _torque),
+        *(lambda rng, s: (rng.uniform(4.0, 12.0) * np.pi / (2 * s.amplitude), 1.0), ""),
+    ),
+    "vibrated-pivot": (0.01, 0.3, _one, _none, "cubic-stiffness"),
+    "squeeze-film": (0.1, 1.0, _loss, _of_swing(1.1, 1.6), ""),
+}
+"""First and largest size, its unit, the shapes, and what comes near, of each law of `BOOK`."""
+
+
+def _book(name: str, unit: Callable[[Scene], float], shapes: _Shapes) -> Motion:
+    def draw(rng: Rng, scene: Scene) -> tuple[str, float, dict[str, float]]:
         first, second = shapes(rng, scene)
-        unit = scale(scene)
+        details = {"book": float(BOOK[name]), "book_shape": first, "book_shape_2": second}
+        return "book_size", unit(scene), details
 
-        def apply(world: World, size: float) -> None:
-            world.law = law
-            world.k[P.SIZE], world.k[P.SHAPE], world.k[P.SHAPE_2] = size * unit, first, second
-
-        return apply
-
-    OUTSIDE[name] = Kind(draw, size, most, near=frozenset(near.split()))
+    return draw
 
 
-def _loss(scene: Scene) -> float:
-    return scene.loss_rate
-
-
-def _torque(scene: Scene) -> float:
-    return scene.omega**2 * scene.amplitude
-
-
-_book("winding-string", Law.WINDING_STRING, 0.01, 0.2, near="quadratic-stiffness")
-_book("rolling-edge", Law.ROLLING_EDGE, 0.01, 0.3, near="cubic-stiffness")
-_book(
-    *("magnet-below", Law.MAGNET_BELOW, 0.005, 0.1),
-    shapes=lambda rng, scene: (rng.uniform(0.1, 0.35) * scene.amplitude, 0.0),
-    near="presliding-friction unnamed-restoring",
-)
-_book(
-    *("eddy-peak", Law.EDDY_PEAK, 0.5, 4.0),
-    shapes=lambda rng, scene: (rng.uniform(0.15, 0.5) * scene.omega * scene.amplitude, 0.0),
-    scale=_loss,
-    near="stribeck-friction power-law-damping",
-)
-_book(
-    *("local-brake", Law.LOCAL_BRAKE, 0.5, 6.0),
-    shapes=lambda rng, scene: (rng.uniform(0.1, 0.4) * scene.amplitude, 0.0),
-    scale=_loss,
-    near="power-law-damping",
-)
-_book(
-    *("bumper", Law.BUMPER, 0.05, 2.0),
-    shapes=lambda rng, scene: (rng.uniform(0.5, 0.85) * scene.amplitude, 0.0),
-)
-_book(
-    *("wind", Law.WIND, 0.2, 1.5),
-    shapes=lambda rng, scene: (rng.uniform(0.1, 0.4) * scene.omega * scene.amplitude, 0.0),
-    scale=lambda scene: scene.loss_rate / (scene.omega * scene.amplitude),
-    near="drag-form",
-)
-_book("one-way-drag", Law.ONE_WAY, 0.3, 3.0, scale=_loss)
-_book(
-    *("ageing-friction", Law.AGEING, 0.05, 1.0),
-    shapes=lambda rng, scene: (rng.uniform(0.03, 0.3) * scene.amplitude, 0.0),
-    scale=lambda scene: scene.loss_rate * scene.omega * scene.amplitude,
-    near="stribeck-friction presliding-friction vortex-shedding",
-)
-_book(
-    *("cable-hysteresis", Law.BOUC_WEN, 1e-3, 0.05),
-    shapes=lambda rng, scene: (rng.uniform(0.2, 0.8) * scene.amplitude, 0.0),
-    near="presliding-friction complex-modulus",
-)
-_book(
-    *("elastic-string", Law.ELASTIC, 0.3, 1.0),
-    shapes=lambda rng, scene: (rng.uniform(2.2, 4.5), rng.uniform(0.005, 0.05)),
-    near="cubic-stiffness",
-)
-_book(
-    *("sloshing-bob", Law.SLOSHING, 1e-3, 0.05),
-    shapes=lambda rng, scene: (rng.uniform(1.06, 1.6), rng.uniform(0.01, 0.05)),
-    near="second-mode plane-coupling release-transient",
-)
-_book(
-    *("slipping-arm", Law.SLIPPING_ARM, 3e-3, 0.2),
-    shapes=lambda rng, scene: (rng.uniform(0.4, 0.75) * scene.amplitude, 0.0),
-    scale=_torque,
-    near="vortex-shedding",
-)
-_book(
-    *("cogging", Law.COGGING, 1e-3, 0.05),
-    shapes=lambda rng, scene: (rng.uniform(4.0, 12.0) * np.pi / (2 * scene.amplitude), 0.0),
-    scale=_torque,
-)
-_book("vibrated-pivot", Law.VIBRATED, 0.01, 0.3, near="cubic-stiffness")
-_book(
-    *("squeeze-film", Law.SQUEEZE_FILM, 0.1, 1.0),
-    shapes=lambda rng, scene: (rng.uniform(1.1, 1.6) * scene.amplitude, 0.0),
-    scale=_loss,
-)
+for _name, (_size, _most, _unit, _shape, _near) in _BOOKS.items():
+    _enter_motion(OUTSIDE, _name, _size, _most, _book(_name, _unit, _shape), near=_near)
 
 
 @_enter(OUTSIDE, "subdivision", 1e-3, 0.02)
@@ -608,9 +517,7 @@ def squared(rng: Rng, scene: Scene) -> Apply:
     phase, beats = rng.uniform(0, 2 * np.pi), _log(rng, 2.0, 10.0)
 
     def apply(world: World, size: float) -> None:
-        world.k[P.PLANE_DETUNING] = 2 * np.pi * beats / scene.duration_s
-        world.start[2] = scene.amplitude * np.cos(phase)
-        world.start[3] = scene.amplitude * scene.omega * np.sin(phase)
+        _second_plane(world, scene, beats, scene.amplitude, phase)
         world.readings.append(lambda seen, y: y + size * seen.p**2 / scene.amplitude)
 
     return apply

@@ -15,8 +15,8 @@ from scipy.signal import lfilter
 
 from benchmarks import null_families as nulls
 from benchmarks.apparatus.causes import CATALOGUE, OUTSIDE, Kind, Rng
-from benchmarks.apparatus.motion import Array
 from benchmarks.apparatus.world import EVENT_EDGE, EVENT_JITTER_S, Cause, Scene, evidence
+from pendpipe.arrays import FloatArray as Array
 
 PARTS: Final = {"null": 0.2, "one": 0.45, "two": 0.15, "outside": 0.2}
 """Of a set, by what is hidden in an item beside sin x."""

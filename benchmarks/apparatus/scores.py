@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from statistics import median
 from typing import Any, Final
 
-from benchmarks.null_families import wilson
+from benchmarks.table import share
 
 LIKELY: Final = 0.5
 """A probability from which a name is meant."""
@@ -76,11 +76,6 @@ def judge(kept: Kept, names: frozenset[str]) -> dict[str, Any]:
     }
 
 
-def share(hits: list[bool]) -> str:
-    """How many of how many, and the share with its interval in percent."""
-    return f"{sum(hits)} of {len(hits)}: {wilson(sum(hits), len(hits))}"
-
-
 def rows(kept: list[Kept]) -> dict[str, list[bool]]:
     """What is asked of a set, with the answer for each item of which it is asked."""
     names = catalogue()
@@ -120,7 +115,7 @@ def rows(kept: list[Kept]) -> dict[str, list[bool]]:
 def table(kept: list[Kept]) -> str:
     """The scores of a set, a line each."""
     lines = ["| what | share, % (95 % interval) |", "|---|---|"]
-    lines += [f"| {what} | {share(hits)} |" for what, hits in rows(kept).items()]
+    lines += [f"| {what} | {share(sum(hits), len(hits))} |" for what, hits in rows(kept).items()]
     cpu_s = [item["cpu_s"] for item in kept]
     lines += [f"| CPU s, median and largest | {median(cpu_s):.1f}, {max(cpu_s):.1f} |"]
     return "\n".join(lines)

@@ -1,25 +1,31 @@
-"""A scene: a pendulum, its sensor, and what acts on both; and what the sensor reads of it."""
+"""A scene: a pendulum, its sensor, and what acts on both; and what the sensor reads of it.
+
+The motion is the challenge's own (`pendpipe_challenge.motion`); nothing is taken from the library.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from scipy.signal import lfilter
 
-from benchmarks.apparatus.motion import PARAMETERS, TIMES, Array, Law, P, T, integrate
+from pendpipe.arrays import FloatArray as Array
+from pendpipe_challenge.chain import with_turns
+from pendpipe_challenge.motion import Motion
+from pendpipe_challenge.torques import of_rates
 
-STEPS_IN_CYCLE: Final = 400
-TANGENT: Final = (P.OMEGA, P.A, P.B_VISCOUS, P.C)
-"""Parameters of the baseline that any fit would adjust, beside amplitude, instant and offset."""
+IN_CYCLE: Final = 200
+TANGENT: Final = ("omega", "quadratic", "gamma", "coulomb", "release")
+"""Parameters of the baseline that any fit would adjust, beside instant and offset."""
 
 
 @dataclass
 class Seen:
-    """What a sensor sees at its instants: motion, second oscillator, last turning point."""
+    """What a sensor sees at its instants: motion, second coordinate, last turning point."""
 
     time_s: Array
     angle: Callable[[Array], Array]
@@ -37,14 +43,14 @@ Reading = Callable[[Seen, Array], Array]
 class World:
     """All that an effect may change; what is drawn of a scene before an effect is none."""
 
-    k: Array
-    law: Law
+    motion: Motion
     grid: Array
-    times: Array
-    kicks: Array
-    start: Array
     clock: list[Callable[[Array], Array]] = field(default_factory=list)
     readings: list[Reading] = field(default_factory=list)
+
+    def add(self, name: str, by: float, **details: float) -> None:
+        """Add to a parameter of the motion, and set others."""
+        self.motion = self.motion.changed(**{name: self.motion.value(name) + by}, **details)
 
 
 Apply = Callable[[World, float], None]
@@ -99,6 +105,11 @@ class Scene:
         return 2 * np.pi * self.frequency_hz
 
     @property
+    def fastest(self) -> float:
+        """The first speed, rad/s."""
+        return self.omega * self.amplitude
+
+    @property
     def duration_s(self) -> float:
         """From the first reading to the last."""
         return float(self.time_s[-1])
@@ -112,16 +123,10 @@ class Scene:
 
     def world(self) -> World:
         """The scene without any effect."""
-        h = 1 / (STEPS_IN_CYCLE * self.frequency_hz)
-        n = int((self.lead_s + self.duration_s) / h) + 8
-        k = np.zeros(PARAMETERS)
-        k[P.OMEGA] = self.omega
-        k[P.A], k[P.B_VISCOUS], k[P.B_HYSTERETIC], k[P.C] = self.rates
-        times = np.zeros((2 * n + 1, TIMES))
-        times[:, T.STIFF] = times[:, T.LOSS] = 1.0
-        start = np.array([self.amplitude, 0.0, 0.0, 0.0, 0.0])
-        grid = np.arange(n + 1) * h - self.lead_s
-        return World(k, Law.NONE, grid, times, np.zeros(n + 1), start)
+        h = 1 / (IN_CYCLE * self.frequency_hz)
+        grid = np.arange(int((self.lead_s + self.duration_s) / h) + 8) * h - self.lead_s
+        a, viscous, hysteretic, c = self.rates
+        return World(Motion(of_rates(self.omega, a, viscous, hysteretic, c), self.amplitude), grid)
 
     def reading(
         self,
@@ -145,20 +150,20 @@ class Scene:
             cause.apply(world, cause.size)
         if change:
             change(world)
-        h = world.grid[1] - world.grid[0]
-        states, turns = integrate(world.start, h, world.k, world.law, world.times, world.kicks)
-        angle = CubicHermiteSpline(world.grid, states[:, 0], states[:, 1], extrapolate=True)
-        other = CubicHermiteSpline(world.grid, states[:, 2], states[:, 3], extrapolate=True)
+        track = world.motion.run(world.grid)
+        x, v = track.angle_rad, track.rate_rad_s
+        angle = CubicHermiteSpline(world.grid, x, v, extrapolate=True)
         stamps = self.time_s if time_s is None else time_s
         at = stamps.copy()
         for shift in world.clock:
             at = at + shift(stamps)
-        place = np.clip(np.searchsorted(world.grid, at, side="right") - 1, 0, len(turns) - 1)
-        velocity = angle(at, 1)
-        # Between a turn and the next point of the grid the turning point is the next point's.
-        turned = np.sign(velocity) != np.sign(states[place, 1])
-        place = np.minimum(place + turned, len(turns) - 1)
-        seen = Seen(stamps, angle, angle(at), velocity, other(at), turns[place])
+        turned, sampled = with_turns(world.grid, x, v)
+        before = np.flatnonzero(v[:-1] * v[1:] < 0)
+        share = v[before] / (v[before] - v[before + 1])
+        instants = world.grid[before] + share * (world.grid[1] - world.grid[0])
+        turns = np.r_[x[0], turned[~sampled]][np.searchsorted(instants, at)]
+        other = CubicSpline(world.grid, track.second_rad)(at)
+        seen = Seen(stamps, angle, angle(at), angle(at, 1), other, turns)
         y = seen.x.copy()
         for read in world.readings:
             y = read(seen, y)
@@ -192,15 +197,13 @@ def evidence(scene: Scene, causes: list[Cause]) -> list[float]:
     the truth.
     """
 
-    def shifted(place: int, by: float) -> Callable[[World], None]:
+    def shifted(name: str, by: float) -> Callable[[World], None]:
         def change(world: World) -> None:
-            world.k[place] += by
-
-        return change
-
-    def released(by: float) -> Callable[[World], None]:
-        def change(world: World) -> None:
-            world.start[0] += by
+            if name == "release":
+                start = world.motion.angle_rad + by
+                world.motion = replace(world.motion, angle_rad=start)
+            else:
+                world.add(name, by)
 
         return change
 
@@ -208,17 +211,16 @@ def evidence(scene: Scene, causes: list[Cause]) -> list[float]:
     columns = [np.ones_like(there), seen.v]
     loss = scene.loss_rate
     sizes = {
-        P.OMEGA: 1e-5 * scene.omega,
-        P.A: 0.01 * loss / scene.amplitude,
-        P.B_VISCOUS: 0.01 * loss,
-        P.C: 0.003 * loss * scene.amplitude,
+        "omega": 1e-5 * scene.omega,
+        "quadratic": 0.015 * loss / scene.amplitude / scene.omega,
+        "gamma": 0.02 * loss,
+        "coulomb": 0.005 * loss * scene.amplitude * scene.omega,
+        "release": 1e-4 * scene.amplitude,
     }
     columns += [
-        (scene.reading(causes, shifted(place, sizes[place]))[0] - there) / sizes[place]
-        for place in TANGENT
+        (scene.reading(causes, shifted(name, sizes[name]))[0] - there) / sizes[name]
+        for name in TANGENT
     ]
-    by = 1e-4 * scene.amplitude
-    columns.append((scene.reading(causes, released(by))[0] - there) / by)
     for number, cause in enumerate(causes):
         less = cause._replace(size=0.98 * cause.size)
         without = [*causes[:number], less, *causes[number + 1 :]]

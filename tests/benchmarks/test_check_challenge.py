@@ -48,6 +48,6 @@ def test_chance_alone_fails_less_than_one_set_in_a_thousand(of: int, share: floa
     failed = {True: 0.0, False: 0.0}
     for hits in range(of + 1):
         probability = comb(of, hits) * share**hits * (1 - share) ** (of - hits)
-        failed[True] += probability * check.is_fewer({"hits": hits, "of": of}, share)
-        failed[False] += probability * check.is_more({"hits": hits, "of": of}, share)
+        failed[True] += probability * check.is_beyond({"hits": hits, "of": of}, share, "less")
+        failed[False] += probability * check.is_beyond({"hits": hits, "of": of}, share, "greater")
     assert max(failed.values()) < 0.001

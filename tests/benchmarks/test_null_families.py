@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+from argparse import Namespace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from benchmarks import journal
 from benchmarks import null_families as nulls
 
 LAW = nulls.Law(0.7, quadratic=0.3, viscous=0.02, hysteretic=0.03, coulomb=2e-4)
@@ -100,8 +103,10 @@ def test_a_stand_has_one_resonance() -> None:
     assert np.ptp(near) == len(near) - 1
 
 
-def test_an_answer_of_other_code_is_asked_again_and_a_torn_line_is_none(tmp_path) -> None:
-    journal = tmp_path / "journal.jsonl"
-    lines = [json.dumps({"family": "red", "number": n, "code": c}) for n, c in ((0, "x"), (1, "y"))]
-    journal.write_text("\n".join([*lines, lines[0][:20]]), encoding="utf-8")
-    assert set(nulls.read_journal(journal, "x")) == {("red", 0)}
+def test_an_answer_of_other_code_is_asked_again_and_a_torn_line_is_none(tmp_path: Path) -> None:
+    path, mark = tmp_path / "journal.jsonl", journal.code(("benchmarks/journal.py",))
+    lines = [json.dumps({"key": n, "answer": -n, "code": c}) for n, c in ((1, mark), (2, "other"))]
+    path.write_text("\n".join([*lines, lines[0][:20], ""]), encoding="utf-8")
+    told = Namespace(journal=path, processes=1)
+    assert list(journal.answers(told, [1, 2, 3], abs, ("benchmarks/journal.py",))) == [-1, 2, 3]
+    assert list(journal.answers(told, [3, 2], float, ("benchmarks/journal.py",))) == [3, 2]

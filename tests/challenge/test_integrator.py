@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 from pendpipe.arrays import FloatArray
 from pendpipe_challenge.motion import Motion
+from pendpipe_challenge.torques import BOOK
 
 OMEGA, AMPLITUDE = 5.6, 0.2
 LOSSES = {
@@ -37,6 +38,16 @@ LAWS: dict[str, tuple[dict[str, float], Callable[[float, float, float], float]]]
     "sin x": ({"sine": 1.0}, lambda t, x, v: 0.0),
     "x^3": ({"cubic": 0.3}, lambda t, x, v: -(OMEGA**2) * 0.3 * x**3),
     "x^2": ({"square": 0.1}, lambda t, x, v: -(OMEGA**2) * 0.1 * x**2),
+    # Its slope has a kink at 0, within a step.
+    "x|x|": ({"sided": 0.01}, lambda t, x, v: -(OMEGA**2) * 0.01 * x * abs(x)),
+    "modulated torque": (
+        {"parametric": 0.01, "parametric_omega": 9.0},
+        lambda t, x, v: -(OMEGA**2) * 0.01 * np.cos(9.0 * t) * x,
+    ),
+    "a brake beyond its best speed": (
+        {"book": float(BOOK["eddy-peak"]), "book_size": 0.05, "book_shape": 0.5},
+        lambda t, x, v: -0.05 * v / (1 + (v / 0.5) ** 2),
+    ),
     "v|v|": ({"drag": 0.05}, lambda t, x, v: -0.05 * abs(v) * v),
     "|v|^1.5": ({"power": 0.02}, lambda t, x, v: -0.02 * abs(v) ** 1.5 * np.sign(v)),
     "v^3": ({"rayleigh": 0.02}, lambda t, x, v: -0.02 * v**3),
@@ -116,8 +127,8 @@ def test_motion_is_that_of_another_integrator(law: str) -> None:
     # At the coarsest step that is taken; and at half of it, where the eighth order shows.
     assert np.abs(motion.run(TIME).angle_rad - theirs).max() < 2e-7 * AMPLITUDE
     fine = motion.run(np.linspace(0.0, TIME[-1], 2 * len(TIME) - 1)).angle_rad[::2]
-    # A fractional power is singular where the motion reverses: there the order is lower.
-    rough = law in ("|v|^1.5", "C_D(Re)")
+    # A fractional power is singular where the motion reverses, x|x| at 0: there the order is lower.
+    rough = law in ("|v|^1.5", "C_D(Re)", "x|x|")
     assert np.abs(fine - theirs).max() < (1e-8 if rough else 3e-9) * AMPLITUDE
 
 

@@ -177,7 +177,7 @@ def crossing(
 @compiled
 def longest_step(p: Any, s: FloatArray) -> float:
     """How long a step may be: a twentieth of a cycle, less where something is quick."""
-    rate = p.omega / 0.32
+    rate = p.omega / p.step_phase
     speed = math.sqrt(s[1] * s[1] + (p.omega * s[0]) ** 2)
     if p.dahl != 0.0:
         rate = max(rate, speed / (0.5 * p.dahl_reach))
@@ -275,6 +275,8 @@ def follow(
         sign = sticks(p, s, work, t, region, extra, turn, turned_at)
     for i in range(1, len(times)):
         end = times[i]
+        # Time since `base`: what a step rounds off does not grow with t.
+        base, done = t, 0.0
         extra = rubs[i - 1] if len(rubs) else 0.0
         if len(kicks) and kicks[i - 1] != 0.0:
             s[1] += kicks[i - 1]
@@ -287,10 +289,10 @@ def follow(
             if sign == 0.0:
                 sign = sticks(p, s, work, t, region, extra, turn, turned_at)
             limit = end if at >= len(breaks) else min(end, breaks[at])
-            left = limit - t
+            left = (limit - base) - done
             if left > 0.0:
                 if sign == 0.0:
-                    t = limit
+                    t, base, done = limit, limit, 0.0
                 else:
                     h = left / max(math.ceil(left / longest_step(p, s) - 1e-9), 1)
                     step(p, s, new, k, work, t, h, sign, region, extra, turn, turned_at, states)
@@ -345,7 +347,11 @@ def follow(
                         new[1] = 0.0
                     for n in range(states):
                         s[n] = new[n]
-                    t = limit if kind == 0 and h >= left else t + h
+                    if kind == 0 and h >= left:
+                        t, base, done = limit, limit, 0.0
+                    else:
+                        done += h
+                        t = base + done
                     if kind == 2:
                         turn, turned_at = s[0], t
                         sign = sticks(p, s, work, t, region, extra, turn, turned_at)
@@ -364,6 +370,7 @@ def follow(
                 if s[1] != 0.0:
                     sign = math.copysign(1.0, s[1])
                 at += 1
+        t = end
         out[i, 0], out[i, 1], out[i, 2] = s[0], s[1], s[SECOND]
     return out
 
@@ -474,5 +481,6 @@ class Motion:
             "maxwell": BASSET,
             "basset": SECOND,
             "second": STATES,
+            "book": STATES,
         }
         return max([2, *(end for name, end in ends.items() if self.value(name) != 0.0)])

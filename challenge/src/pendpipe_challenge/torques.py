@@ -17,6 +17,7 @@ from pendpipe.arrays import FloatArray
 PARAMETERS: Final = {
     # The free decay of the paper.
     "omega": 1.0,  # rad/s
+    "step_phase": 0.32,  # longest step, rad of the swing
     "gamma": 0.0,  # omega/Q_v, 1/s
     "coulomb": 0.0,  # f_c sgn v, rad/s^2
     "hysteretic": 0.0,  # f_h sqrt(w^2 x^2 + v^2) sgn v, 1/s
@@ -25,6 +26,7 @@ PARAMETERS: Final = {
     "sine": 0.0,  # share of sin x in the place of x
     "cubic": 0.0,  # k3 x^3, 1/rad^2
     "square": 0.0,  # k2 x^2, 1/rad
+    "sided": 0.0,  # x |x|, 1/rad
     "stiffening": 0.0,  # flexure: x^3 at first, sinh in full, 1/rad^2
     "stiffening_scale": 0.5,  # rad
     "lopsided": 0.0,  # x^2 at first, exp in full, 1/rad
@@ -97,6 +99,14 @@ PARAMETERS: Final = {
     "rub": 0.0,  # damping during a short time, 1/s
     "rub_at": 0.0,
     "rub_width": 1.0,
+    "parametric": 0.0,  # of omega^2, relative
+    "parametric_omega": 1.0,
+    "parametric_phase": 0.0,
+    # A law of `Book`, which no catalogue has: its size and two shapes.
+    "book": 0.0,
+    "book_size": 0.0,
+    "book_shape": 1.0,
+    "book_shape_2": 1.0,
     # Drive and a second coordinate.
     "drive": 0.0,  # rad/s^2
     "drive_omega": 1.0,
@@ -115,6 +125,7 @@ GROUPS: Final = {
         "sine",
         "cubic",
         "square",
+        "sided",
         "stiffening",
         "lopsided",
         "magnet",
@@ -141,8 +152,9 @@ GROUPS: Final = {
         "shedding",
         "rough",
         "memory",
+        "book",
     ),
-    "any_time": ("creep", "creep_log", "rest_jump", "omega_drift", "omega_jump"),
+    "any_time": ("creep", "creep_log", "rest_jump", "omega_drift", "omega_jump", "parametric"),
     "any_push": ("drive", "impulse"),
     "any_hidden": ("dahl", "iwan", "maxwell", "basset"),
 }
@@ -160,6 +172,58 @@ BASSET_ELEMENTS: Final = 12
 SECOND: Final = BASSET + BASSET_ELEMENTS
 STATES: Final = SECOND + 2
 """Where each hidden state stands behind x and v."""
+
+
+BOOK: Final = {
+    # (1 + s x) x'' + s x'^2 + w^2 sin x = 0: the string winds on a cylinder of radius s l.
+    "winding-string": (WINDING_STRING := 1),
+    # The axis rolls: the moment of inertia is 1 + 2 s (1 - cos x).
+    "rolling-edge": (ROLLING_EDGE := 2),
+    # A magnet under the equilibrium: s w^2 x (1 + (x/d)^2)^(-5/2).
+    "magnet-below": (MAGNET_BELOW := 3),
+    # An eddy-current brake beyond its best speed: s v/(1 + (v/d)^2).
+    "eddy-peak": (EDDY_PEAK := 4),
+    # A brake near the equilibrium only: s v exp(-(x/d)^2).
+    "local-brake": (LOCAL_BRAKE := 5),
+    # A cushion on one side, beyond d: s w^2 (x - d).
+    "bumper": (BUMPER := 6),
+    # Drag against air that moves at d: s (v - d)|v - d|.
+    "wind": (WIND := 7),
+    # Viscous in one direction only, as a cable that drags.
+    "one-way-drag": (ONE_WAY_DRAG := 8),
+    # Friction that has grown at the reversal, and wears off: s exp(-|x - x_turn|/d).
+    "ageing-friction": (AGEING_FRICTION := 9),
+    # Bouc and Wen: w^2 s z, z' = v - (|v| z + v |z|)|z|/(2 d^2).
+    "cable-hysteresis": (CABLE_HYSTERESIS := 10),
+    # Stretch and swing exchange energy.
+    "elastic-string": (ELASTIC_STRING := 11),
+    # Water in the bob: driven by the swing, and acting on it.
+    "sloshing-bob": (SLOSHING_BOB := 12),
+    # The support gives way for a tenth of a period at one of the turning points, beyond d.
+    "slipping-arm": (SLIPPING_ARM := 13),
+    # s sin(d x).
+    "cogging": (COGGING_MOTOR := 14),
+    # A pivot that vibrates fast (Kapitza): s w^2 sin(2x)/2.
+    "vibrated-pivot": (VIBRATED_PIVOT := 15),
+    # Air squeezed out of a gap at the end of the swing: s v/(1 - x/d)^3.
+    "squeeze-film": (SQUEEZE_FILM := 16),
+}
+"""Laws that stand in no catalogue, from physics books and from apparatus: their numbers."""
+
+
+def of_rates(
+    omega: float, a: float, viscous: float, hysteretic: float, c: float, *, speed: bool = False
+) -> dict[str, float]:
+    """Parameters of Eq. 8 by the rates of Eq. 13; `speed`: the drag is v|v|, not the energy's."""
+    quadratic = 0.5 * math.pi * a / omega
+    return {
+        "omega": omega,
+        "gamma": 2.0 * viscous,
+        "hysteretic": 0.5 * math.pi * hysteretic,
+        "coulomb": 0.5 * math.pi * omega * c,
+        "quadratic": 0.0 if speed else quadratic,
+        "drag": 1.5 * quadratic if speed else 0.0,
+    }
 
 
 compiled = nb.njit(cache=True, fastmath=False, error_model="numpy")
@@ -192,6 +256,10 @@ def omega_now(p: Any, t: float, middle: float) -> float:
         factor += p.omega_drift * ramp(t, p.omega_drift_time)
     if p.omega_jump != 0.0 and middle > p.omega_jump_at:
         factor += p.omega_jump
+    if p.parametric != 0.0:
+        factor *= math.sqrt(
+            1.0 + p.parametric * math.cos(p.parametric_omega * t + p.parametric_phase)
+        )
     return float(p.omega * factor)
 
 
@@ -209,6 +277,8 @@ def restoring(p: Any, x: float, region: int) -> float:
         force += p.cubic * x * x * x
     if p.square != 0.0:
         force += p.square * x * x
+    if p.sided != 0.0:
+        force += p.sided * x * abs(x)
     if p.stiffening != 0.0:
         s = p.stiffening_scale
         force += p.stiffening * 6.0 * s * s * (s * math.sinh(x / s) - x)
@@ -286,6 +356,8 @@ def friction(
         force += p.rough * math.exp(-(((x - p.rough_place) / p.rough_width) ** 2))
     if p.memory != 0.0:
         force += p.memory * abs(x - turn) ** p.memory_power
+    if p.book == AGEING_FRICTION:
+        force += p.book_size * math.exp(-abs(x - turn) / p.book_shape)
     return float(force)
 
 
@@ -333,6 +405,50 @@ def hidden(p: Any, s: FloatArray, out: FloatArray, sign: float) -> float:
             force -= p.basset * math.sqrt(rate) / math.pi * out[BASSET + i]
             rate /= math.e
     return float(force)
+
+
+@compiled
+def by_the_book(p: Any, s: FloatArray, out: FloatArray, turn: float) -> None:
+    """Add a law of `BOOK` to the acceleration, and move what it moves besides."""
+    x, v, u, z, w = s[0], s[1], s[SECOND], s[DAHL], p.omega
+    size, d, e, law = p.book_size, p.book_shape, p.book_shape_2, p.book
+    if law == WINDING_STRING:
+        out[1] = (out[1] - size * v * v) / (1.0 + size * x)
+    elif law == ROLLING_EDGE:
+        inertia = 1.0 + 2.0 * size * (1.0 - math.cos(x))
+        out[1] = (out[1] - size * math.sin(x) * v * v) / inertia
+    elif law == MAGNET_BELOW:
+        out[1] -= size * w * w * x * (1.0 + (x / d) ** 2) ** -2.5
+    elif law == EDDY_PEAK:
+        out[1] -= size * v / (1.0 + (v / d) ** 2)
+    elif law == LOCAL_BRAKE:
+        out[1] -= size * v * math.exp(-((x / d) ** 2))
+    elif law == BUMPER:
+        out[1] -= size * w * w * max(0.0, x - d)
+    elif law == WIND:
+        out[1] -= size * ((v - d) * abs(v - d) + d * abs(d))
+    elif law == ONE_WAY_DRAG:
+        out[1] -= size * max(0.0, v)
+    elif law == CABLE_HYSTERESIS:
+        out[1] -= w * w * size * z
+        out[DAHL] = v - 0.5 * (abs(v) * z + v * abs(z)) * abs(z) / (d * d)
+    elif law == ELASTIC_STRING:
+        out[1] = (out[1] - 2.0 * size * s[SECOND + 1] * v) / (1.0 + size * u)
+        pulled = (1.0 + u) * v * v + w * w * (math.cos(x) - 1.0)
+        out[SECOND] = s[SECOND + 1]
+        out[SECOND + 1] = pulled - (w * d) ** 2 * u - w * d * e * s[SECOND + 1]
+    elif law == SLOSHING_BOB:
+        out[1] += size * w * w * u
+        out[SECOND] = s[SECOND + 1]
+        out[SECOND + 1] = w * w * x - (w * d) ** 2 * u - w * d * e * s[SECOND + 1]
+    elif law == SLIPPING_ARM and turn < -d and math.atan2(abs(v) / w, -x) < 0.2 * math.pi:
+        out[1] -= size
+    elif law == COGGING_MOTOR:
+        out[1] -= size * math.sin(d * x)
+    elif law == VIBRATED_PIVOT:
+        out[1] -= size * w * w * 0.5 * math.sin(2.0 * x)
+    elif law == SQUEEZE_FILM:
+        out[1] -= size * v / (1.0 - x / d) ** 3
 
 
 @compiled
@@ -392,4 +508,6 @@ def rates(
             + p.coupling * p.omega * p.omega * x
             - p.inertial * out[1]
         )
+    if p.book != 0.0:
+        by_the_book(p, s, out, turn)
     return float(free)
