@@ -1,6 +1,8 @@
 """The measures of the house: how much code there is, how it hangs together, what it costs.
 
-    python -m benchmarks.house [--commit 2af5a66] [--list]     # that commit beside what is here
+    python -m benchmarks.house [--commit 2af5a66] [--list] [--tests]
+
+A commit stands beside what is here; ``--tests`` runs both suites and times them.
 
 Strings that stand alone (docstrings) are no statements. A file's importers are the other files of
 the two packages that name it. A definition is unused if its name stands nowhere else in code,
@@ -26,6 +28,10 @@ from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 from statistics import median
 from typing import Any, Final
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 ROOT: Final = Path(__file__).parents[1]
 SAME_LINES, SAME_TOKENS = 6, 40
@@ -82,13 +88,35 @@ def importers(trees: dict[Path, ast.Module]) -> dict[str, set[str]]:
     return found
 
 
-def floors(trees: dict[Path, ast.Module], package: str = "pendpipe.diagnosis") -> int:
-    """Longest chain of imports at the top of a package's files; 0 where there is a circle."""
-    tops = {
+def tops(trees: dict[Path, ast.Module]) -> dict[Path, ast.Module]:
+    """Of each file what it imports when it is imported."""
+    return {
         path: ast.Module([n for n in tree.body if isinstance(n, ast.Import | ast.ImportFrom)], [])
         for path, tree in trees.items()
     }
-    by = importers(tops)
+
+
+def circles(trees: dict[Path, ast.Module]) -> int:
+    """Folders that import each other, in functions too, and files at their tops."""
+    number = 0
+    for by, depth in ((importers(trees), 2), (importers(tops(trees)), 9)):
+        arrows = {
+            (".".join(a.split(".")[:depth]), ".".join(b.split(".")[:depth]))
+            for b, users in by.items()
+            for a in users
+        }
+        names = sorted({name for arrow in arrows for name in arrow})
+        places = [[names.index(name) for name in arrow] for arrow in arrows if arrow[0] != arrow[1]]
+        if places:
+            graph = csr_array((np.ones(len(places)), np.transpose(places)), [len(names)] * 2)
+            _, groups = connected_components(graph, connection="strong")
+            number += int(np.sum(np.bincount(groups) > 1))
+    return number
+
+
+def floors(trees: dict[Path, ast.Module], package: str = "pendpipe.diagnosis") -> int:
+    """Longest chain of imports at the top of a package's files; 0 where there is a circle."""
+    by = importers(tops(trees))
     names = [module_name(path) for path in trees]
     left = {name for name in names if name.startswith(f"{package}.")}
     needs = {name: {n for n in left if name in by[n]} for name in left}
@@ -177,31 +205,30 @@ def measure(tree: Path) -> tuple[dict[str, dict[str, Any]], list[str]]:
     table: dict[str, dict[str, Any]] = {}
     for part, paths in parts.items():
         texts = [path.read_text("utf-8") for path in paths]
-        sizes = [len(text.splitlines()) for text in texts]
         nodes = [node for path in paths for node in ast.walk(trees[path])]
         functions = [node for node in nodes if isinstance(node, Function)]
         long = [f for f in functions if f.end_lineno and f.end_lineno - f.lineno >= 60]
-        kinds = ("posonlyargs", "args", "kwonlyargs")
-        counts = [sum(len(getattr(f.args, kind)) for kind in kinds) for f in functions]
         alone = [p for p in paths if p in packages and len(by[module_name(p)]) == 1]
         table[part] = {
             "files": len(paths),
             "statements": sum(isinstance(n, ast.stmt) and not is_text(n) for n in nodes),
-            "lines": sum(sizes),
-            "median file, lines": round(median(sizes)),
+            "lines": sum(len(text.splitlines()) for text in texts),
+            "files above 400 statements": sum(
+                sum(isinstance(n, ast.stmt) and not is_text(n) for n in ast.walk(trees[p])) > 400
+                for p in paths
+            ),
             "functions over 60 lines": len(long),
-            "functions over 7 parameters": sum(n > 7 for n in counts),
             "files with exactly one importer": len(alone),
             "definitions nobody uses": sum(tree / n.partition(":")[0] in paths for n in dead),
             "lines that stand twice": duplicates(paths),
             "floors of the diagnosis": floors({p: trees[p] for p in paths if p in packages}),
-            "`# fmt: skip`": sum(text.count("# fmt: " + "skip") for text in texts),
+            "circles of imports": circles({p: trees[p] for p in paths if p in packages}),
         }
     return table, dead
 
 
-def costs(tree: Path) -> dict[str, str]:
-    """What starting costs beyond the bare interpreter, and how large the wheel is."""
+def costs(tree: Path, *, tests: bool) -> dict[str, str]:
+    """What starting costs beyond the bare interpreter, and the tests."""
     environment = {**os.environ, "PYTHONPATH": str(tree / "src")}
 
     def cpu_ms(*words: str) -> float:
@@ -213,16 +240,18 @@ def costs(tree: Path) -> dict[str, str]:
     def start(*words: str) -> str:
         return f"{median(cpu_ms(*words) - cpu_ms('-c', 'pass') for _ in range(STARTS)):.0f} ms"
 
-    with tempfile.TemporaryDirectory() as folder:
-        words = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", folder]
-        built = subprocess.run([*words, str(tree)], capture_output=True, text=True)
-        wheels = [f"{p.stat().st_size / 1e3:.0f} kB" for p in Path(folder).glob("*.whl")]
-    why = f"not built: {built.stderr.strip().splitlines()[-1:]}"
-    return {
+    found = {
         "CPU of `import pendpipe`": start("-c", "import pendpipe"),
         "CPU of `pendpipe --version`": start("-m", "pendpipe.cli", "--version"),
-        "wheel of the library": (wheels or [why])[0],
     }
+    if tests:
+        call = [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "worksteal"]
+        paths = os.pathsep.join(str(tree / part) for part in ("src", "challenge/src", "."))
+        run = subprocess.run(
+            call, cwd=tree, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True
+        )
+        found["tests"] = (run.stdout.strip().splitlines() or ["none"])[-1]
+    return found
 
 
 def git(*words: str) -> bytes:
@@ -248,13 +277,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--commit", metavar="REF", help="a commit to set beside the working tree")
     parser.add_argument("--list", action="store_true", help="name the definitions nobody uses")
+    parser.add_argument("--tests", action="store_true", help="run the suites, on two cores")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         trees = {"here": copy_of(None, Path(folder))}
         if arguments.commit:
             trees = {arguments.commit: copy_of(arguments.commit, Path(folder)), **trees}
         found = {name: measure(tree) for name, tree in trees.items()}
-        prices = {name: costs(tree) for name, tree in trees.items()}
+        prices = {name: costs(tree, tests=arguments.tests) for name, tree in trees.items()}
     parts = list(found["here"][0])
     heads = [f"{part}, {name}" for part in parts for name in trees]
     print(table_row("", heads), table_row("---", ["---"] * len(heads)), sep="\n")
