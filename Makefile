@@ -27,23 +27,14 @@ report: .venv/installed
 	$(RUN) snakemake --report results/snakemake-report.html
 
 bench: .venv/installed-bench
-	$(RUN) python -m benchmarks
+	$(RUN) python -m benchmarks speed
 
 evidence: .venv/installed-bench
-	$(RUN) python -m benchmarks.consistency
-	$(RUN) python -m benchmarks.null_families --number 15
-	$(RUN) python -m benchmarks.known_physics
-	$(RUN) python -m benchmarks.campaign_challenge
-	$(RUN) python -m benchmarks.acquisition
+	$(RUN) python -m benchmarks judge
 
 # What interruptions and hostile input cost (docs/evidence.md): hours; goes on where it was stopped.
 integrity: .venv/installed
-	$(RUN) python -m benchmarks.acquisition kill flips disk
-	$(RUN) python -m benchmarks.kills
-	$(RUN) python -m benchmarks.torn_files --apart
-	$(RUN) python -m benchmarks.answers lights
-	$(RUN) python -m benchmarks.hostile
-	$(RUN) python -m benchmarks.fuzz
+	$(RUN) python -m benchmarks robustness
 
 # Conceal, solve, open, score, and write results/challenge/SET/scores/proof.md; goes on where it was interrupted.
 # A set is made once: SET=another makes another, with a seed of its own.

@@ -1,18 +1,16 @@
 """A class of thirty: files as phones, cameras, rangers, gates and interfaces write them.
 
-    python -m benchmarks.school_class make FOLDER
-    python -m benchmarks.school_class run [FOLDER]
+    python -m benchmarks.school_class [FOLDER]
 
-`make` writes six files of each of five instruments, every pupil with a pendulum of its own, and
-`truth.json`. `run` uses them as a new user would: the first answer, all to one table, a sheet of
-each. It prints what that took (seconds of the clock, and of the processors, which others do not
-lengthen), and how far T0 and Q are from the truth, in percent and in their errors.
+Six files of each of five instruments, every pupil with a pendulum of its own, are written and used
+as a new user would: the first answer, all to one table, a sheet of each. It prints what that took
+(seconds of the clock, and of the processors, which others do not lengthen), and how far T0 and Q
+are from the truth, in percent and in their errors.
 """
 
 from __future__ import annotations
 
 import csv
-import json
 import math
 import os
 import resource
@@ -97,7 +95,7 @@ WRITERS: Final[dict[str, Callable[[Eq8, float, np.random.Generator], str]]] = {
 def make(folder: Path, of_each: int = 6) -> dict[str, tuple[Eq8, float]]:
     """Write the files; return the law and the first amplitude of each."""
     folder.mkdir(parents=True, exist_ok=True)
-    made, told = {}, {}
+    made = {}
     for instrument, writer in WRITERS.items():
         for pupil in range(1, of_each + 1):
             rng = np.random.default_rng([INSTRUMENTS.index(instrument), pupil])
@@ -108,8 +106,6 @@ def make(folder: Path, of_each: int = 6) -> dict[str, tuple[Eq8, float]]:
             name = f"{instrument}-{pupil}.{'txt' if instrument in ('tracker', 'cassy') else 'csv'}"
             (folder / name).write_text(writer(law, y0, rng), encoding="utf-8")
             made[name] = law, y0
-            told[name] = {"T0_s": math.tau / omega, "a": law.quadratic, "b": b, "c": law.coulomb}
-    (folder / "truth.json").write_text(json.dumps(told, indent=1), encoding="utf-8")
     return made
 
 
@@ -170,12 +166,8 @@ def _off(row: dict[str, str], name: str, sd: str, truth: float) -> str:
 
 
 def main() -> None:
-    """Make the class, or use it."""
-    what, *rest = [*sys.argv[1:], "run"] if len(sys.argv) < 2 else sys.argv[1:]
-    folder = Path(rest[0]) if rest else Path(tempfile.mkdtemp())
-    if what == "make":
-        make(folder)
-        return
+    """Use a class's files, in a folder that is kept or in one of its own."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(tempfile.mkdtemp())
     for line in run(folder):
         print(line, flush=True)
 

@@ -123,7 +123,6 @@ def test_the_oracle_finds_and_names_a_large_effect_and_no_null() -> None:
     assert single["oracle"]["detected"]
     assert "sensor-cubic" in single["oracle"]["class"]
     assert 20.0 < single["oracle"]["threshold"] < 35.0
-    assert single["oracle"]["threshold_of_effect"] < single["oracle"]["threshold"]
     nulls = [make_null(random, oracle=True).truth["oracle"] for _ in range(6)]
     assert sum(null["detected"] for null in nulls) <= 1
 

@@ -28,7 +28,6 @@ def truth(family: str, effect: str = "", size: float = 100.0, **more: Any) -> di
     ]
     oracle = {
         "detected": size > 20 and bool(effect),
-        "detected_by_effect": size > 15 and bool(effect),
         "named": effect,
         "top3": [effect],
         "class": [effect, "backlash"],
@@ -36,7 +35,6 @@ def truth(family: str, effect: str = "", size: float = 100.0, **more: Any) -> di
         "largest_score": size,
         "threshold": 20.0,
         "scores": {"cubic-stiffness": size if effect else 1.0},
-        "whiteness_p": 0.5,
     }
     nuisances = {
         "alpha": 0.0,

@@ -68,20 +68,7 @@ def judge(bench: Bench, point: Point, scenario: Scenario, codes: IntArray) -> Ve
     more = {"dropped-samples": shift_score(bench, angle, residual)}
     if more["dropped-samples"] == 0.0:
         more |= refitted(oracle, angle, residual)
-    verdict = oracle.judge(residual, codes, more)
-    return replace(verdict, whiteness_p=whiteness(oracle.bench.off(residual)))
-
-
-def whiteness(residual: FloatArray, lags: int = 20) -> float:
-    """Ljung and Box's test of a residual: the p-value of its first autocorrelations."""
-    from scipy.stats import chi2
-
-    count = len(residual)
-    centred = residual - residual.mean()
-    square = float(centred @ centred)
-    found = np.array([centred[k:] @ centred[:-k] for k in range(1, lags + 1)]) / square
-    statistic = count * (count + 2.0) * np.sum(found**2 / (count - np.arange(1, lags + 1)))
-    return float(chi2.sf(statistic, lags))
+    return oracle.judge(residual, codes, more)
 
 
 def effect_truth(sized: Sized) -> dict[str, Any]:
@@ -134,15 +121,12 @@ def oracle_truth(verdict: Verdict, effect: str) -> dict[str, Any]:
     best = sorted(verdict.scores, key=lambda name: -verdict.scores[name])[:10]
     return {
         "threshold": verdict.threshold,
-        "threshold_of_effect": verdict.threshold_by_effect.get(effect),
         "detected": verdict.detected,
-        "detected_by_effect": verdict.detected_by_effect,
         "largest_score": verdict.scores[best[0]],
         "score_of_effect": verdict.scores.get(effect),
         "named": verdict.ranking[0],
         "top3": list(verdict.ranking[:3]),
         "class": list(verdict.members),
-        "whiteness_p": verdict.whiteness_p,
         "scores": {name: verdict.scores[name] for name in best},
     }
 

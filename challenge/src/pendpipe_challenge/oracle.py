@@ -1,10 +1,7 @@
 """The oracle: it knows nuisances, noise and catalogue, and pays the same look-elsewhere.
 
-Its detection level comes from Monte Carlo of the projected Gaussian scores. There are
-two levels. `threshold` is that of the largest score over the whole catalogue, scans included.
-`threshold_by_effect` first takes each effect's own look-elsewhere off (so that an effect
-without a scan does not pay for the tones' thousands of frequencies); it is the harder
-rival, and its level depends on the effect.
+Its detection level comes from Monte Carlo of the projected Gaussian scores: that of the largest
+score over the whole catalogue, scans included.
 
 Rivals of a large effect, compared by nonlinear refits instead of linear scores.
 
@@ -14,6 +11,7 @@ Lost and repeated samples: from one moment on the reading is that of another tim
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -45,26 +43,21 @@ class Verdict:
     ----------
     scores
         Delta chi^2 of every effect, its best shape.
-    threshold, threshold_by_effect
-        See the module. The second is by effect.
-    detected, detected_by_effect
-        Whether any effect passes the one, or its own of the other.
+    threshold
+        See the module.
+    detected
+        Whether any effect passes it.
     ranking
         Effects by likelihood, the best first (a parameter more costs 2).
     members
         The equivalence class: effects within `CLASS` of the best.
-    whiteness_p
-        Of a whiteness test of the same residual, a peer's answer.
     """
 
     scores: dict[str, float]
     threshold: float
-    threshold_by_effect: dict[str, float]
     detected: bool
-    detected_by_effect: bool
     ranking: tuple[str, ...]
     members: tuple[str, ...]
-    whiteness_p: float = float("nan")
 
 
 @dataclass
@@ -98,7 +91,6 @@ class Oracle:
             self.steps.append((effect, left[:, known] / norms[known]))
         self.tones = Tones(bench)
         self.specials = Specials(bench)
-        self._levels: tuple[float, dict[str, float]] | None = None
 
     def scores(self, residuals: FloatArray) -> dict[str, FloatArray]:
         """Best score of every effect for each of several residuals (kept, draws)."""
@@ -117,22 +109,15 @@ class Oracle:
                 better(effect, values)
         return found
 
-    def levels(self, draws: int = DRAWS) -> tuple[float, dict[str, float]]:
-        """The detection levels: of the largest score, and of each effect."""
-        if self._levels is None:
-            random = np.random.default_rng(self.bench.count)
-            parts = [
-                self.scores(random.standard_normal((self.bench.count, 100)))
-                for _ in range(draws // 100)
-            ]
-            null = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-            largest = np.max(list(null.values()), axis=0)
-            # Each effect's own look-elsewhere: the height that it passes once in twenty.
-            own = {name: float(np.quantile(values, 0.95)) for name, values in null.items()}
-            excess = np.max([values - own[name] for name, values in null.items()], axis=0)
-            common = tail(excess)
-            self._levels = (tail(largest), {name: own[name] + common for name in null})
-        return self._levels
+    @cached_property
+    def threshold(self) -> float:
+        """The level of the largest score."""
+        random = np.random.default_rng(self.bench.count)
+        largest = []
+        for _ in range(DRAWS // 100):
+            scores = self.scores(random.standard_normal((self.bench.count, 100)))
+            largest.append(np.max(list(scores.values()), axis=0))
+        return tail(np.concatenate(largest))
 
     def clean_scores(self, residual: FloatArray) -> dict[str, float]:
         """Scores of a noise-free residual: of the effects that are directions in it."""
@@ -171,16 +156,11 @@ class Oracle:
             scores |= of_codes
         for name, value in (more or {}).items():
             scores[name] = max(value, scores.get(name, 0.0))
-        threshold, by_effect = self.levels()
-        by_effect = {name: by_effect.get(name, threshold) for name in scores}
-        ranking = ranked(scores)
         return Verdict(
             scores=scores,
-            threshold=threshold,
-            threshold_by_effect=by_effect,
-            detected=max(scores.values()) > threshold,
-            detected_by_effect=any(scores[name] > by_effect[name] for name in scores),
-            ranking=ranking,
+            threshold=self.threshold,
+            detected=max(scores.values()) > self.threshold,
+            ranking=ranked(scores),
             members=members(scores),
         )
 
