@@ -6,11 +6,6 @@
 (`known`), what was worked out by hand (`by_hand`), and names that would be wrong. `pendpipe fit`
 and `pendpipe diagnose` run on each with the path and the listed options alone. An item is found
 if one of its alternatives (split by `/`) is named, or belongs to the class of a named effect.
-
-Residuals are set beside the floor of the sensor, never beside a fitted spectrum: step/sqrt(12) for
-an encoder that is read at fixed times, else what polynomials of degree 5 leave of nine
-neighbouring rows. Beside what was left by hand stands what names leave of the same readings
-(`hand_span`, s).
 """
 
 from __future__ import annotations
@@ -28,15 +23,12 @@ from statistics import median
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import stats
 
 from benchmarks.journal import ROOT, answers, judge_parser
 from pendpipe.files import without_folders
 
 RECORDINGS: Final = ROOT.parent / "shared/recordings"
 TABLE: Final = Path(__file__).with_suffix(".tsv")
-ROWS, DEGREE = 9, 5
 FOLLOWED: Final = 0.1
 """A model whose residual is a larger part of the reading's rms does not follow the motion."""
 LIMITED: Final = """
@@ -48,7 +40,6 @@ sys.exit(main(sys.argv[2:]))
 """
 """The command line, which the system ends when its CPU seconds are spent."""
 Content = Mapping[str, Any]
-Array = NDArray[np.float64]
 
 
 # ---------------------------------------------------------------- what is asked
@@ -189,41 +180,6 @@ def is_found(item: str, answers: Answers) -> bool:
 # ---------------------------------------------------------------- what is measured
 
 
-def floor_of(time_s: Array, reading: Array) -> float:
-    """The noise of one reading: what a polynomial leaves of a few neighbours, most of the time.
-
-    Parameters
-    ----------
-    time_s, reading
-        Shape (n,); times need not be uniform.
-    """
-    starts = np.linspace(0, len(time_s) - ROWS, min(len(time_s) - ROWS, 2000)).astype(int)
-    left = []
-    for at in starts:
-        t, y = time_s[at : at + ROWS], reading[at : at + ROWS]
-        if np.ptp(y) > 0 and np.ptp(t) > 0:
-            powers = np.vander(2 * (t - t[0]) / np.ptp(t) - 1, DEGREE + 1)
-            fitted = powers @ np.linalg.lstsq(powers, y)[0]
-            left.append(float(np.sum((y - fitted) ** 2)))
-    return float(np.sqrt(np.median(left) / stats.chi2.median(ROWS - DEGREE - 1)))
-
-
-def residuals(content: Content, said: str) -> dict[str, float]:
-    """Residual at the start, with names alone, and with curves too, in rad (or the unit it has)."""
-    before, after = (content[key]["residual_rms_rad"] for key in ("baseline", "improved"))
-    curves = [each for each in content["effects"] if each["kind"] == "unnamed"]
-    counted = re.search(r"to (\d+) readings", said)
-    names = after
-    if curves and counted:
-        # A curve's gain in chi^2, in units of what is left, tells what is left without it.
-        left = content["improved"]["chi2_per_dof"] * int(counted.group(1))
-        names *= np.sqrt(1 + sum(max(0.0, each["delta_chi2"]) for each in curves) / left)
-    given = [each.get("residual_rms_rad") for each in content["effects"] if each not in curves]
-    if given and given[-1]:
-        names = given[-1]
-    return {"before": before, "names": min(names, before), "curve": after}
-
-
 def run(command: str, words: list[str], limit_s: float) -> dict[str, Any]:
     """Run a command of the library; its status, its answer, what it said, its CPU seconds."""
     before = getrusage(RUSAGE_CHILDREN)
@@ -242,18 +198,13 @@ def run(command: str, words: list[str], limit_s: float) -> dict[str, Any]:
 
 
 def ask(row: Mapping[str, str], limit_s: float) -> dict[str, Any]:
-    """Both commands on one recording, and its sensor's floor."""
+    """Both commands on one recording, and the rms of its free part."""
     import pendpipe as pp
 
     path, options = RECORDINGS / row["file"], row["options"].split()
     words = [str(path), *options]
     fit = run("fit", words, limit_s)
     diagnosis = run("diagnose", [*words, "--no-figures"], limit_s)
-    same = diagnosis
-    if row["hand_span"]:
-        ends = zip(("--start", "--stop"), row["hand_span"].split(":"), strict=True)
-        span = [word for end, at in ends if at for word in (end, at)]
-        same = run("diagnose", [*words, *span, "--no-figures"], limit_s)
     names = [each.removeprefix("--") for each in options[::2]]
     recording = pp.read(path, **dict(zip(names, options[1::2], strict=True)))
     kept = slice(None)
@@ -264,12 +215,8 @@ def ask(row: Mapping[str, str], limit_s: float) -> dict[str, Any]:
         kept = np.flatnonzero(within)
     except pp.InputError:
         pass
-    floor = floor_of(recording.time_s[kept], recording.values[kept])
-    if row["encoder_step"]:
-        floor = float(row["encoder_step"]) * 1e-3 / np.sqrt(12)
     rms = float(np.std(recording.values[kept]))
-    asked = {"fit": fit, "diagnosis": diagnosis, "same_span": same}
-    return {"record": row["record"], **asked, "floor": floor, "rms": rms}
+    return {"record": row["record"], "fit": fit, "diagnosis": diagnosis, "rms": rms}
 
 
 # ---------------------------------------------------------------- the table
@@ -301,13 +248,7 @@ def judge(row: Mapping[str, str], kept: Mapping[str, Any]) -> dict[str, Any]:
         "cpu_s": (kept["fit"]["cpu_s"], kept["diagnosis"]["cpu_s"]),
     }
     if judged["answered"]:
-        left = residuals(content, kept["diagnosis"]["said"])
-        judged["over_floor"] = {key: value / kept["floor"] for key, value in left.items()}
-        judged["followed"] = left["curve"] < FOLLOWED * kept["rms"]
-        if row["hand_rms"]:
-            same = kept["same_span"]
-            names = residuals(same["content"], same["said"])["names"]
-            judged["over_hand"] = names / (float(row["hand_rms"]) * 1e-3)
+        judged["followed"] = content["improved"]["residual_rms_rad"] < FOLLOWED * kept["rms"]
     return judged
 
 
@@ -325,7 +266,6 @@ def line(row: Mapping[str, str], kept: Mapping[str, Any], judged: Mapping[str, A
     if judged["answered"] and not judged["followed"]:
         missed.append("**not followed**")
     hand = [each for each, hit in judged["by_hand"].items() if hit]
-    over = judged.get("over_floor")
     cells = [
         row["record"],
         shown if judged["answered"] else f"refused: {judged['refused'][:120]}",
@@ -333,8 +273,6 @@ def line(row: Mapping[str, str], kept: Mapping[str, Any], judged: Mapping[str, A
         ", ".join(found),
         ", ".join(missed),
         f"{len(hand)} of {len(judged['by_hand'])}" if judged["by_hand"] else "",
-        *([f"{over[key]:.3g}" for key in ("before", "names", "curve")] if over else [""] * 3),
-        f"{judged['over_hand']:.2f}" if "over_hand" in judged else "",
         judged["restoring"],
         "{:.1f}, {:.1f}".format(*judged["cpu_s"]),
     ]
@@ -343,8 +281,7 @@ def line(row: Mapping[str, str], kept: Mapping[str, Any], judged: Mapping[str, A
 
 HEAD: Final = (
     "| record | named | class of the first | known: found | missed | by hand, found"
-    " | residual over floor: Eq. 8 | names | with curve | names over hand's | fit's torque"
-    " | CPU s: fit, diagnose |\n" + "|---" * 12 + "|"
+    " | fit's torque | CPU s: fit, diagnose |\n" + "|---" * 8 + "|"
 )
 
 
@@ -356,8 +293,6 @@ def summary(judged: list[tuple[Mapping[str, str], dict[str, Any]]]) -> str:
     driven = [each for row, each in judged if row["answer"] == "driven"]
     sine = [(row, each) for row, each in judged if "circular-error" in items(row["known"])]
     agree = sum(each["restoring"] == "sine" for _, each in sine)
-    over = [each["over_floor"] for each in free if "over_floor" in each]
-    ratio = [each["over_hand"] for each in free if "over_hand" in each]
     cpu_s = [each["cpu_s"][1] for _, each in judged]
     whole = sum(all(each["known"].values()) and not each["wrong"] for each in free)
     lines = [
@@ -372,16 +307,6 @@ def summary(judged: list[tuple[Mapping[str, str], dict[str, Any]]]) -> str:
         f"fit takes sin x where it is known: {agree} of {len(sine)}",
         f"CPU of diagnose: median {median(cpu_s):.1f} s, largest {max(cpu_s):.1f} s",
     ]
-    if over:
-        medians = [
-            f"{median(each[key] for each in over):.3g}" for key in ("before", "names", "curve")
-        ]
-        lines.append(f"median residual over floor: {', '.join(medians)} (Eq. 8, names, with curve)")
-    if ratio:
-        lines.append(
-            f"residual with names over that by hand: median {median(ratio):.2f},"
-            f" at most 1.2 in {sum(each <= 1.2 for each in ratio)} of {len(ratio)}"
-        )
     return "\n".join(f"* {each}" for each in lines)
 
 
