@@ -19,9 +19,8 @@ from pendpipe_challenge.hidden import (
     Hidden,
     Maker,
     amplitude,
+    enter,
     outside,
-    reading,
-    torque,
 )
 from pendpipe_challenge.scenario import Scenario
 
@@ -34,97 +33,78 @@ def _loss(s: Scenario) -> float:
     return s.motion.value("gamma") + s.motion.value("hysteretic") + 1e-4 * s.omega
 
 
-@outside("magnet-near-centre")
-def magnet(r: Random, s: Scenario) -> Hidden:
-    """A magnet under the rest position; its pull is felt over a small angle."""
+def _rub(s: Scenario) -> float:
+    return 0.1 * _loss(s) * s.omega * amplitude(s)
+
+
+def _magnet(r: Random, s: Scenario) -> tuple[float, dict[str, float]]:
+    """Its pull is felt over a small angle."""
     width = amplitude(s) * float(r.uniform(0.08, 0.3))
-    return torque(
-        s,
-        RESTORING,
-        "magnet near the centre",
-        "magnet",
-        float(r.choice([-1, 1])) * 1e-4,
-        own=False,
-        magnet_width=width,
-    )
+    return float(r.choice([-1, 1])) * 1e-4, {"magnet_width": width}
 
 
-@outside("rough-spot")
-def rough(r: Random, s: Scenario) -> Hidden:
-    """A spot off centre that rubs."""
-    a = amplitude(s)
-    return torque(
-        s,
-        DAMPING,
-        "rough spot off centre",
-        "rough",
-        0.1 * _loss(s) * s.omega * a,
-        own=False,
-        rough_place=a * float(r.choice([-1, 1]) * r.uniform(0.25, 0.7)),
-        rough_width=a * float(r.uniform(0.03, 0.12)),
-    )
-
-
-@outside("cogging-torque")
-def cogging(r: Random, s: Scenario) -> Hidden:
-    """A motor's teeth."""
-    a = amplitude(s)
-    return torque(
-        s,
-        RESTORING,
-        "cogging torque",
-        "cogging",
-        1e-4 * a,
-        own=False,
-        cogging_teeth=float(r.uniform(8, 25)) / a,
-        cogging_phase=float(r.uniform(0, 2 * np.pi)),
-    )
-
-
-@outside("turning-point-memory")
-def memory(r: Random, s: Scenario) -> Hidden:
+def _memory(r: Random, s: Scenario) -> tuple[float, dict[str, float]]:
     """Friction that grows with the way from the last turning point."""
-    a, p = amplitude(s), float(r.uniform(0.3, 2.5))
-    return torque(
-        s,
-        DAMPING,
-        "memory of the last turning point",
-        "memory",
-        0.1 * _loss(s) * s.omega * a / (2 * a) ** p,
-        own=False,
-        memory_power=p,
-    )
+    p = float(r.uniform(0.3, 2.5))
+    return _rub(s) / (2 * amplitude(s)) ** p, {"memory_power": p}
 
 
-@outside("pulsed-damping")
-def pulsed(r: Random, s: Scenario) -> Hidden:
-    """Damping that comes and goes in time."""
-    omega = 2 * np.pi / (s.span_s * float(r.uniform(0.08, 0.3)))
-    return torque(
-        s,
-        DAMPING,
-        "damping periodic in time",
-        "pulsed",
+enter(
+    *(RESTORING, "magnet near the centre", "magnet", _magnet),
+    own=False,
+    outside="magnet-near-centre",
+)
+enter(
+    *(DAMPING, "rough spot off centre", "rough"),
+    lambda r, s: (
+        _rub(s),
+        {
+            "rough_place": amplitude(s) * float(r.choice([-1, 1]) * r.uniform(0.25, 0.7)),
+            "rough_width": amplitude(s) * float(r.uniform(0.03, 0.12)),
+        },
+    ),
+    own=False,
+    outside="rough-spot",
+)
+# A motor's teeth.
+enter(
+    *(RESTORING, "cogging torque", "cogging"),
+    lambda r, s: (
+        1e-4 * amplitude(s),
+        {
+            "cogging_teeth": float(r.uniform(8, 25)) / amplitude(s),
+            "cogging_phase": float(r.uniform(0, 2 * np.pi)),
+        },
+    ),
+    own=False,
+    outside="cogging-torque",
+)
+enter(
+    *(DAMPING, "memory of the last turning point", "memory", _memory),
+    own=False,
+    outside="turning-point-memory",
+)
+enter(
+    *(DAMPING, "damping periodic in time", "pulsed"),
+    lambda r, s: (
         0.1 * _loss(s),
-        own=False,
-        pulsed_omega=omega,
-        pulsed_phase=float(r.uniform(0, 2 * np.pi)),
-    )
-
-
-@outside("kinked-damping")
-def kink(r: Random, s: Scenario) -> Hidden:
-    """1/Q with a kink at one amplitude."""
-    a = amplitude(s)
-    return torque(
-        s,
-        DAMPING,
-        "kink of 1/Q",
-        "kink",
-        _loss(s) / a,
-        own=False,
-        kink_amplitude=a * float(r.uniform(0.5, 0.8)),
-    )
+        {
+            "pulsed_omega": 2 * np.pi / (s.span_s * float(r.uniform(0.08, 0.3))),
+            "pulsed_phase": float(r.uniform(0, 2 * np.pi)),
+        },
+    ),
+    own=False,
+    outside="pulsed-damping",
+)
+enter(
+    *(DAMPING, "kink of 1/Q", "kink"),
+    lambda r, s: (
+        _loss(s) / amplitude(s),
+        {"kink_amplitude": amplitude(s) * float(r.uniform(0.5, 0.8))},
+    ),
+    own=False,
+    outside="kinked-damping",
+)
 
 
 @outside("two-state-friction")
@@ -140,31 +120,22 @@ def telegraph(r: Random, s: Scenario) -> Hidden:
     return Hidden(DAMPING, "two-state friction", build, size, False, s, parameter="friction")
 
 
-@outside("rippled-gain")
-def ripple(r: Random, s: Scenario) -> Hidden:
-    """A gain that ripples with the logarithm of the amplitude."""
-    return reading(
-        s,
-        READING,
-        "log-periodic gain",
-        "ripple",
-        1e-3,
-        own=False,
-        ripple_count=float(r.uniform(6, 14)),
-    )
-
-
-@outside("swing-delay")
-def delay(r: Random, s: Scenario) -> Hidden:
-    """A reading that lags more the wider the swing."""
-    return reading(
-        s,
-        READING,
-        "delay that grows with the swing",
-        "delay_s_rad2",
-        float(r.choice([-1, 1])) * 1e-3 / s.omega / amplitude(s) ** 2,
-        own=False,
-    )
+# A gain that ripples with the logarithm of the amplitude; a reading that lags more the wider the
+# swing.
+enter(
+    *(READING, "log-periodic gain", "ripple"),
+    lambda r, s: (1e-3, {"ripple_count": float(r.uniform(6, 14))}),
+    chain=True,
+    own=False,
+    outside="rippled-gain",
+)
+enter(
+    *(READING, "delay that grows with the swing", "delay_s_rad2"),
+    lambda r, s: (float(r.choice([-1, 1])) * 1e-3 / s.omega / amplitude(s) ** 2, {}),
+    chain=True,
+    own=False,
+    outside="swing-delay",
+)
 
 
 MEASUREMENT: Final = frozenset(

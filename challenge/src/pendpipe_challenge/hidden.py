@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
@@ -103,40 +103,47 @@ def outside(name: str) -> Callable[[Maker], Maker]:
     return keep
 
 
-def torque(
-    scenario: Scenario,
+Draw: TypeAlias = Callable[[np.random.Generator, Scenario], tuple[float, dict[str, float]]]
+"""A strength to begin with, and what else is set."""
+
+
+def enter(
     effect: str,
     law: str,
-    name: str,
-    scale: float,
+    parameter: str,
+    draw: Draw,
     *,
+    chain: bool = False,
     own: bool = True,
-    **details: float,
-) -> Hidden:
-    """An effect whose strength is one parameter of the motion."""
+    prepare: Callable[[Scenario], Scenario] | None = None,
+    outside: str = "",
+    **more: Any,
+) -> None:
+    """Register an effect whose strength is one number of the motion, or of the chain.
 
-    def build(prepared: Scenario, strength: float) -> Scenario:
-        return prepared.with_motion(**{name: strength}, **details)
+    Parameters
+    ----------
+    outside
+        Its name where no catalogue's entry describes it.
+    more
+        Of `Hidden`, or what gives it for a scenario and the details.
+    """
 
-    return Hidden(effect, law, build, scale, own, scenario, details=dict(details), parameter=name)
+    def maker(random: np.random.Generator, scenario: Scenario) -> Hidden:
+        scale, details = draw(random, scenario)
 
+        def build(prepared: Scenario, strength: float) -> Scenario:
+            changed = prepared.with_chain if chain else prepared.with_motion
+            return changed(**{parameter: strength}, **details)
 
-def reading(
-    scenario: Scenario,
-    effect: str,
-    law: str,
-    name: str,
-    scale: float,
-    *,
-    own: bool = True,
-    **details: float,
-) -> Hidden:
-    """An effect whose strength is one number of the measurement chain."""
+        prepared = prepare(scenario) if prepare else scenario
+        hidden = Hidden(
+            effect, law, build, scale, own, prepared, details=dict(details), parameter=parameter
+        )
+        own_more = {k: v(scenario, details) if callable(v) else v for k, v in more.items()}
+        return replace(hidden, **own_more)
 
-    def build(prepared: Scenario, strength: float) -> Scenario:
-        return prepared.with_chain(**{name: strength}, **details)
-
-    return Hidden(effect, law, build, scale, own, scenario, details=dict(details), parameter=name)
+    (OUTSIDE if outside else CATALOGUE).setdefault(outside or effect, []).append(maker)
 
 
 def amplitude(scenario: Scenario) -> float:

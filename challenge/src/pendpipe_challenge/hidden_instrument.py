@@ -6,88 +6,73 @@ from dataclasses import replace
 
 import numpy as np
 
-from pendpipe_challenge.hidden import Hidden, amplitude, either_sign, law, reading
+from pendpipe_challenge.hidden import Hidden, amplitude, either_sign, enter, law
 from pendpipe_challenge.scenario import Scenario
 
 Random = np.random.Generator
 
 
-@law("sensor-quadratic")
-def square(r: Random, s: Scenario) -> Hidden:
-    """s2 x^2."""
-    return reading(
-        s, "sensor-quadratic", "x^2", "square", either_sign(r) * s.sd_rad / amplitude(s) ** 2
-    )
+def _volts(s: Scenario) -> float:
+    """The noise, as the amplifier gives it."""
+    return s.sd_rad * s.chain.volts_per_radian
 
 
-@law("sensor-quadratic")
-def leaning(r: Random, s: Scenario) -> Hidden:
-    """A capacitor whose moving plate does not rest in the middle."""
-    found = reading(
-        s,
-        "sensor-quadratic",
-        "plates",
-        "plates",
-        s.sd_rad / amplitude(s) ** 2,
-        own=False,
-        lean=either_sign(r) * 0.4,
-    )
-    return replace(found, largest=0.4 / amplitude(s))
-
-
-@law("sensor-cubic")
-def cubic(r: Random, s: Scenario) -> Hidden:
-    """s3 x^3."""
-    return reading(s, "sensor-cubic", "x^3", "cubic", either_sign(r) * s.sd_rad / amplitude(s) ** 3)
-
-
-@law("sensor-cubic")
-def plates(_: Random, s: Scenario) -> Hidden:
-    """A differential capacitor: (C1 - C2)/(C1 + C2) with parallel plates and strays."""
-    found = reading(s, "sensor-cubic", "plates", "plates", 0.1 / amplitude(s), own=False)
-    return replace(found, growth=4.0, largest=0.9 / amplitude(s))
-
-
-@law("sensor-cubic")
-def saturating(_: Random, s: Scenario) -> Hidden:
-    """A sensor whose field weakens off its centre (tanh)."""
-    return reading(s, "sensor-cubic", "tanh", "logistic", s.sd_rad / amplitude(s) ** 3, own=False)
-
-
-@law("sensor-backlash")
-def coupling(_: Random, s: Scenario) -> Hidden:
-    """Play between axis and sensor."""
-    return reading(s, "sensor-backlash", "play", "play_rad", s.sd_rad)
-
-
-@law("sensor-backlash")
-def elastic(_: Random, s: Scenario) -> Hidden:
-    """A coupling that gives before it slips."""
-    return reading(s, "sensor-backlash", "elastic slip", "elastic_play_rad", s.sd_rad, own=False)
-
-
-@law("offset-drift")
-def drift(r: Random, s: Scenario) -> Hidden:
-    """Straight."""
-    volts = s.sd_rad * s.chain.volts_per_radian
-    return reading(
-        s, "offset-drift", "straight", "drift_volts_s", either_sign(r) * volts / s.span_s
-    )
-
-
-@law("offset-drift")
-def warm_up(r: Random, s: Scenario) -> Hidden:
-    """An amplifier that warms up."""
-    volts = s.sd_rad * s.chain.volts_per_radian
-    return reading(
-        s,
-        "offset-drift",
-        "warm-up",
-        "warm_up_volts",
-        either_sign(r) * volts,
-        own=False,
-        warm_up_s=float(r.uniform(0.1, 0.5)) * s.span_s,
-    )
+enter(
+    *("sensor-quadratic", "x^2", "square"),
+    lambda r, s: (either_sign(r) * s.sd_rad / amplitude(s) ** 2, {}),
+    chain=True,
+)
+# A capacitor whose moving plate does not rest in the middle.
+enter(
+    *("sensor-quadratic", "plates", "plates"),
+    lambda r, s: (s.sd_rad / amplitude(s) ** 2, {"lean": either_sign(r) * 0.4}),
+    chain=True,
+    own=False,
+    largest=lambda s, d: 0.4 / amplitude(s),
+)
+enter(
+    *("sensor-cubic", "x^3", "cubic"),
+    lambda r, s: (either_sign(r) * s.sd_rad / amplitude(s) ** 3, {}),
+    chain=True,
+)
+# A differential capacitor: (C1 - C2)/(C1 + C2) with parallel plates and strays.
+enter(
+    *("sensor-cubic", "plates", "plates"),
+    lambda r, s: (0.1 / amplitude(s), {}),
+    chain=True,
+    own=False,
+    growth=4.0,
+    largest=lambda s, d: 0.9 / amplitude(s),
+)
+# A sensor whose field weakens off its centre.
+enter(
+    *("sensor-cubic", "tanh", "logistic"),
+    lambda r, s: (s.sd_rad / amplitude(s) ** 3, {}),
+    chain=True,
+    own=False,
+)
+# Play between axis and sensor, and a coupling that gives before it slips.
+enter("sensor-backlash", "play", "play_rad", lambda r, s: (s.sd_rad, {}), chain=True)
+enter(
+    *("sensor-backlash", "elastic slip", "elastic_play_rad"),
+    lambda r, s: (s.sd_rad, {}),
+    chain=True,
+    own=False,
+)
+enter(
+    *("offset-drift", "straight", "drift_volts_s"),
+    lambda r, s: (either_sign(r) * _volts(s) / s.span_s, {}),
+    chain=True,
+)
+enter(
+    *("offset-drift", "warm-up", "warm_up_volts"),
+    lambda r, s: (
+        either_sign(r) * _volts(s),
+        {"warm_up_s": float(r.uniform(0.1, 0.5)) * s.span_s},
+    ),
+    chain=True,
+    own=False,
+)
 
 
 @law("offset-drift")
@@ -102,21 +87,24 @@ def walk(r: Random, s: Scenario) -> Hidden:
     return Hidden("offset-drift", "wandering", build, volts, False, s, parameter="step_volts")
 
 
-@law("gain-drift")
-def gain(r: Random, s: Scenario) -> Hidden:
-    """Straight."""
-    found = reading(s, "gain-drift", "straight", "gain_drift", either_sign(r) * 1e-2 / s.span_s)
-    return replace(found, largest=0.5 / s.span_s)
-
-
-@law("gain-drift")
-def gain_relaxing(r: Random, s: Scenario) -> Hidden:
-    """With the amplifier's temperature."""
+def _relaxing(r: Random, s: Scenario, size: float, name: str) -> tuple[float, dict[str, float]]:
     tau = float(r.uniform(0.15, 0.5)) * s.span_s
-    found = reading(
-        s, "gain-drift", "relaxing", "gain_drift", either_sign(r) * 1e-2 / tau, gain_drift_s=tau
-    )
-    return replace(found, largest=0.5 / tau)
+    return either_sign(r) * size / tau, {name: tau}
+
+
+enter(
+    *("gain-drift", "straight", "gain_drift"),
+    lambda r, s: (either_sign(r) * 1e-2 / s.span_s, {}),
+    chain=True,
+    largest=lambda s, d: 0.5 / s.span_s,
+)
+# With the amplifier's temperature.
+enter(
+    *("gain-drift", "relaxing", "gain_drift"),
+    lambda r, s: _relaxing(r, s, 1e-2, "gain_drift_s"),
+    chain=True,
+    largest=lambda s, d: 0.5 / d["gain_drift_s"],
+)
 
 
 @law("ac-coupling")
@@ -141,36 +129,24 @@ def ac(r: Random, s: Scenario) -> Hidden:
     )
 
 
-def _tone(r: Random, s: Scenario, second: float, name: str) -> Hidden:
+def _tone(r: Random, s: Scenario, second: float) -> tuple[float, dict[str, float]]:
     nyquist = 0.5 / s.interval_s
     line = s.omega / 2 / np.pi
     hertz = float(r.uniform(0.15 * line, nyquist))
     while min(abs(hertz - k * line) for k in (1, 2, 3, 5)) < 0.1 * line:
         hertz = float(r.uniform(0.15 * line, nyquist))
-    volts = s.sd_rad * s.chain.volts_per_radian
-    return reading(
-        s,
-        "tone-pickup",
-        name,
-        "tone_volts",
-        volts,
-        own=second == 0.0,
-        tone_hz=hertz,
-        tone_phase=float(r.uniform(0, 2 * np.pi)),
-        tone_second=second,
-    )
+    phase = float(r.uniform(0, 2 * np.pi))
+    return _volts(s), {"tone_hz": hertz, "tone_phase": phase, "tone_second": second}
 
 
-@law("tone-pickup")
-def tone(r: Random, s: Scenario) -> Hidden:
-    """Mains or its alias."""
-    return _tone(r, s, 0.0, "cosine")
-
-
-@law("tone-pickup")
-def hum(r: Random, s: Scenario) -> Hidden:
-    """With a harmonic."""
-    return _tone(r, s, 0.3, "with harmonic")
+# Mains or its alias.
+enter("tone-pickup", "cosine", "tone_volts", lambda r, s: _tone(r, s, 0.0), chain=True)
+enter(
+    *("tone-pickup", "with harmonic", "tone_volts"),
+    lambda r, s: _tone(r, s, 0.3),
+    chain=True,
+    own=False,
+)
 
 
 def _peaks(s: Scenario) -> tuple[float, float]:
@@ -284,27 +260,24 @@ def coarse(r: Random, s: Scenario) -> Hidden:
     )
 
 
-@law("clock-drift")
-def clock(r: Random, s: Scenario) -> Hidden:
-    """Straight."""
-    return reading(s, "clock-drift", "straight", "clock_drift", either_sign(r) * 1e-4 / s.span_s)
-
-
-@law("clock-drift")
-def clock_relaxing(r: Random, s: Scenario) -> Hidden:
-    """A crystal that warms up."""
-    tau = float(r.uniform(0.15, 0.5)) * s.span_s
-    return reading(
-        s, "clock-drift", "relaxing", "clock_drift", either_sign(r) * 1e-4 / tau, clock_drift_s=tau
-    )
-
-
-@law("jitter")
-def jitter(_: Random, s: Scenario) -> Hidden:
-    """Samples at uncertain moments."""
-    size = 0.5 * s.sd_rad / (s.omega * amplitude(s))
-    found = reading(s, "jitter", "Gaussian", "jitter_s", size)
-    return replace(found, sized="variance", growth=4.0)
+enter(
+    *("clock-drift", "straight", "clock_drift"),
+    lambda r, s: (either_sign(r) * 1e-4 / s.span_s, {}),
+    chain=True,
+)
+# A crystal that warms up.
+enter(
+    *("clock-drift", "relaxing", "clock_drift"),
+    lambda r, s: _relaxing(r, s, 1e-4, "clock_drift_s"),
+    chain=True,
+)
+enter(
+    *("jitter", "Gaussian", "jitter_s"),
+    lambda r, s: (0.5 * s.sd_rad / (s.omega * amplitude(s)), {}),
+    chain=True,
+    sized="variance",
+    growth=4.0,
+)
 
 
 @law("dropped-samples")

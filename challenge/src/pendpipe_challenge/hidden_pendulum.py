@@ -6,8 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from pendpipe_challenge.hidden import Hidden, amplitude, either_sign, from_rest, law, moment, torque
+from pendpipe_challenge.hidden import (
+    Hidden,
+    amplitude,
+    either_sign,
+    enter,
+    from_rest,
+    law,
+    moment,
+)
 from pendpipe_challenge.scenario import Scenario
+
+Random = np.random.Generator
 
 
 def _bare(scenario: Scenario) -> Scenario:
@@ -52,170 +62,132 @@ def circular(_: Random, s: Scenario) -> Hidden:
     )
 
 
-@law("cubic-stiffness")
-def cubic(r: Random, s: Scenario) -> Hidden:
-    """k3 x^3."""
-    size = either_sign(r) * 1e-3 / amplitude(s) ** 2
-    return torque(s, "cubic-stiffness", "x^3", "cubic", size)
+def _viscous(s: Scenario) -> float:
+    """Rate to which effects are set, where there may be no viscous loss."""
+    return s.motion.value("gamma") + 1e-4 * s.omega
 
 
-@law("cubic-stiffness")
-def flexure(r: Random, s: Scenario) -> Hidden:
-    """A flexure that stiffens as sinh."""
-    a = amplitude(s)
-    size, scale = 1e-3 / a**2, a * float(r.uniform(0.7, 1.5))
-    return torque(
-        s, "cubic-stiffness", "sinh flexure", "stiffening", size, own=False, stiffening_scale=scale
-    )
+def _top(s: Scenario) -> float:
+    """The first speed."""
+    return s.omega * amplitude(s)
 
 
-@law("quadratic-stiffness")
-def square(r: Random, s: Scenario) -> Hidden:
-    """k2 x^2."""
-    return torque(s, "quadratic-stiffness", "x^2", "square", either_sign(r) * 3e-3 / amplitude(s))
+enter(
+    *("cubic-stiffness", "x^3", "cubic"),
+    lambda r, s: (either_sign(r) * 1e-3 / amplitude(s) ** 2, {}),
+)
+# A flexure.
+enter(
+    *("cubic-stiffness", "sinh flexure", "stiffening"),
+    lambda r, s: (
+        1e-3 / amplitude(s) ** 2,
+        {"stiffening_scale": amplitude(s) * float(r.uniform(0.7, 1.5))},
+    ),
+    own=False,
+)
+enter(
+    *("quadratic-stiffness", "x^2", "square"),
+    lambda r, s: (either_sign(r) * 3e-3 / amplitude(s), {}),
+)
+# A magnet on one side, x^2 + x^3/(3 scale) + ...: the phase, which the odd part moves, is often the
+# first to show.
+enter(
+    *("quadratic-stiffness", "exponential", "lopsided"),
+    lambda r, s: (
+        either_sign(r) * 3e-3 / amplitude(s),
+        {"lopsided_scale": amplitude(s) * float(r.uniform(1, 3))},
+    ),
+    own=False,
+    also=("cubic-stiffness",),
+)
+# These are hidden from Eq. 3.
+enter(
+    *("coulomb-friction", "sgn v", "coulomb"),
+    lambda r, s: (0.02 * _bare(s).motion.value("gamma") * s.omega * amplitude(s), {}),
+    prepare=_bare,
+)
+enter(
+    *("coulomb-friction", "short bristles", "dahl"),
+    lambda r, s: (
+        0.02 * _bare(s).motion.value("gamma") / s.omega * amplitude(s) / (0.03 * amplitude(s)),
+        {"dahl_reach": 0.03 * amplitude(s)},
+    ),
+    own=False,
+    prepare=_bare,
+    also=("presliding-friction",),
+)
+enter(
+    *("quadratic-drag", "v|v|", "drag"),
+    lambda r, s: (0.02 * _bare(s).motion.value("gamma") / s.omega / amplitude(s), {}),
+    own=False,
+    prepare=_bare,
+)
+enter(
+    *("quadratic-drag", "Eq. 8", "quadratic"),
+    lambda r, s: (0.02 * _bare(s).motion.value("gamma") / s.omega / amplitude(s), {}),
+    prepare=_bare,
+)
+enter(
+    *("drag-form", "v|v|", "drag"),
+    lambda r, s: (
+        0.3 * (s.motion.value("gamma") + 1e-3 * s.omega) / s.omega / amplitude(s),
+        {},
+    ),
+    prepare=lambda s: s.with_motion(quadratic=0.0),
+)
 
 
-@law("quadratic-stiffness")
-def lopsided(r: Random, s: Scenario) -> Hidden:
-    """A magnet on one side: exponential."""
-    a = amplitude(s)
-    found = torque(
-        s,
-        "quadratic-stiffness",
-        "exponential",
-        "lopsided",
-        either_sign(r) * 3e-3 / a,
-        own=False,
-        lopsided_scale=a * float(r.uniform(1, 3)),
-    )
-    # x^2 + x^3/(3 scale) + ...: the phase, which the odd part moves, is often the first to show.
-    return replace(found, also=("cubic-stiffness",))
-
-
-@law("coulomb-friction")
-def coulomb(_: Random, s: Scenario) -> Hidden:
-    """Constant friction, hidden from Eq. 3."""
-    bare = _bare(s)
-    size = 0.02 * bare.motion.value("gamma") * s.omega * amplitude(s)
-    return torque(bare, "coulomb-friction", "sgn v", "coulomb", size)
-
-
-@law("coulomb-friction")
-def bristles(_: Random, s: Scenario) -> Hidden:
-    """Bristles (LuGre) that slide almost at once."""
-    bare, reach = _bare(s), 0.03 * amplitude(s)
-    size = 0.02 * bare.motion.value("gamma") / s.omega * amplitude(s) / reach
-    found = torque(
-        bare, "coulomb-friction", "short bristles", "dahl", size, own=False, dahl_reach=reach
-    )
-    return replace(found, also=("presliding-friction",))
-
-
-@law("quadratic-drag")
-def drag(_: Random, s: Scenario) -> Hidden:
-    """True v|v|, hidden from Eq. 3."""
-    bare = _bare(s)
-    size = 0.02 * bare.motion.value("gamma") / s.omega / amplitude(s)
-    return torque(bare, "quadratic-drag", "v|v|", "drag", size, own=False)
-
-
-@law("quadratic-drag")
-def energy_drag(_: Random, s: Scenario) -> Hidden:
-    """Eq. 8's energy form, hidden from Eq. 3."""
-    bare = _bare(s)
-    size = 0.02 * bare.motion.value("gamma") / s.omega / amplitude(s)
-    return torque(bare, "quadratic-drag", "Eq. 8", "quadratic", size)
-
-
-@law("drag-form")
-def form(_: Random, s: Scenario) -> Hidden:
-    """v|v| where Eq. 8 has (w^2 x^2 + v^2) sgn v."""
-    plain = s.with_motion(quadratic=0.0)
-    size = 0.3 * (s.motion.value("gamma") + 1e-3 * s.omega) / s.omega / amplitude(s)
-    return torque(plain, "drag-form", "v|v|", "drag", size)
-
-
-@law("power-law-damping")
-def power(r: Random, s: Scenario) -> Hidden:
-    """|v|^n."""
+def _power(r: Random, s: Scenario) -> tuple[float, dict[str, float]]:
     n = float(r.choice([r.uniform(0.35, 0.65), r.uniform(1.3, 1.7)]))
-    size = 0.1 * (s.motion.value("gamma") + 1e-4 * s.omega) * (s.omega * amplitude(s)) ** (1 - n)
-    return torque(s, "power-law-damping", "|v|^n", "power", size, power_exponent=n)
+    return 0.1 * _viscous(s) * _top(s) ** (1 - n), {"power_exponent": n}
 
 
-@law("power-law-damping")
-def energy(r: Random, s: Scenario) -> Hidden:
-    """Eq. 9a with a free lambda."""
+def _energy(r: Random, s: Scenario) -> tuple[float, dict[str, float]]:
     exponent = float(r.choice([0.25, 0.75]) + r.uniform(-0.08, 0.08))
-    top = s.omega * amplitude(s)
-    size = 0.1 * (s.motion.value("gamma") + 1e-4 * s.omega) * top ** (1 - 2 * exponent)
-    return torque(s, "power-law-damping", "E^lambda", "energy", size, energy_exponent=exponent)
+    return 0.1 * _viscous(s) * _top(s) ** (1 - 2 * exponent), {"energy_exponent": exponent}
 
 
-@law("power-law-damping")
-def reynolds(r: Random, s: Scenario) -> Hidden:
-    """A sphere's drag by C_D(Re), Schiller and Naumann."""
-    speed = s.omega * amplitude(s) / float(np.exp(r.uniform(np.log(20), np.log(600))))
-    size = 0.1 * (s.motion.value("gamma") + 1e-4 * s.omega)
-    return torque(
-        s, "power-law-damping", "C_D(Re)", "reynolds", size, own=False, reynolds_speed=speed
+enter("power-law-damping", "|v|^n", "power", _power)
+enter("power-law-damping", "E^lambda", "energy", _energy)
+# A sphere, by Schiller and Naumann.
+enter(
+    *("power-law-damping", "C_D(Re)", "reynolds"),
+    lambda r, s: (
+        0.1 * _viscous(s),
+        {"reynolds_speed": _top(s) / float(np.exp(r.uniform(np.log(20), np.log(600))))},
+    ),
+    own=False,
+)
+enter(
+    *("cubic-damping", "v^3", "rayleigh"),
+    lambda r, s: (0.1 * _viscous(s) / _top(s) ** 2, {}),
+)
+enter(
+    *("cubic-damping", "x^2 v", "van_der_pol"),
+    lambda r, s: (0.1 * _viscous(s) / amplitude(s) ** 2, {}),
+)
+# An eddy-current brake whose magnet leaves its plate.
+enter(
+    *("cubic-damping", "brake's edge", "eddy"),
+    lambda r, s: (0.1 * _viscous(s), {"eddy_width": amplitude(s) * float(r.uniform(1.2, 2.0))}),
+    own=False,
+)
+for _law, _power_of_v in (("Gaussian", 2.0), ("exponential", 1.0)):
+    enter(
+        *("stribeck-friction", _law, "stribeck"),
+        lambda r, s, power=_power_of_v: (  # type: ignore[misc]
+            0.02 * _viscous(s) * s.omega * amplitude(s),
+            {
+                "stribeck_speed": s.omega * amplitude(s) * float(r.uniform(0.05, 0.3)),
+                "stribeck_power": power,
+            },
+        ),
+        own=_law == "Gaussian",
     )
-
-
-@law("cubic-damping")
-def rayleigh(_: Random, s: Scenario) -> Hidden:
-    """v^3."""
-    size = 0.1 * (s.motion.value("gamma") + 1e-4 * s.omega) / (s.omega * amplitude(s)) ** 2
-    return torque(s, "cubic-damping", "v^3", "rayleigh", size)
-
-
-@law("cubic-damping")
-def van_der_pol(_: Random, s: Scenario) -> Hidden:
-    """x^2 v."""
-    size = 0.1 * (s.motion.value("gamma") + 1e-4 * s.omega) / amplitude(s) ** 2
-    return torque(s, "cubic-damping", "x^2 v", "van_der_pol", size)
-
-
-@law("cubic-damping")
-def eddy(r: Random, s: Scenario) -> Hidden:
-    """An eddy-current brake whose magnet leaves its plate."""
-    size = 0.1 * (s.motion.value("gamma") + 1e-4 * s.omega)
-    width = amplitude(s) * float(r.uniform(1.2, 2.0))
-    return torque(s, "cubic-damping", "brake's edge", "eddy", size, own=False, eddy_width=width)
-
-
-def _stribeck(r: Random, s: Scenario, exponent: float, law_name: str, own: bool) -> Hidden:
-    slow = s.omega * amplitude(s) * float(r.uniform(0.05, 0.3))
-    size = 0.02 * (s.motion.value("gamma") + 1e-4 * s.omega) * s.omega * amplitude(s)
-    return torque(
-        s,
-        "stribeck-friction",
-        law_name,
-        "stribeck",
-        size,
-        own=own,
-        stribeck_speed=slow,
-        stribeck_power=exponent,
-    )
-
-
-@law("stribeck-friction")
-def stribeck(r: Random, s: Scenario) -> Hidden:
-    """exp(-(v/v_s)^2)."""
-    return _stribeck(r, s, 2.0, "Gaussian", True)
-
-
-@law("stribeck-friction")
-def stribeck_exponential(r: Random, s: Scenario) -> Hidden:
-    """exp(-|v|/v_s)."""
-    return _stribeck(r, s, 1.0, "exponential", False)
-
-
-@law("presliding-friction")
-def dahl(r: Random, s: Scenario) -> Hidden:
-    """Dahl."""
-    reach = amplitude(s) * float(r.uniform(0.1, 0.8))
-    return torque(s, "presliding-friction", "Dahl", "dahl", 1e-4, dahl_reach=reach)
+enter(
+    *("presliding-friction", "Dahl", "dahl"),
+    lambda r, s: (1e-4, {"dahl_reach": amplitude(s) * float(r.uniform(0.1, 0.8))}),
+)
 
 
 @law("presliding-friction")
@@ -245,68 +217,38 @@ def lugre(r: Random, s: Scenario) -> Hidden:
     )
 
 
-@law("presliding-friction")
-def iwan(r: Random, s: Scenario) -> Hidden:
-    """Elements of several reaches."""
-    reach = amplitude(s) * float(r.uniform(0.1, 0.5))
-    return torque(s, "presliding-friction", "Iwan", "iwan", 1e-4, own=False, iwan_reach=reach)
+# Elements of several reaches.
+enter(
+    *("presliding-friction", "Iwan", "iwan"),
+    lambda r, s: (1e-4, {"iwan_reach": amplitude(s) * float(r.uniform(0.1, 0.5))}),
+    own=False,
+)
+enter("backlash", "dead zone", "play", lambda r, s: (1e-4 * amplitude(s), {}))
+enter("history-force", "Basset", "basset", lambda r, s: (1e-3, {}), prepare=from_rest)
 
 
-@law("backlash")
-def backlash(_: Random, s: Scenario) -> Hidden:
-    """A dead zone in the restoring torque."""
-    return torque(s, "backlash", "dead zone", "play", 1e-4 * amplitude(s))
-
-
-@law("history-force")
-def history(_: Random, s: Scenario) -> Hidden:
-    """Basset's force after a release from rest."""
-    return torque(from_rest(s), "history-force", "Basset", "basset", 1e-3)
-
-
-@law("vortex-shedding")
-def shedding(r: Random, s: Scenario) -> Hidden:
-    """A burst of drag after each reversal above an amplitude."""
+def _shedding(r: Random, s: Scenario) -> tuple[float, dict[str, float]]:
     a, exponent = amplitude(s), float(r.choice([0.5, 1.0, 1.5]))
-    size = 0.1 * (s.motion.value("gamma") + 1e-4 * s.omega) * s.omega * a ** (1 - exponent)
-    return torque(
-        s,
-        "vortex-shedding",
-        "burst after reversal",
-        "shedding",
-        size,
-        own=False,
-        shedding_amplitude=a * float(r.uniform(0.4, 0.8)),
-        shedding_power=exponent,
-    )
+    size = 0.1 * _viscous(s) * s.omega * a ** (1 - exponent)
+    above = a * float(r.uniform(0.4, 0.8))
+    return size, {"shedding_amplitude": above, "shedding_power": exponent}
 
 
-@law("release-transient")
-def release(r: Random, s: Scenario) -> Hidden:
-    """Damping that dies away."""
+def _release(r: Random, s: Scenario) -> tuple[float, dict[str, float]]:
     tau = 2 * np.pi / s.omega * float(r.uniform(1.0, 6.0))
-    return torque(
-        from_rest(s), "release-transient", "damping", "release", 0.01 / tau, release_time=tau
-    )
+    return 0.01 / tau, {"release_time": tau}
 
 
-@law("release-transient")
-def finger(r: Random, s: Scenario) -> Hidden:
-    """A finger that rubs on the first swings."""
+def _finger(r: Random, s: Scenario) -> tuple[float, dict[str, float]]:
     tau = 2 * np.pi / s.omega * float(r.uniform(1.0, 4.0))
-    size = 0.01 / tau * s.omega * amplitude(s)
-    return torque(
-        from_rest(s),
-        "release-transient",
-        "rubbing",
-        "release_finger",
-        size,
-        own=False,
-        release_time=tau,
-    )
+    return 0.01 / tau * s.omega * amplitude(s), {"release_time": tau}
 
 
-Random = np.random.Generator
+# A burst of drag after each reversal above an amplitude.
+enter("vortex-shedding", "burst after reversal", "shedding", _shedding, own=False)
+enter("release-transient", "damping", "release", _release, prepare=from_rest)
+# A finger that rubs on the first swings.
+enter(*("release-transient", "rubbing", "release_finger", _finger), own=False, prepare=from_rest)
 
 
 @law("second-mode")
@@ -396,40 +338,24 @@ def crossed(r: Random, s: Scenario) -> Hidden:
     )
 
 
-@law("plane-coupling")
-def coupled(r: Random, s: Scenario) -> Hidden:
+def _coupled(r: Random, s: Scenario) -> tuple[float, dict[str, float]]:
     """Swing flows into the other plane and back."""
     detuning = _beat(r, s)
     loss = s.motion.value("gamma") + 4 / np.pi * s.motion.value("hysteretic")
     omega = s.omega * (1.0 + detuning)
-    found = torque(
-        s,
-        "plane-coupling",
-        "coupled planes",
-        "coupling",
-        0.1 * abs(detuning),
-        own=False,
-        second=1.0,
-        second_omega=omega,
-        second_gamma=loss,
-    )
-    return replace(found, growth=4.0, details={"detuning": detuning})
+    return 0.1 * abs(detuning), {"second": 1.0, "second_omega": omega, "second_gamma": loss}
 
 
-@law("periodic-drive")
-def drive(r: Random, s: Scenario) -> Hidden:
+def _drive(r: Random, s: Scenario) -> tuple[float, dict[str, float]]:
     """A fan, a building."""
     ratio = float(r.choice([r.uniform(0.3, 0.8), r.uniform(1.2, 3.5)]))
     omega = min(ratio * s.omega, 0.8 * np.pi / s.interval_s)
-    return torque(
-        s,
-        "periodic-drive",
-        "cosine",
-        "drive",
-        s.sd_rad * s.omega**2,
-        drive_omega=omega,
-        drive_phase=float(r.uniform(0, 2 * np.pi)),
-    )
+    phase = float(r.uniform(0, 2 * np.pi))
+    return s.sd_rad * s.omega**2, {"drive_omega": omega, "drive_phase": phase}
+
+
+enter("plane-coupling", "coupled planes", "coupling", _coupled, own=False, growth=4.0)
+enter("periodic-drive", "cosine", "drive", _drive)
 
 
 @law("broadband-drive")
@@ -448,174 +374,103 @@ def broadband(r: Random, s: Scenario) -> Hidden:
     )
 
 
-def _drift_time(r: Random, s: Scenario, straight: bool) -> float:
-    return 0.0 if straight else float(r.uniform(0.15, 0.5)) * s.span_s
+def _loss(s: Scenario) -> float:
+    return s.motion.value("gamma") + s.motion.value("hysteretic") + 1e-5 * s.omega
 
 
-def _frequency_drift(r: Random, s: Scenario, straight: bool) -> Hidden:
-    return torque(
-        s,
-        "frequency-drift",
-        "straight" if straight else "relaxing",
-        "omega_drift",
-        either_sign(r) * 1e-4 / s.span_s,
-        omega_drift_time=_drift_time(r, s, straight),
+for _law in ("straight", "relaxing"):
+    # A rod, a bearing that warm up.
+    enter(
+        *("frequency-drift", _law, "omega_drift"),
+        lambda r, s, law=_law: (  # type: ignore[misc]
+            either_sign(r) * 1e-4 / s.span_s,
+            {
+                "omega_drift_time": 0.0
+                if law == "straight"
+                else float(r.uniform(0.15, 0.5)) * s.span_s
+            },
+        ),
     )
-
-
-@law("frequency-drift")
-def frequency_drift(r: Random, s: Scenario) -> Hidden:
-    """Straight."""
-    return _frequency_drift(r, s, True)
-
-
-@law("frequency-drift")
-def frequency_relaxing(r: Random, s: Scenario) -> Hidden:
-    """A rod that warms up."""
-    return _frequency_drift(r, s, False)
-
-
-def _damping_drift(r: Random, s: Scenario, straight: bool) -> Hidden:
-    loss = s.motion.value("gamma") + s.motion.value("hysteretic") + 1e-5 * s.omega
-    return torque(
-        s,
-        "damping-drift",
-        "straight" if straight else "relaxing",
-        "gamma_drift",
-        either_sign(r) * 0.05 * loss / s.span_s,
-        gamma_drift_time=_drift_time(r, s, straight),
+for _law in ("straight", "relaxing"):
+    enter(
+        *("damping-drift", _law, "gamma_drift"),
+        lambda r, s, law=_law: (  # type: ignore[misc]
+            either_sign(r) * 0.05 * _loss(s) / s.span_s,
+            {
+                "gamma_drift_time": 0.0
+                if law == "straight"
+                else float(r.uniform(0.15, 0.5)) * s.span_s
+            },
+        ),
     )
+enter(
+    *("equilibrium-creep", "straight", "creep"),
+    lambda r, s: (either_sign(r) * s.sd_rad / s.span_s, {}),
+)
 
 
-@law("damping-drift")
-def damping_drift(r: Random, s: Scenario) -> Hidden:
-    """Straight."""
-    return _damping_drift(r, s, True)
-
-
-@law("damping-drift")
-def damping_relaxing(r: Random, s: Scenario) -> Hidden:
-    """A bearing that warms up."""
-    return _damping_drift(r, s, False)
-
-
-@law("equilibrium-creep")
-def creep(r: Random, s: Scenario) -> Hidden:
-    """Secondary creep."""
-    return torque(s, "equilibrium-creep", "straight", "creep", either_sign(r) * s.sd_rad / s.span_s)
-
-
-@law("equilibrium-creep")
-def creep_log(r: Random, s: Scenario) -> Hidden:
-    """Primary creep, logarithmic."""
+def _creep_log(r: Random, s: Scenario) -> tuple[float, dict[str, float]]:
+    """Primary creep."""
     tau = float(r.uniform(0.02, 0.1)) * s.span_s
-    return torque(
-        s,
-        "equilibrium-creep",
-        "logarithmic",
-        "creep_log",
-        either_sign(r) * s.sd_rad,
-        creep_log_time=tau,
-    )
+    return either_sign(r) * s.sd_rad, {"creep_log_time": tau}
 
 
-@law("equilibrium-creep")
-def anelastic(r: Random, s: Scenario) -> Hidden:
-    """Springs that relax after the pendulum was held aside (Maxwell elements)."""
+enter("equilibrium-creep", "logarithmic", "creep_log", _creep_log)
+
+
+def _held(s: Scenario) -> Scenario:
     start = from_rest(s)
-    held = replace(start, motion=replace(start.motion, held_rad=start.motion.angle_rad))
-    tau = float(r.uniform(0.03, 0.1)) * s.span_s
-    return torque(
-        held,
-        "equilibrium-creep",
-        "Maxwell elements",
-        "maxwell",
+    return replace(start, motion=replace(start.motion, held_rad=start.motion.angle_rad))
+
+
+# Springs that relax after the pendulum was held aside.
+enter(
+    *("equilibrium-creep", "Maxwell elements", "maxwell"),
+    lambda r, s: (
         s.sd_rad / amplitude(s),
-        own=False,
-        maxwell_time=tau,
-    )
+        {"maxwell_time": float(r.uniform(0.03, 0.1)) * s.span_s},
+    ),
+    own=False,
+    prepare=_held,
+)
+# A mesoanelastic jump.
+enter(
+    *("equilibrium-step", "jump", "rest_jump"),
+    lambda r, s: (either_sign(r) * s.sd_rad, {"rest_jump_at": moment(r, s, 0.15, 0.85)}),
+)
+enter(
+    *("amplitude-step", "instant", "scaling"),
+    lambda r, s: (-1e-3, {"scaling_at": moment(r, s, 0.1, 0.8)}),
+)
 
 
-@law("equilibrium-step")
-def rest_jump(r: Random, s: Scenario) -> Hidden:
-    """A mesoanelastic jump."""
-    return torque(
-        s,
-        "equilibrium-step",
-        "jump",
-        "rest_jump",
-        either_sign(r) * s.sd_rad,
-        rest_jump_at=moment(r, s, 0.15, 0.85),
-    )
-
-
-@law("amplitude-step")
-def scaled(r: Random, s: Scenario) -> Hidden:
-    """A loss in an instant."""
-    return torque(
-        s, "amplitude-step", "instant", "scaling", -1e-3, scaling_at=moment(r, s, 0.1, 0.8)
-    )
-
-
-@law("amplitude-step")
-def rubbed(r: Random, s: Scenario) -> Hidden:
-    """A touch that lasts a swing or two."""
+def _touch(r: Random, s: Scenario) -> tuple[float, dict[str, float]]:
     width = float(r.uniform(0.3, 2.0)) * 2 * np.pi / s.omega
-    return torque(
-        s,
-        "amplitude-step",
-        "a touch",
-        "rub",
-        1e-3 / width,
-        own=False,
-        rub_at=moment(r, s, 0.1, 0.8),
-        rub_width=width,
-    )
+    return 1e-3 / width, {"rub_at": moment(r, s, 0.1, 0.8), "rub_width": width}
 
 
-@law("frequency-step")
-def omega_jump(r: Random, s: Scenario) -> Hidden:
-    """A flexure that finds another seat."""
-    return torque(
-        s,
-        "frequency-step",
-        "jump",
-        "omega_jump",
-        either_sign(r) * 1e-5,
-        omega_jump_at=moment(r, s, 0.15, 0.8),
-    )
+# A swing or two.
+enter("amplitude-step", "a touch", "rub", _touch, own=False)
+# A flexure finds another seat; a bubble leaves, a rub sets in.
+enter(
+    *("frequency-step", "jump", "omega_jump"),
+    lambda r, s: (either_sign(r) * 1e-5, {"omega_jump_at": moment(r, s, 0.15, 0.8)}),
+)
+enter(
+    *("damping-step", "jump", "gamma_jump"),
+    lambda r, s: (0.05 * _loss(s), {"gamma_jump_at": moment(r, s, 0.15, 0.8)}),
+)
 
 
-@law("damping-step")
-def gamma_jump(r: Random, s: Scenario) -> Hidden:
-    """A bubble leaves, a rub sets in."""
-    loss = s.motion.value("gamma") + s.motion.value("hysteretic") + 1e-5 * s.omega
-    return torque(
-        s, "damping-step", "jump", "gamma_jump", 0.05 * loss, gamma_jump_at=moment(r, s, 0.15, 0.8)
-    )
-
-
-def _impulse(r: Random, s: Scenario, width: float, name: str) -> Hidden:
+def _knock(r: Random, s: Scenario, width: float) -> tuple[float, dict[str, float]]:
     size = either_sign(r) * s.sd_rad * s.omega
-    return torque(
-        s,
-        "impulse",
-        name,
-        "impulse",
-        size,
-        own=width == 0.0,
-        impulse_at=moment(r, s, 0.1, 0.85),
-        impulse_width=width,
-    )
+    return size, {"impulse_at": moment(r, s, 0.1, 0.85), "impulse_width": width}
 
 
-@law("impulse")
-def knock(r: Random, s: Scenario) -> Hidden:
-    """Sudden."""
-    return _impulse(r, s, 0.0, "sudden")
-
-
-@law("impulse")
-def pushed(r: Random, s: Scenario) -> Hidden:
-    """A push that lasts a part of a swing."""
-    return _impulse(r, s, float(r.uniform(0.05, 0.3)) * 2 * np.pi / s.omega, "half sine")
+enter("impulse", "sudden", "impulse", lambda r, s: _knock(r, s, 0.0))
+# It lasts a part of a swing.
+enter(
+    *("impulse", "half sine", "impulse"),
+    lambda r, s: _knock(r, s, float(r.uniform(0.05, 0.3)) * 2 * np.pi / s.omega),
+    own=False,
+)
