@@ -421,6 +421,8 @@ def diagnose(
     """
     check(restoring=restoring, baseline=baseline, level=level, seed=seed)
     torque = None if restoring == "auto" else restoring
+    from pendpipe.diagnosis.run import diagnose_recording
+
     if not isinstance(recording, Recording | str | Path):
         from pendpipe.diagnosis.several import diagnose_several
         from pendpipe.files import distinct_names
@@ -441,6 +443,7 @@ def diagnose(
         return diagnose_several(
             [_motion(each, volts_per_radian) for each in recording.values()],
             list(recording),
+            diagnose=diagnose_recording,
             baseline=baseline,
             level=level,
             restoring=torque,
@@ -448,8 +451,6 @@ def diagnose(
             own=own,
             same_sensor=same_sensor,
         )
-    from pendpipe.diagnosis.run import diagnose_recording
-
     return diagnose_recording(
         _motion(recording, volts_per_radian),
         baseline=baseline,

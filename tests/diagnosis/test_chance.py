@@ -20,11 +20,11 @@ from pendpipe.diagnosis.detect import (
     Trials,
     detect,
     draw_chance,
-    local_p_values,
     prepare,
 )
 from pendpipe.diagnosis.hypothesis import applicable
 from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.projection import local_p_values
 from pendpipe.diagnosis.rivals import Rival, Scale, evidence
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 

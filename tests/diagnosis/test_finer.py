@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pendpipe.diagnosis.data import gather
-from pendpipe.diagnosis.detect import finer_shape
 from pendpipe.diagnosis.noise import white_noise
+from pendpipe.diagnosis.projection import finer_shape
 from pendpipe.diagnosis.refine import refine
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.detect import finer_shape
 from pendpipe.diagnosis.instants import with_instants
+from pendpipe.diagnosis.projection import finer_shape
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.values import effect_parameters
 from pendpipe.effects.catalogue import by_identifier

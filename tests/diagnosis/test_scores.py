@@ -15,13 +15,11 @@ from pendpipe.diagnosis.detect import (
     Bank,
     build_bank,
     detect,
-    local_p_values,
     prepare,
-    scores_and_lengths,
-    tangent_basis,
 )
 from pendpipe.diagnosis.hypothesis import applicable
 from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.projection import local_p_values, scores_and_lengths, tangent_basis
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model

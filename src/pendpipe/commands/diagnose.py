@@ -185,6 +185,7 @@ def _diagnose_several(arguments: Arguments) -> int:
     joint = diagnose_several(
         list(recordings.values()),
         list(recordings),
+        diagnose=diagnose_recording,
         baseline=arguments.baseline,
         level=arguments.level,
         restoring=_torque(arguments),

@@ -15,13 +15,13 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betainc, chdtrc
 
-from pendpipe.arrays import FloatArray, scaled_qr
+from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.blocks import Blocks, blocks_of
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit, pulled
+from pendpipe.diagnosis.projection import local_p_values, tangent_basis, whitened
+from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.spectrum import Band, ToneScan, tone_scan
 from pendpipe.effects import Effect
@@ -29,7 +29,6 @@ from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue.in_time import plane_band_hz
 from pendpipe.effects.curves import Curve
 from pendpipe.effects.effect import Span
-from pendpipe.effects.model import responses
 
 _VISIBLE = 1e-4
 """Part of a derivative that must remain after the projection for the effect to be visible."""
@@ -40,8 +39,6 @@ _RESOLVED_SD = 4.0
 
 _COLUMNS_AT_ONCE = 32
 _NUMBERS_AT_ONCE = 1 << 22
-_KNOWN = 1e-6
-"""Variance of ln S below which it is known."""
 
 
 class Candidate(NamedTuple):
@@ -109,22 +106,6 @@ class Bank:
     def freedom(self) -> FloatArray:
         """Degrees of freedom of each candidate."""
         return np.array([candidate.width for candidate in self.candidates], dtype=np.float64)
-
-
-def tangent_basis(fit: Fit) -> FloatArray:
-    """Return an orthonormal basis of the derivatives by the fitted values.
-
-    Values at a bound are included, unless the readings pull them far beyond it.
-    """
-    known = pulled(fit)
-    return _span(fit.jacobian[:, [index for index in fit.free if index not in known]])
-
-
-def _span(part: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the space that columns span."""
-    left, small, _ = scaled_qr(part)
-    mixing, sizes, _ = np.linalg.svd(small)
-    return np.asarray(left @ mixing[:, sizes > 1e-9 * sizes[0]])
 
 
 def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
@@ -207,31 +188,6 @@ def _shapes(effect: Effect, span: Span) -> list[tuple[float, ...]]:
     return [tuple(float(number) for number in row) for row in effect.shapes(span)]
 
 
-def whitened(
-    fit: Fit, noise: Noise, effect: Effect, shapes: Sequence[Sequence[float]]
-) -> FloatArray:
-    """Derivatives of the whitened readings by each size of each shape, (columns, n + 1)."""
-    if isinstance(effect, ReleasedParameter):
-        return effect.sensitivity(fit)[None]
-    small = effect.small(fit.at.span)
-    changes = [_sizes(effect, shape, k, small) for shape in shapes for k in range(effect.sizes)]
-    raw = responses(effect, changes, fit.at, fit.model.pendulum(fit.value))
-    raw /= small
-    raw[~np.isfinite(raw.sum(axis=1))] = 0.0
-    rows = np.zeros((len(raw), len(fit.jacobian)))
-    rows[:, :-1] = noise.whiten(raw.T).T
-    return rows
-
-
-def _sizes(
-    effect: Effect, shape: Sequence[float], index: int, small: float
-) -> tuple[FloatArray, FloatArray]:
-    low = np.concatenate([np.zeros(effect.sizes), np.asarray(shape, dtype=np.float64)])
-    high = low.copy()
-    high[index] = small
-    return low, high
-
-
 def _visible(curve: Curve, part: FloatArray) -> tuple[Curve, FloatArray]:
     """Keep the combinations of a curve's basis functions that the record resolves."""
     mixtures, lengths, _ = np.linalg.svd(np.asarray(np.linalg.qr(part.T, mode="r")).T)
@@ -239,59 +195,8 @@ def _visible(curve: Curve, part: FloatArray) -> tuple[Curve, FloatArray]:
     return curve.reduced(mixing), mixing.T @ part
 
 
-def local_p_values(
-    scores: FloatArray, freedom: FloatArray, log_scale_variance: FloatArray | None = None
-) -> FloatArray:
-    """Return the probability that chance alone does better, for each candidate by itself.
-
-    Where the variance of the noise is uncertain, by v in its logarithm, as if it were estimated
-    from 2/v squares: by Fisher's distribution instead of chi^2.
-    """
-    found = np.asarray(chdtrc(freedom, np.maximum(scores, 0.0).T).T)
-    if log_scale_variance is not None:
-        unsure = log_scale_variance > _KNOWN
-        squares = 2.0 / log_scale_variance[unsure]
-        share = squares / (squares + scores[unsure])
-        found[unsure] = betainc(0.5 * squares, 0.5 * freedom[unsure], share)
-    return found
-
-
-def finer_shape(
-    base: Fit, noise: Noise, effect: Effect, shape: tuple[float, ...]
-) -> tuple[float, ...]:
-    """Return the shape of highest score among those near a scan's best (`Effect.finer`).
-
-    A fit alone would end beside it: the response to a knock, say, depends on its phase, so that
-    chi^2 has a minimum in each half cycle, while the scan's shapes are farther apart.
-    """
-    shapes = [tuple(row) for row in effect.finer(base.at.span, shape)] if shape else []
-    if not shapes:
-        return shape
-    shapes.append(shape)
-    scores, _ = scores_and_lengths(base, noise, effect, shapes)
-    return shapes[int(np.argmax(np.abs(scores)))]
-
-
-def scores_and_lengths(
-    base: Fit, noise: Noise, effect: Effect, shapes: Sequence[Sequence[float]]
-) -> tuple[FloatArray, FloatArray]:
-    """Score shapes of an effect's first size on a fit's residual.
-
-    Returns
-    -------
-    scores, lengths
-        Inner products of the residual with the derivative by the size, projected and of unit
-        length, and the lengths of that (inf where nothing remains); shape (shapes,). The size is
-        score/length, and lowers chi^2 by score^2.
-    """
-    columns = whitened(base, noise, effect, shapes)[:: effect.sizes]
-    basis = tangent_basis(base)
-    columns -= (columns @ basis) @ basis.T
-    lengths = np.linalg.norm(columns, axis=1)
-    lengths[lengths == 0.0] = np.inf
-    return columns @ base.residual / lengths, lengths
-
-
+LEVEL: Final = 0.01
+"""The false-alarm probability: how often a recording that lacks nothing is reported."""
 CATALOGUE_SHARE: Final = 0.5
 """Part of the significance level for the scan of the catalogue."""
 RED_NOISE_SHARE: Final = 0.2

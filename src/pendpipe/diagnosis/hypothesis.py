@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -23,7 +23,6 @@ from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR, Fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import INCOMPLETE, Remainder, remainder_of
 from pendpipe.diagnosis.result import Finding
-from pendpipe.diagnosis.rivals import Rival
 from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects import Effect
@@ -31,6 +30,9 @@ from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue.reading import SoftClipping
 from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN, circular_error
 from pendpipe.effects.curves import CURVES, Curve
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.rivals import Rival
 
 CHOICE: Final = 7.4
 """Price of a name or curve beside a remaining misfit: it is one of some forty (2 ln 40)."""

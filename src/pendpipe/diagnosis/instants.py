@@ -10,8 +10,8 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.detect import scores_and_lengths
 from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.projection import scores_and_lengths
 from pendpipe.diagnosis.refine import Fit, best_fit, better
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.reading import DroppedSamples, OffsetStep

@@ -11,7 +11,7 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.remainder import by_cycle
 from pendpipe.diagnosis.result import Location
-from pendpipe.diagnosis.rivals import last_in
+from pendpipe.diagnosis.values import last_in
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
 from pendpipe.quantities import after_number, listed, with_error

@@ -78,6 +78,10 @@ class Noise:
         """Whether cosines differ in variance; else the readings are white."""
         return bool(np.any(self.variance != self.variance[0]))
 
+    def white(self, data: Data) -> Noise:
+        """Return white noise as large as this, of other readings."""
+        return white_noise(data, self.white_rms)
+
     @property
     def cost(self) -> float:
         """-2 ln of its probability density, less chi^2 and constants."""

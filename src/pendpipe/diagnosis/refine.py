@@ -1,23 +1,27 @@
 """Maximum-likelihood fit of a model by Gauss-Newton steps, also from start values far away."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Collection, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy.optimize import brentq
 
 from pendpipe.analysis.fit.least_squares import bounded_least_squares
 from pendpipe.arrays import FloatArray, IntArray, scaled_qr
-from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.noise import Noise, white_noise
 from pendpipe.diagnosis.unwrapped import unwrapped
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.baseline import OMEGA, SHARE, B, share_by_b
 from pendpipe.effects.model import Evaluated, Model, jacobian
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.data import Data
+    from pendpipe.diagnosis.noise import Noise
 
 SETTLED: Final = 0.02
 """Expected fall of chi^2 below which a step is the last."""
@@ -592,7 +596,7 @@ def fit_in_growing_window(
     try:
         while count < len(data):
             part = data.first(count)
-            short, white = model.at_times(part.time_s), white_noise(part, noise.white_rms)
+            short, white = model.at_times(part.time_s), noise.white(part)
             value = refine(short, part, white, value, held=fixed, rounds=_GROWING_ROUNDS).value
             count = int(_GROWTH * count) + 1
         return refine(model, data, noise, value, held=fixed)

@@ -17,14 +17,14 @@ from pendpipe.diagnosis.detect import (
     Detection,
     Lead,
     Trials,
-    finer_shape,
 )
 from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.projection import finer_shape
 from pendpipe.diagnosis.refine import ROUNDS, SETTLED, Fit, Refining, pulled
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.spectrum import OFF_HARMONIC
-from pendpipe.diagnosis.values import effect_parameters
+from pendpipe.diagnosis.values import last_in
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
@@ -155,12 +155,6 @@ def from_harmonic(fit: Fit, effect: Effect, about_hz: float = 0.0) -> Estimate |
     motion = 0.5 * float(fit.value[OMEGA]) / math.pi
     off = abs(math.remainder(tone.value - about_hz, motion))
     return Estimate(off / motion, tone.sd / motion, "")
-
-
-def last_in(fit: Fit, effect: Effect, unit: str) -> Estimate | None:
-    """Return an effect's last parameter in that unit: instant and frequency follow the sizes."""
-    found = [each for each in effect_parameters(fit, effect).values() if each.unit == unit]
-    return found[-1] if found else None
 
 
 def lines(fit: Fit) -> dict[str, float]:

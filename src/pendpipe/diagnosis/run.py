@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -19,13 +19,14 @@ from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import begin
 from pendpipe.diagnosis.cycles import SmallSwings, small_swings
 from pendpipe.diagnosis.data import with_scatter
-from pendpipe.diagnosis.detect import whitened
+from pendpipe.diagnosis.detect import LEVEL
 from pendpipe.diagnosis.forensics.codes import with_true_step
 from pendpipe.diagnosis.forensics.colour import level_note, wander_note
 from pendpipe.diagnosis.forensics.lost_samples import loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.held_out import held_out
 from pendpipe.diagnosis.hypothesis import Hypothesis, catalogue_beside
+from pendpipe.diagnosis.projection import whitened
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
@@ -54,9 +55,6 @@ from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.errors import NotAnalysableError
 from pendpipe.quantities import stretch
 from pendpipe.recording import Recording
-
-LEVEL: Final = 0.01
-"""The false-alarm probability: how often a recording that lacks nothing is reported."""
 
 
 def diagnose_recording(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections import ChainMap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final
 
@@ -22,6 +22,7 @@ from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.detect import LEVEL
 from pendpipe.diagnosis.held_out import held_out
 from pendpipe.diagnosis.hypothesis import (
     Hypothesis,
@@ -42,7 +43,6 @@ from pendpipe.diagnosis.result import (
     swinging,
 )
 from pendpipe.diagnosis.rivals import Scale
-from pendpipe.diagnosis.run import LEVEL, diagnose_recording
 from pendpipe.diagnosis.search import LESS_FRICTION, run_search
 from pendpipe.diagnosis.statement import DOUBTFUL, statement
 from pendpipe.diagnosis.summary import COLOURED_NOISE
@@ -77,6 +77,7 @@ def diagnose_several(
     recordings: Sequence[Recording],
     names: Sequence[str],
     *,
+    diagnose: Callable[..., Diagnosis],
     baseline: Baseline = "eq8",
     level: float = LEVEL,
     seed: int = 0,
@@ -92,6 +93,8 @@ def diagnose_several(
     ----------
     recordings, names
         At least two, and what to call them.
+    diagnose
+        Diagnoses each of them alone (`diagnose_recording`).
     baseline, level, seed, restoring, provenance, progress
         As for `diagnose_recording`.
     same_sensor
@@ -115,7 +118,7 @@ def diagnose_several(
     for recording, name in zip(recordings, names, strict=True):
         progress(f"{name} alone")
         outcomes.append(
-            diagnose_recording(
+            diagnose(
                 recording,
                 baseline=baseline,
                 level=level,

@@ -145,6 +145,12 @@ def effect_parameters(fit: Fit, effect: Effect, unit: str = "rad") -> dict[str, 
     return found
 
 
+def last_in(fit: Fit, effect: Effect, unit: str) -> Estimate | None:
+    """Return an effect's last parameter in that unit: instant and frequency follow the sizes."""
+    found = [each for each in effect_parameters(fit, effect).values() if each.unit == unit]
+    return found[-1] if found else None
+
+
 _CURVE_POINTS: Final = 61
 
 

@@ -18,10 +18,10 @@ from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.blocks import blocks_of
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.detect import tangent_basis
 from pendpipe.diagnosis.forensics.local import residual_of
 from pendpipe.diagnosis.forensics.tails import tail_of_squares, upper_tail
 from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.projection import tangent_basis
 from pendpipe.diagnosis.result import Finding, Location
 from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.estimate import Estimate

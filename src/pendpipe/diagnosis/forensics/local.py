@@ -17,11 +17,11 @@ import numpy as np
 from scipy.fft import dct, idct
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
-from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.unwrapped import unwrapped
 
 if TYPE_CHECKING:
+    from pendpipe.diagnosis.data import Data
+    from pendpipe.diagnosis.noise import Noise
     from pendpipe.diagnosis.refine import Fit
 
 _WINDOW_CYCLES: Final = 2
