@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from pendpipe_challenge.score import calibration_error, found_at, page, score
+from pendpipe_challenge.score import calibration_error, figure, found_at, page, ratio, score
 
 
 def truth(family: str, effect: str = "", size: float = 100.0, **more: Any) -> dict[str, Any]:
@@ -171,6 +171,13 @@ def test_the_power_curve_is_found_again() -> None:
     found = (random.random(3000) < norm.cdf(np.sqrt(size) - 4.0)).astype(float)
     assert found_at(size, found, 0.0) == pytest.approx(16.0, rel=0.05)
     assert found_at(size, found, 1.2816) == pytest.approx((4 + 1.2816) ** 2, rel=0.05)
+
+
+def test_a_ratio_whose_second_mean_may_vanish_has_an_interval_all_the_same() -> None:
+    found = figure(ratio, [1.0, 0.0, 1.0], [0.0, 0.0, 1.0], paired=True)
+    assert found["value"] == pytest.approx(2.0)
+    assert found["interval95"] == pytest.approx([1.0, 3.0], abs=0.5)
+    assert figure(ratio, [1.0, 1.0], [0.0, 0.0], paired=True)["value"] is None
 
 
 def test_the_page_says_yes_and_no() -> None:

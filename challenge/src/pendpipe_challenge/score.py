@@ -8,6 +8,7 @@ unchanged twin. Shares have exact 95 % intervals, other figures those of items d
 from __future__ import annotations
 
 import math
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -168,25 +169,26 @@ def figure(
     what: Callable[..., Any], *samples: Sequence[float] | FloatArray, paired: bool = False
 ) -> Score:
     """A figure of samples, with the middle 95 % of those of items drawn anew."""
-    from scipy.stats import bootstrap
+    from scipy.stats import DegenerateDataWarning, bootstrap
 
     count = min(map(len, samples))
-    if count < 2:
+    value = float(what(*samples)) if count > 1 else math.nan
+    if not math.isfinite(value):
         return {"value": None, "interval95": [None, None], "of": count}
-    found = bootstrap(
-        [np.asarray(each, np.float64) for each in samples],
-        what,
-        paired=paired,
-        vectorized=False,
-        n_resamples=DRAWS,
-        method="percentile",
-        rng=np.random.default_rng(1),
-    ).confidence_interval
-    return {
-        "value": float(what(*samples)),
-        "interval95": [float(found.low), float(found.high)],
-        "of": count,
-    }
+    with warnings.catch_warnings():
+        # A ratio of two means is none where the drawn items have no second one.
+        warnings.simplefilter("ignore", DegenerateDataWarning)
+        drawn = bootstrap(
+            [np.asarray(each, np.float64) for each in samples],
+            what,
+            paired=paired,
+            vectorized=False,
+            n_resamples=DRAWS,
+            method="percentile",
+            rng=np.random.default_rng(1),
+        ).bootstrap_distribution
+    low, high = np.quantile(drawn[np.isfinite(drawn)], [0.025, 0.975])
+    return {"value": value, "interval95": [float(low), float(high)], "of": count}
 
 
 def ratio(above: Sequence[float], below: Sequence[float]) -> float:
@@ -589,7 +591,7 @@ def page(scores: Score) -> str:
                     band,
                     who,
                     *(in_words(found[f"{key}{name}"]) for name in ("top1", "top3", "class")),
-                    found[f"{key}class_size"],
+                    "-" if not (size := found[f"{key}class_size"]) else f"{size:.2f}",
                 )
                 for band, found in scores["naming"].items()
                 for who, key in (("diagnose", ""), ("oracle", "oracle_"))
