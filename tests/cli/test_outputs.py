@@ -14,6 +14,7 @@ import pendpipe as pp
 from pendpipe.cli import main
 from pendpipe.errors import InputError
 from pendpipe.files import check_output, replaced, write_json, write_whole, writing
+from pendpipe.recording import Recording, write_plain
 
 TIME_S = np.arange(900) / 30.0
 SWING = 0.1 * np.exp(-0.01 * TIME_S) * np.cos(4.0 * TIME_S)
@@ -98,6 +99,14 @@ def test_an_output_that_is_an_input_is_refused(
     assert path.read_bytes() == before
 
 
+def test_a_recording_that_pendpipe_has_written_is_an_input_as_well(given: dict[str, Path]) -> None:
+    given["recording"].unlink()
+    write_plain(given["recording"], Recording(TIME_S, SWING, "angle_rad"))
+    before = given["recording"].read_bytes()
+    assert main(call("fit", given["recording"], given)) == 2
+    assert given["recording"].read_bytes() == before
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_file_of_others_is_replaced_only_with_force(
     given: dict[str, Path],
@@ -156,7 +165,11 @@ def test_a_raw_file_is_never_replaced(given: dict[str, Path], tmp_path: Path) ->
     before = raw.read_bytes()
     shutil.copy(raw, tmp_path / "copy.csv")
     assert main(["convert", str(given["recording"]), str(tmp_path / "copy.csv"), "--force"]) == 2
-    assert main([*device, "--out", str(tmp_path / "new.csv"), "--raw", str(raw), "--force"]) == 2
+    notes = given["table"]
+    for kept in (raw, notes):
+        words = [*device, "--out", str(tmp_path / "new.csv"), "--raw", str(kept), "--force"]
+        assert main(words) == 2
+    assert notes.read_text() == CALIPER
     assert main(["acquire", "--recover", str(raw), "--out", str(raw), "--force"]) == 2
     assert raw.read_bytes() == before
 
