@@ -248,15 +248,20 @@ def _waveform(
     found = replace(found, torque_odds=-for_spring)
     if spring is None or for_spring < -ODDS or not spring.minimum.converged:
         return found
-    frequency, as_spring = found["frequency"], float(spring.value[OMEGA]) / math.tau
-    if abs(as_spring - frequency.value) <= frequency.sd:
+    return _with_other_frequency(found, float(spring.value[OMEGA]) / math.tau)
+
+
+def _with_other_frequency(found: FitResult, as_spring: float) -> FitResult:
+    """Give that of a spring beside the pendulum's, where they differ by more than the error."""
+    own = found["frequency"]
+    if abs(as_spring - own.value) <= own.sd:
         return found
-    told = Estimate(as_spring, frequency.sd * as_spring / frequency.value, frequency.unit)
+    other = Estimate(as_spring, own.sd * as_spring / own.value, own.unit)
     said = (
-        f"as a pendulum {_period(frequency)}; as a spring or torsion wheel {_period(told)}:"
+        f"as a pendulum {_period(own)}; as a spring or torsion wheel {_period(other)}:"
         " --restoring linear"
     )
-    return replace(found, other_frequency=told, warnings=(*found.warnings, said))
+    return replace(found, other_frequency=other, warnings=(*found.warnings, said))
 
 
 def _period(frequency: Estimate) -> str:
