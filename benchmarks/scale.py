@@ -63,7 +63,7 @@ def one_node() -> Iterator[None]:
 
 
 GUARDS: Final = (
-    *("pendpipe.manifest", "pendpipe.commands.stage", "pendpipe.commands.campaign"),
+    *("pendpipe.manifest", "pendpipe.commands.stage", "pendpipe.commands.small"),
     *("workflow/rules/*.smk", "workflow/Snakefile"),
 )
 """What plans and runs: other code has other costs."""

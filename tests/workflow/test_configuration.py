@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from pendpipe.analysis.fit.result import FitResult
-from pendpipe.commands import config
+from pendpipe.commands import small
 from pendpipe.configuration import jobs
 from pendpipe.configuration.apparatus import pendulum
 from pendpipe.configuration.load import (
@@ -178,8 +178,8 @@ def test_a_table_that_is_no_text_is_named_in_one_line(tmp_path: Path) -> None:
 def test_schema_and_manual_are_those_of_the_models() -> None:
     """Both are made by `pendpipe config`; whoever changes a model makes them anew."""
     committed = ROOT / "workflow/schemas/configuration.schema.json"
-    assert committed.read_text(encoding="utf-8") == config.schema()
-    assert config.manual() in (ROOT / "config/README.md").read_text(encoding="utf-8")
+    assert committed.read_text(encoding="utf-8") == small.schema()
+    assert small.configuration_manual() in (ROOT / "config/README.md").read_text(encoding="utf-8")
 
 
 def table(folder: Path, *rows: str, header: str = "\t".join(COLUMNS)) -> Path:
