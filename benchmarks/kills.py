@@ -112,19 +112,12 @@ class Project:
         self,
         *arguments: str,
         cores: int = 2,
-        limit: int | None = None,
         printed: IO[bytes] | None = None,
         **environment: str,
     ) -> subprocess.Popen[bytes]:
-        """Start Snakemake as the leader of a group; `limit` is the most bytes of a file."""
+        """Start Snakemake as the leader of a group."""
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
         command = [sys.executable, "-m", "snakemake", "--cores", str(cores)]
-
-        def limited() -> None:
-            import resource
-
-            if limit is not None:
-                resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
         with tempfile.TemporaryFile() as nobody:
             return subprocess.Popen(
@@ -135,7 +128,6 @@ class Project:
                 stdout=printed or nobody,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
-                preexec_fn=limited if limit is not None else None,
             )
 
     def run(self, *arguments: str, **options: Any) -> tuple[int, str]:
@@ -248,7 +240,6 @@ class Trial:
             kept.with_suffix(".new").rename(kept)
         self.project, self.sums = project, project.sums()
         self.bytes = size_of(project.folder)
-        self.largest = max(path.stat().st_size for path in project.results.rglob("*"))
 
     def ended(self, project: Project, case: Case) -> Case:
         """Do what the doctor says, run again, and tell how it ended."""
@@ -384,14 +375,6 @@ def full(trial: Trial, _project: Project, draw: random.Random) -> list[Case]:
         return [trial.ended(project, case)]
 
 
-def limit(trial: Trial, project: Project, draw: random.Random) -> list[Case]:
-    """A limit on the size of a file."""
-    room = draw.randrange(2000, trial.largest)
-    first, said = project.run(limit=room)
-    named = said_why(project, said)
-    return [trial.ended(project, {"room": room, "disturbed": first != 0, "named": named})]
-
-
 def said_why(project: Project, said: str) -> str:
     """The line that names a full or forbidden disk, on the terminal or in a log."""
     logs = "".join(
@@ -418,7 +401,6 @@ PARTS: Final[dict[str, tuple[str, Part, int]]] = {
     "group": ("kill -9 of the group", chain(group), 100),
     "job": ("kill -9 of a job", chain(job), 50),
     "full": ("disk full", full, 10),
-    "limit": ("limit on a file's size", limit, 10),
     "two": ("two at once", two, 10),
 }
 
