@@ -203,8 +203,6 @@ RED_NOISE_SHARE: Final = 0.2
 """Part of it for the test whether red noise is an effect."""
 TESTS_SHARE: Final = 1.0 - CATALOGUE_SHARE - RED_NOISE_SHARE
 """Part of it that the tests of the measurement share."""
-SMALLEST: Final = 1e-12
-"""Smaller p-values rest on tails of the noise that nobody has tested."""
 DRAWS: Final = 256
 FEW_DRAWS: Final = 64
 """Draws for a first look: they determine the number of trials to 20 %."""
@@ -482,12 +480,3 @@ def _trials(smallest: FloatArray) -> Trials:
     middle = float(np.exp(np.mean(np.log(trials[part]))))
     at = float(np.exp(np.mean(np.log(ordered[part]))))
     return Trials(max(middle, 1.0), _TRIALS_EXPONENT, min(at, 0.5))
-
-
-def printed(p_value: float) -> str:
-    """Return a p-value as it is printed: below 1e-12 it would rest on untested tails.
-
-    >>> printed(0.0312), printed(0.0)
-    ('p = 0.031', 'p < 1e-12')
-    """
-    return f"p = {p_value:.2g}" if p_value >= SMALLEST else f"p < {SMALLEST:.0e}"

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from typing import Final
 
 from pendpipe.diagnosis.cycles import SmallSwings
-from pendpipe.diagnosis.detect import printed
 from pendpipe.diagnosis.remainder import Remainder
 from pendpipe.diagnosis.result import BASELINES, FittedModel, FoundEffect
-from pendpipe.diagnosis.summary import COLOURED_NOISE, class_of, factor, percent
+from pendpipe.diagnosis.summary import COLOURED_NOISE, class_of, factor, percent, printed
 from pendpipe.effects.catalogue import CATALOGUE
 from pendpipe.quantities import compact
 

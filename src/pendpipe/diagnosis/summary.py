@@ -28,6 +28,8 @@ _MOVED: Final = 2.0
 """Standard deviations from which a number is said to move."""
 _SURE: Final = 0.95
 """Probability from which a name without rivals needs no further measurement."""
+SMALLEST: Final = 1e-12
+"""Smaller p-values rest on tails of the noise that nobody has tested."""
 _SHOWN: Final = 4
 """Of what was looked for."""
 _KNOWN: Final = 2.0
@@ -266,7 +268,7 @@ def summarise(diagnosis: Diagnosis) -> Summary:
     if not found:
         beyond = f" beyond {presumed}, which is fitted" if presumed else ""
         noise = any(each.identifier == COLOURED_NOISE for each in diagnosis.effects)
-        p = _p(diagnosis.unexplained_p_value)
+        p = printed(diagnosis.unexplained_p_value)
         coloured = "; its noise is coloured" if noise else ""
         wanders = any("the zero wanders" in note for note in diagnosis.warnings)
         zero = "; its zero wanders" if wanders else ""
@@ -516,14 +518,19 @@ def _sentence(diagnosis: Diagnosis, names: Sequence[str], presumed: str) -> str:
         diagnosis.baseline_name, diagnosis.baseline_name
     )
     model += f" with {presumed}" if presumed else ""
-    p = _p(diagnosis.p_value)
+    p = printed(diagnosis.p_value)
     if not names:
         return f"“{model} does not describe this recording ({p}); the cause was not identified.”"
     return f"“{model} does not describe this recording ({p}): it lacks {' and '.join(names)}.”"
 
 
-def _p(p_value: float) -> str:
-    return "p < 1e-12" if p_value < 1e-12 else f"p = {p_value:.2g}"
+def printed(p_value: float) -> str:
+    """Return a p-value as it is printed: below 1e-12 it would rest on untested tails.
+
+    >>> printed(0.0312), printed(0.0)
+    ('p = 0.031', 'p < 1e-12')
+    """
+    return f"p = {p_value:.2g}" if p_value >= SMALLEST else f"p < {SMALLEST:.0e}"
 
 
 def percent(share: float) -> str:
