@@ -154,11 +154,13 @@ class Hypothesis:
         return replace(self, fit=fit, data=data, noise=noise, baseline=baseline)
 
     @property
-    def key(self) -> tuple[frozenset[str], frozenset[str]]:
+    def key(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Its effects and its faults: where a search has been it does not return."""
-        effects = frozenset(effect.key for effect in self.fit.model.effects)
-        released = frozenset(str(index) for index in self.beginning.held if index not in self.held)
-        return effects | released, frozenset(each.identifier for each in self.faults)
+        effects = [effect.key for effect in self.fit.model.effects]
+        released = [str(index) for index in self.beginning.held if index not in self.held]
+        faults = sorted(each.identifier for each in self.faults)
+        # What happens at an instant may happen twice.
+        return tuple(sorted([*effects, *released])), tuple(faults)
 
     @property
     def scan(self) -> Detection:
