@@ -445,6 +445,14 @@ SIGNS = {
     "a byte-order mark": Case("\ufeff" + PLAIN),
     "UTF-16": Case(PLAIN.encode("utf-16")),
     "line ends of Windows": Case(text(TIME, ANGLE, head="time,angle\n").replace("\n", "\r\n")),
+    "a torn byte among signs of UTF-8": Case(
+        ("Zeit;Winkel\n" + each("{:.2f} s;{:.3f}°\n", TIME, DEGREES))
+        .encode()
+        .replace(b"\n0.50 s", b"\n0.5\xff s"),
+        np.delete(ANGLE, 25),
+        said=r"1 damaged row\(s\)",
+        time_s=np.delete(TIME, 25),
+    ),
     "signs of a typesetter": Case(
         PLAIN.replace("-", "\N{MINUS SIGN}").replace(",", ",\N{NO-BREAK SPACE}")
     ),
