@@ -39,6 +39,8 @@ _FEWEST_READINGS: Final = 24
 _DEAD_BANDS: Final = 10.0
 """Distance from the end in half widths of the Coulomb dead band: nearer to it the rest position
 jumps with the parameters."""
+_FAR_BEYOND: Final = 10.0
+"""Spans of the readings: a sensor that clips shows a part of the swing, hardly a tenth of it."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +137,8 @@ def begin(
         seen="rate" if samples.unit == "rad/s" else "angle",
     )
     data, model, at = _before_the_stop(data, model, value)
+    if not np.ptp(at.reading) < _FAR_BEYOND * np.ptp(data.values):
+        raise NoMotionError("it would swing far beyond the readings")
     if second is None:
         data = replace(data, anchor=anchored(data, at))
     held = _held(held_rates, fixed, parts, baseline)
