@@ -12,7 +12,7 @@ rule acquire:
     params:
         settings=planned("acquire"),
         repaired=repaired("acquire"),
-        code=code_version("pendpipe.commands.acquire"),
+        code=code_version("pendpipe.stages.acquire"),
     message:
         "acquire, chunk {wildcards.chunk}"
     shell:

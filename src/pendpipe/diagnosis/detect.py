@@ -220,6 +220,8 @@ proportional to the root of the threshold in chi^2 (Rice's formula), about -2 ln
 _DECAY_TIMES: Final = (0.06, 0.25)
 """Decay times of the decaying tones in the scan, over the record's duration."""
 
+_SURE: Final = 1e-15
+"""A p-value of a tone below which chance has no part in it, and the larger score is the likelier."""
 _CLEARLY_CHANCE: Final = 0.2
 """Global p-value above which no more draws are made: far above any significance level."""
 _FEWEST_CYCLES: Final = 3.0
@@ -459,14 +461,15 @@ def _tone_leads(
     for effect in scanner.spectral:
         found = []
         for scan, scores, p_values in zip(scanner.scans, tones, local, strict=True):
-            # Beyond 10^-308 all p-values are zero: there the scores decide.
-            index = int(np.argmax(np.where(p_values == p_values.min(), scores, -np.inf)))
+            # What a strong line leaks bounds its p-value, beside it: there the scores decide.
+            sure = p_values <= max(float(p_values.min()), _SURE)
+            index = int(np.argmax(np.where(sure, scores, -np.inf)))
             shape = effect.tone(float(scan.frequency_hz[index]), scan.decay_s)
             if shape is not None:
                 trials = Trials(0.5 * len(scores), 0.0)
                 p_value = trials.global_p_value(float(p_values[index]))
                 found.append(Lead(effect, tuple(shape), float(scores[index]), p_value))
-        leads += sorted(found, key=lambda lead: (lead.p_value, -lead.score))[:1]
+        leads += sorted(found, key=lambda lead: (max(lead.p_value, _SURE), -lead.score))[:1]
     return leads
 
 
