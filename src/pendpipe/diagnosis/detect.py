@@ -221,7 +221,7 @@ _DECAY_TIMES: Final = (0.06, 0.25)
 """Decay times of the decaying tones in the scan, over the record's duration."""
 
 _SURE: Final = 1e-15
-"""A p-value of a tone below which chance has no part in it, and the larger score is the likelier."""
+"""A tone of a smaller p-value is no chance; of two the larger score leads."""
 _CLEARLY_CHANCE: Final = 0.2
 """Global p-value above which no more draws are made: far above any significance level."""
 _FEWEST_CYCLES: Final = 3.0
