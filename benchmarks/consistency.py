@@ -387,7 +387,10 @@ def checks(found: list[Found]) -> list[tuple[str, bool]]:
             sum(covered) >= 0.93 * len(covered) - 1,
         ),
         (f"noise wrong: {wrong}; in a diagnosis {noises} of {len(diagnosed)}", wrong + noises == 0),
-        (f"false names: {names} of {len(diagnosed)} diagnosed", True),
+        (
+            f"false names: {names} of {len(diagnosed)} diagnosed (at most 2.5 %)",
+            names <= max(1, 0.025 * len(diagnosed)),
+        ),
         (f"tests of fit that differ: {apart} of {len(diagnosed)}", apart == 0),
     ]
 

@@ -17,11 +17,13 @@ from pendpipe.analysis.fit import fit_recording
 from pendpipe.analysis.fit.by_points import fit_energies
 from pendpipe.analysis.fit.by_waveform import start_values
 from pendpipe.analysis.fit.least_squares import covariance
+from pendpipe.analysis.fit.printed import gravity_line
 from pendpipe.analysis.torque import elliptic, restoring_of, sine_coefficient
 from pendpipe.analysis.turning_points import TurningPoints, find_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, turning_points
 from pendpipe.dynamics.eq8 import Restoring
+from pendpipe.estimate import Estimate
 from pendpipe.files import read_json
 from pendpipe.recording import Recording
 
@@ -275,6 +277,9 @@ def test_a_rate_is_that_of_a_pendulum(amplitude: float) -> None:
         low, high = result[name].bounds95
         assert low - result[name].sd <= value <= high + result[name].sd
     assert result.noise_rms_rad == pytest.approx(1e-3, rel=0.05)
+    # Its length tells g as that of an angle does.
+    g = float(gravity_line(result, length=Estimate(0.4, 0.0, "m")).split()[1].partition("(")[0])
+    assert g == pytest.approx(0.4 * OMEGA**2, rel=8.0 * result["frequency"].sd * math.pi / OMEGA)
 
 
 def test_where_only_the_smallest_swings_contradict_the_larger_are_fitted() -> None:

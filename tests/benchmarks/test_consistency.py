@@ -61,3 +61,9 @@ def test_a_recording_is_judged_by_what_was_hidden() -> None:
     found = judge(truth("b viscous", 0.5), 1, diagnose=False)
     assert (found.light, found.refused, found.restoring) == ("green", "", "sine")
     assert found.decidable
+
+
+@pytest.mark.parametrize(("number", "seed"), [(71, 1), (130, 1), (145, 2)])
+def test_a_perfect_recording_lacks_nothing(number: int, seed: int) -> None:
+    """Averaged across turning points, where friction jumps, these had glitches and clipping."""
+    assert judge(draw(number, seed), seed, diagnose=True).names == ()

@@ -30,6 +30,7 @@ from pendpipe.effects.baseline import (
     A,
     B,
     C,
+    pendulum_of,
     with_parts,
 )
 from pendpipe.effects.model import Evaluated, Model
@@ -111,6 +112,7 @@ def begin(
         before = int(release.time_s < samples.time_s[0])
         span = usable_span(samples, angles, start._replace(value=value, before=before))
     omega, angle = float(value[OMEGA]), float(value[START])
+    own = replace(pendulum_of(value), restoring=torque, drag=drag or "energy")
     data = gather(
         samples.time_s[span],
         samples.values[span],
@@ -119,6 +121,7 @@ def begin(
         counts=samples.counts,
         period_s=2.0 * math.pi / omega,
         noise_rms=points.noise_rms_rad,
+        friction_jump=2.0 * abs(float(own.friction(value[START], *np.array([0.0, 1.0])))),
     )
     data = replace(data, row=span.indices(len(samples.time_s))[0])
     value = with_parts(value, parts)

@@ -19,6 +19,8 @@ _NOISE_RATIOS: Final = tuple(np.linspace(0.04, 0.5, 12))
 _NEEDED_GAIN: Final = 12.0
 _UNEVEN: Final = 0.02
 """Part of an interval by which evenly spaced readings may be off."""
+_MOST_MEANS: Final = 64_000
+"""Means that are kept at most where their noise is less than what averaging leaves."""
 _MOST_UNEVEN: Final = 2
 """Largest number of unevenly spaced readings, over `most`."""
 _FEWEST_IN_CYCLE: Final = 24.0
@@ -218,12 +220,15 @@ def gather(
     counts: bool,
     period_s: float,
     noise_rms: float,
+    friction_jump: float = 0.0,
     most: int = 4000,
 ) -> Data:
     """Collect the readings, averaged where there are very many in a cycle.
 
     At least 24 means are left in a cycle. The averaging reduces the amplitude of the model's
-    readings equally (`Model.fold`).
+    readings equally (`Model.fold`). At a turning point the friction, and with it x'', jumps by
+    `friction_jump` (rad/s^2, or what the readings are in): there a mean over the time T is off by
+    up to jump T^2/48, of a rate by jump T/8. This stays below half of the mean's noise.
     """
     intervals = np.diff(time_s)
     interval = float(np.median(intervals))
@@ -237,6 +242,12 @@ def gather(
     fold = every = 1
     if uniform and len(time_s) > most:
         fold = max(1, int(min(len(time_s) // most + 1, period_s / interval / _FEWEST_IN_CYCLE)))
+    order, part = (1, 8.0) if unit == "rad/s" else (2, 48.0)
+    fewest = len(time_s) // _MOST_MEANS + 1
+    while fold > fewest and (
+        friction_jump * (fold * interval) ** order / part > 0.5 * noise_rms / fold**0.5
+    ):
+        fold -= 1
     if fold > 1:
         whole = len(time_s) // fold * fold
         time_s = time_s[:whole].reshape(-1, fold).mean(axis=1)
