@@ -208,6 +208,7 @@ class Found:
 
 
 def _right_noise(noise: float, found: Found) -> bool:
+    # What lies behind the decay tells nothing of the noise that was found.
     allowed = max(0.05, 3.0 / math.sqrt(2.0 * found.readings))
     return abs(noise / found.truth.noise - 1.0) <= allowed
 
@@ -226,7 +227,7 @@ def judge(truth: Truth, seed: int, *, diagnose: bool) -> Found:
         return found
     finally:
         found.seconds = time.process_time() - begun
-    found.light, found.reason = result.light, result.light_reason
+    found.light, found.reason, found.readings = result.light, result.light_reason, result.samples
     found.restoring = result.restoring
     found.drag_form = str(getattr(result, "drag_form", "energy"))
     found.noise = result.noise_rms_rad
