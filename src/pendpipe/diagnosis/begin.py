@@ -122,6 +122,7 @@ def begin(
         period_s=2.0 * math.pi / omega,
         noise_rms=points.noise_rms_rad,
         friction_jump=2.0 * abs(float(own.friction(value[START], *np.array([0.0, 1.0])))),
+        third=abs(angle) ** 3 / 192.0 if torque == "sine" else 0.0,
     )
     data = replace(data, row=span.indices(len(samples.time_s))[0])
     value = with_parts(value, parts)

@@ -221,14 +221,16 @@ def gather(
     period_s: float,
     noise_rms: float,
     friction_jump: float = 0.0,
+    third: float = 0.0,
     most: int = 4000,
 ) -> Data:
     """Collect the readings, averaged where there are very many in a cycle.
 
     At least 24 means are left in a cycle. The averaging reduces the amplitude of the model's
-    readings equally (`Model.fold`). At a turning point the friction, and with it x'', jumps by
-    `friction_jump` (rad/s^2, or what the readings are in): there a mean over the time T is off by
-    up to jump T^2/48, of a rate by jump T/8. This stays below half of the mean's noise.
+    readings equally (`Model.fold`). Two things it leaves add less than one to chi^2: at a turning
+    point the friction, and with it x'', jumps by `friction_jump` (rad/s^2), where a mean over the
+    time T is off by up to jump T^2/48, of a rate by jump T/8; and of the `third` harmonic (rad) a
+    mean loses (3 omega T)^4/1920 more than the model.
     """
     intervals = np.diff(time_s)
     interval = float(np.median(intervals))
@@ -242,11 +244,16 @@ def gather(
     fold = every = 1
     if uniform and len(time_s) > most:
         fold = max(1, int(min(len(time_s) // most + 1, period_s / interval / _FEWEST_IN_CYCLE)))
-    order, part = (1, 8.0) if unit == "rad/s" else (2, 48.0)
     fewest = len(time_s) // _MOST_MEANS + 1
-    while fold > fewest and (
-        friction_jump * (fold * interval) ** order / part > 0.5 * noise_rms / fold**0.5
-    ):
+    omega, half_cycles = 2.0 * math.pi / period_s, 2.0 * len(time_s) * interval / period_s
+    rate = unit == "rad/s"
+    while fold > fewest:
+        width = fold * interval
+        kink = friction_jump * (width / 8.0 if rate else width**2 / 48.0)
+        bent = third * (3.0 * omega if rate else 1.0) * (3.0 * omega * width) ** 4 / 1920.0
+        off = math.hypot(kink * math.sqrt(half_cycles), bent * math.sqrt(len(time_s) / fold))
+        if off < noise_rms / math.sqrt(fold):
+            break
         fold -= 1
     if fold > 1:
         whole = len(time_s) // fold * fold
