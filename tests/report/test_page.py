@@ -339,11 +339,15 @@ def many(example: Any, count: int) -> dict[str, Any]:
     return {**example.content, "records": entries, "typical_record": "record 0014"}
 
 
+@pytest.mark.parametrize("relative", [False, True])
 def test_beyond_a_hundred_records_only_those_that_need_a_look_are_drawn(
-    example: Any, tmp_path: Path
+    example: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, relative: bool
 ) -> None:
+    """The workflow gives paths below the folder that it runs in."""
     from pendpipe.files import write_json
 
+    monkeypatch.chdir(tmp_path)
+    folder = Path() if relative else tmp_path
     content, own = many(example, 120), {}
     for entry, like in zip(content["records"], example.content["records"] * 5, strict=False):
         if not entry.get("refused"):
@@ -351,8 +355,8 @@ def test_beyond_a_hundred_records_only_those_that_need_a_look_are_drawn(
     found = tmp_path / "record 0002"
     found.unlink()
     write_json(found / "diagnosis/diagnosis.json", diagnosed("record 0002"))
-    home = tmp_path / "report.html"
-    page = render({}, content, {}, tmp_path, tmp_path, home=home, own_page=own.__setitem__)
+    home = folder / "report.html"
+    page = render({}, content, {}, folder, folder, home=home, own_page=own.__setitem__)
     assert len(page.encode()) < BUDGET_BYTES
     assert re.findall(r'class="record" id="record-(\d+)"', page) == ["1", "2", "3"]
     assert list(own) == [f"record {index:04}" for index in range(1, 120)]

@@ -180,7 +180,7 @@ def render(
         line["diagnosis"] = _diagnosis(folder / line["name"]) if enabled else None
     title = comparison.get("title") or "A campaign of free decays"
     below = home is not None and folder.absolute().is_relative_to(home.absolute().parent)
-    links = Links(folder, home.absolute().parent if home is not None and below else None)
+    links = Links(folder, home.parent if home is not None and below else None)
     shared = _FOR_TEMPLATES | own_files()
     _draw_records(folder, lines, room, links)
     for line in lines:
@@ -267,7 +267,9 @@ class Links(NamedTuple):
         """The link to a result, by its folder and name."""
         if self.home is None:
             return None
-        return quote(self.folder.joinpath(*names).absolute().relative_to(self.home).as_posix())
+        return quote(
+            self.folder.joinpath(*names).absolute().relative_to(self.home.absolute()).as_posix()
+        )
 
     def present(self, names: Iterable[str], record: str = "") -> list[tuple[str, str]]:
         """Names and links of those of a record's (or the campaign's) files that there are."""
