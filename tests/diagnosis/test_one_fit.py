@@ -10,6 +10,7 @@ import pytest
 
 import pendpipe as pp
 from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.eq8 import Drag, Restoring
 from pendpipe.simulation.model import read_model, simulate
 
@@ -110,3 +111,15 @@ def test_what_is_found_never_leaves_more_of_the_readings_than_was_left_without_i
     plain = simulated(20.0, amplitude=0.3)
     found = pp.diagnose(pp.Recording(*spoilt(plain.time_s, plain.values), "angle_rad"))
     assert found.improved.residual_rms_rad <= found.baseline.residual_rms_rad
+
+
+def test_a_position_is_diagnosed_as_l_sin_x() -> None:
+    """Read as x it has another torque; the angle of its fit lacks nothing."""
+    omega, time_s = 5.0, np.arange(0.0, 60.0, 0.01)
+    law = Eq8(omega, 0.02, 0.004, 0.006, 1e-3, restoring="sine")
+    noise = 1e-5 * np.random.default_rng(1).standard_normal(len(time_s))
+    position = 9.80665 / omega**2 * np.sin(sample(law, Release(-0.2, 0.5), time_s)) + noise
+    recording = pp.Recording(time_s, position, "displacement_m")
+    found = pp.diagnose(recording, restoring="sine")
+    assert (found.verdict, found.restoring) == ("consistent", "sine")
+    assert abs(found.baseline.parameters["frequency"].value - 0.5 * omega / math.pi) < 1e-6

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import check_fixed
+from pendpipe.analysis.fit.by_points import GRAVITY, check_fixed
 from pendpipe.analysis.fit.result import Baseline, FitResult
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples, prepare
@@ -115,7 +115,10 @@ def diagnose_recording(
 
     check_fixed(fixed or {}, baseline)
     progress("finding the free decay and its turning points")
-    points, part = measure_recording(recording.as_motion(place=place), place)
+    motion = recording.as_motion(place=place)
+    points, part = measure_recording(motion, place)
+    if restoring == "sine" and motion.unit == "m":
+        points, part = measure_recording(_angle_of(motion, part, points, place), place)
     for cut in points.cuts:
         progress(f"left out: {stretch(cut.start_s, cut.stop_s)}, {cut.reason}")
     return diagnose_decay(
@@ -130,6 +133,26 @@ def diagnose_recording(
         provenance=provenance,
         progress=progress,
         whole=recording,
+    )
+
+
+def _angle_of(
+    motion: Recording, part: Recording, points: TurningPoints, place: str | Path
+) -> Recording:
+    """The angle arcsin((s - s0)/L) of a pendulum's position s, with the s0 and L of its fit."""
+    from pendpipe.analysis.fit import fit_recording
+
+    fit = fit_recording(part, points=points, restoring="sine", place=place)
+    length = GRAVITY / (2.0 * math.pi * fit.value("frequency")) ** 2
+    sine = (motion.values - fit.value("offset")) / length
+    step = None if motion.resolution is None else motion.resolution / length
+    note = f"read as arcsin(s/L): L = g/ω² = {length:.3f} m"
+    return replace(
+        motion,
+        values=np.arcsin(np.clip(sine, -1.0, 1.0)),
+        quantity="angle_rad",
+        resolution=step,
+        notes=(*motion.notes, note),
     )
 
 
