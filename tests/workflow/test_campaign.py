@@ -25,6 +25,12 @@ ROOT = Path(__file__).parents[2]
 SMALL = ROOT / "tests/workflow/small"
 
 
+def jobs_in(said: str) -> dict[str, int]:
+    """The table of jobs of Snakemake's plan."""
+    table = re.findall(r"^(\w+) +(\d+)$", said, flags=re.MULTILINE)
+    return {name: int(count) for name, count in table}
+
+
 class Campaign:
     """A campaign in a folder of its own, run by Snakemake from the project's root."""
 
@@ -58,11 +64,12 @@ class Campaign:
 
     def planned(self, *arguments: str, library: Path | None = None) -> dict[str, int]:
         """Count the jobs that Snakemake would run."""
-        said = self.snakemake("-n", *arguments, library=library)
-        return {
-            name: int(count)
-            for name, count in re.findall(r"^(\w+) +(\d+)$", said, flags=re.MULTILINE)
-        }
+        return jobs_in(self.snakemake("-n", *arguments, library=library))
+
+    def assert_nothing_planned(self, library: Path | None = None) -> None:
+        """Nothing is to be done; where something is, Snakemake's reasons are the message."""
+        said = self.snakemake("-n", library=library)
+        assert not jobs_in(said), said
 
     @property
     def chunks(self) -> int:
@@ -241,7 +248,7 @@ def test_a_campaign_of_refused_records_ends_with_its_figures_places(tmp_path: Pa
 
 
 def test_a_finished_campaign_has_nothing_to_do(campaign: Campaign) -> None:
-    assert not campaign.planned()
+    campaign.assert_nothing_planned()
 
 
 @pytest.mark.parametrize(
@@ -286,7 +293,7 @@ def test_a_change_in_the_library_reruns_what_depends_on_it(
     """A change of the fit reruns the fits and what follows; an untouched copy nothing."""
     library = tmp_path / "src"
     shutil.copytree(ROOT / "src", library, ignore=shutil.ignore_patterns("__pycache__"))
-    assert not campaign.planned(library=library)
+    campaign.assert_nothing_planned(library)
     with (library / "pendpipe/analysis/fit/by_waveform.py").open("a") as source:
         source.write("# changed\n")
     planned = campaign.planned(library=library)
@@ -335,7 +342,7 @@ def test_damaged_results_are_named_and_made_again(campaign: Campaign) -> None:
         assert len(list(campaign.results.glob(f"{name}.damaged-*"))) == 1
     assert (campaign.results / "campaign.json").read_bytes() == before
     assert (source.read_bytes(), source.stat().st_mtime_ns) == source_before
-    assert not campaign.planned()
+    campaign.assert_nothing_planned()
 
 
 def test_a_job_that_reads_a_damaged_result_says_so_and_writes_none(
