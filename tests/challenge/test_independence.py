@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pendpipe_challenge
 
-PERMITTED = {"arrays", "errors", "files", "formats", "process", "version", "__file__"}
-"""Of the library: what says nothing about pendulums, and the readers for real recordings."""
+PERMITTED = {"arrays", "errors", "files", "process", "version", "__file__"}
+"""Of the library: what says nothing about pendulums."""
 
 
 def parts_of_the_library(tree: ast.Module) -> Iterator[str]:
@@ -32,6 +32,5 @@ def test_the_challenge_imports_nothing_that_it_judges() -> None:
         for path in files
         for part in parts_of_the_library(ast.parse(path.read_text(encoding="utf-8")))
     }
-    assert len(files) > 15
-    assert "formats" in used
+    assert "arrays" in used
     assert used <= PERMITTED

@@ -64,7 +64,7 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> Places:
     places = Places(root / "open" / "set", root / "hidden" / "truth")
     patch = pytest.MonkeyPatch()
     patch.setattr(sets, "make_item", lambda recipe, random: make_null(random))
-    patch.setattr(sets, "plan", lambda count, random, real: [{"family": "null"}] * count)
+    patch.setattr(sets, "plan", lambda count, random: [{"family": "null"}] * count)
     patch.setattr(sets, "process_pool", Alone)
     make_set(places, 3, seed=7)
     patch.undo()
@@ -193,7 +193,7 @@ def test_an_interrupted_set_goes_on_and_the_ledger_misses_nothing(tmp_path: Path
     recipes = [{"family": "null"}] * 3
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sets, "make_item", lambda recipe, random: make_null(random))
-        patch.setattr(sets, "plan", lambda count, random, real: recipes[:count])
+        patch.setattr(sets, "plan", lambda count, random: recipes[:count])
         patch.setattr(sets, "process_pool", Alone)
         # As if it had stopped between two items: made, and not entered.
         patch.setattr(sets, "enter", interrupted)
@@ -230,7 +230,7 @@ def test_a_salt_hides_what_was_hashed() -> None:
 
 
 def test_the_plan_has_a_third_nulls_and_many_instrument_decoys() -> None:
-    recipes = items.plan(600, np.random.default_rng(0), real=1000)
+    recipes = items.plan(600, np.random.default_rng(0))
     assert len(recipes) == 600
     count = {f: sum(r["family"] == f for r in recipes) for f in items.SHARES}
     assert count["null"] >= 200

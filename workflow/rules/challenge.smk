@@ -31,14 +31,13 @@ rule challenge_make:
     params:
         number=CHALLENGE_ITEMS,
         seed=option("seed", CHALLENGE["seed"]),
-        real=option("real", CHALLENGE["real"]),
         folder=subpath(output[0], parent=True),
         sealed=SEALED,
     message:
         "make and seal {params.number} items"
     shell:
         "pendpipe challenge make {params.folder:q} --sealed {params.sealed:q} --items {params.number:q}"
-        " {params.seed} {params.real} --workers {threads} 2> {log:q}"
+        " {params.seed} --workers {threads} 2> {log:q}"
 
 
 rule challenge_solve:

@@ -1,7 +1,7 @@
 """Concealed effects: an independent generator, its oracle, sealing and scoring.
 
-Of the library it imports what says nothing about pendulums, and the readers: the proof may not
-be the program agreeing with itself.
+Of the library it imports what says nothing about pendulums: the proof may not be the program
+agreeing with itself.
 
 The generator: `torques`, `motion`, `chain`, `scenario`; what it hides: `hidden` and
 `hidden_...`, `catalogue`. The oracle: `bench`, `signatures`, `oracle`, `sizing`. A set: `items`,

@@ -22,7 +22,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _set(make, sealed=True)
     make.add_argument("--items", type=_count, default=600, help="how many (%(default)s)")
     make.add_argument("--seed", type=int, metavar="N", help="drawn where it is not given")
-    make.add_argument("--real", type=Path, metavar="DIR", help="real recordings, if any")
     make.add_argument("--ledger", type=Path, metavar="FILE", help="of every item ever made")
     make.add_argument("--workers", type=_count, default=1, help="processes")
     solve = actions.add_parser("solve", help="solve a set by pendpipe diagnose")
@@ -65,7 +64,6 @@ def _make(arguments: argparse.Namespace) -> int:
         arguments.items,
         seed=arguments.seed,
         workers=arguments.workers,
-        real=arguments.real,
         ledger=arguments.ledger,
     )
     print(f"{arguments.set}: made and sealed; the truth is in {arguments.sealed}")

@@ -393,9 +393,8 @@ SHARES: Final = {
     "single": 0.33,
     "combination": 0.08,
     "tie": 0.05,
-    "outside": 0.10,
-    "withheld": 0.05,
-    "real": 0.05,
+    "outside": 0.12,
+    "withheld": 0.08,
 }
 """Of a set; what rounding leaves goes to the nulls."""
 WITHOUT_STRENGTH: Final = frozenset({"dropped-samples", "coarse-quantisation", "coloured-noise"})
@@ -428,7 +427,7 @@ TIES: Final = (
 """Effects that one record can hardly tell from a rival."""
 
 
-def plan(count: int, random: np.random.Generator, *, real: int = 0) -> list[dict[str, Any]]:
+def plan(count: int, random: np.random.Generator) -> list[dict[str, Any]]:
     """What each item of a set hides, in an order that gives nothing away.
 
     Parameters
@@ -437,11 +436,8 @@ def plan(count: int, random: np.random.Generator, *, real: int = 0) -> list[dict
         Items of the set.
     random
         Shuffles, and deals the instrument's share of the singles.
-    real
-        How many real recordings with a concealed change can be made here.
     """
     number = {name: int(share * count) for name, share in SHARES.items()}
-    number["real"] = min(number["real"], real)
     number["null"] += count - sum(number.values())
     recipes: list[dict[str, Any]] = [{"family": "null"} for _ in range(number["null"])]
     recipes += _singles(number["single"], random)
@@ -467,7 +463,6 @@ def plan(count: int, random: np.random.Generator, *, real: int = 0) -> list[dict
     for i in range(number["withheld"]):
         effect = ("circular-error", "coulomb-friction", "quadratic-drag")[i % 3]
         recipes.append({"family": "withheld", "effects": [effect], "delta_chi2": [1e4]})
-    recipes += [{"family": "real", "number": i} for i in range(number["real"])]
     random.shuffle(recipes)
     return recipes
 

@@ -1,8 +1,8 @@
 """Scores of an opened set beside the oracle's: alarms, power, names, places, values, prediction.
 
 A name is right where the effect is hidden or its law may be called so; a class is the first name
-with what the answer calls indistinguishable from it. A changed real recording is compared with its
-unchanged twin. Shares have exact 95 % intervals, other figures those of items drawn anew.
+with what the answer calls indistinguishable from it. Shares have exact 95 % intervals, other
+figures those of items drawn anew.
 """
 
 from __future__ import annotations
@@ -89,12 +89,11 @@ def read_answer(entry: dict[str, Any], hidden: Iterable[str] = ()) -> Answer:
 
 @dataclass(frozen=True)
 class Solved:
-    """One item: its truth, its answer, and its unchanged twin's answer if it has one."""
+    """One item: its truth and its answer."""
 
     name: str
     truth: dict[str, Any]
     answer: Answer
-    twin: Answer | None
 
     @property
     def effect(self) -> dict[str, Any]:
@@ -146,8 +145,7 @@ def read_items(opened: dict[str, Any]) -> list[Solved]:
     for name, entry in opened["items"].items():
         effects = entry["truth"]["effects"]
         hidden = [each for e in effects for each in (e["effect"], *e.get("also", []))]
-        twin = read_answer(entry["twin"]) if "twin" in entry else None
-        found.append(Solved(name, entry["truth"], read_answer(entry["answer"], hidden), twin))
+        found.append(Solved(name, entry["truth"], read_answer(entry["answer"], hidden)))
     return found
 
 
@@ -270,7 +268,7 @@ def naming(items: list[Solved]) -> Score:
 
 
 def others(family: Callable[..., list[Solved]]) -> Iterator[tuple[str, Score]]:
-    """Combinations, ties, what is outside the catalogue, what the baseline lacks, real changes."""
+    """Combinations, ties, what is outside the catalogue, what the baseline lacks."""
 
     def each(item: Solved) -> list[bool]:
         return [true_of(item.answer.names, effect) for effect in item.truth["effects"]]
@@ -294,13 +292,7 @@ def others(family: Callable[..., list[Solved]]) -> Iterator[tuple[str, Score]]:
     large = [item for item in outside if item.effect["left_by_catalogue"] > 70.0]
     right_kind = [true_of(item.answer.names, item.effect) for item in large]
     yield "outside, large: unnamed, of the right kind", share(right_kind)
-    for what in ("withheld", "real"):
-        yield f"{what}: detected", share([item.answer.detected for item in family(what)])
-    real = [
-        true_of(i.answer.names, i.effect) and not (i.twin and true_of(i.twin.names, i.effect))
-        for i in family("real")
-    ]
-    yield "real: the change is named, and not in its twin", share(real)
+    yield "withheld: detected", share([item.answer.detected for item in family("withheld")])
 
 
 GROUPS: Final = {
@@ -502,7 +494,7 @@ def score(opened: dict[str, Any], interval_s: Mapping[str, float] | None = None)
         "pulls": pulls(single),
         "held_out": held_out(single),
         "calibration": calibration(family("single", "tie", "outside")),
-        "places": places(family("single", "tie", "combination", "real"), interval_s or {}),
+        "places": places(family("single", "tie", "combination"), interval_s or {}),
         "confusion": dict(Counter(f"{i.effect['effect']} -> {i.answer.lead}" for i in named)),
         "missed": [f"{i.name} | {i.effect['effect']} ({i.effect['law']})" for i in missed],
     }

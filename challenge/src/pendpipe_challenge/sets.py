@@ -34,7 +34,7 @@ from pendpipe.files import finite, read_json, replaced, write_json
 from pendpipe.process import ONE_THREAD
 from pendpipe.version import __version__
 from pendpipe_challenge.items import make_item, plan
-from pendpipe_challenge.recordings import available, make_real, recording_text
+from pendpipe_challenge.recordings import recording_text
 
 LEDGER: Final = "ledger.jsonl"
 """Beside the sets' folders: every item ever made."""
@@ -173,7 +173,6 @@ def make_set(
     *,
     seed: int | None = None,
     workers: int = 1,
-    real: Path | None = None,
     ledger: Path | None = None,
 ) -> None:
     """Make a set, or go on with one that was interrupted.
@@ -188,8 +187,6 @@ def make_set(
         Drawn where it is not given; it is sealed with the truth.
     workers
         Processes.
-    real
-        Folder of real recordings; without it that family is left out.
     ledger
         Where every item that is ever made is entered; beside the set's folder if None.
     """
@@ -206,16 +203,13 @@ def make_set(
             "begun": now(),
         }
         write_json(places.secret, secret)
-    there = len(available(real)) if real is not None else 0
-    if real is not None and not there:
-        print(f"{real}: no real recordings here: that family is left out", flush=True)
     root = np.random.default_rng([secret["seed"], 0])
-    recipes = plan(secret["count"], root, real=1000 if there else 0)
+    recipes = plan(secret["count"], root)
     ledger = ledger or places.folder.parent / LEDGER
     there_already = entered(ledger, places.folder.name)
     names = [f"item-{number:04d}" for number in range(1, len(recipes) + 1)]
     todo = [
-        (places, name, recipe, [secret["seed"], number], real)
+        (places, name, recipe, [secret["seed"], number])
         for number, (name, recipe) in enumerate(zip(names, recipes, strict=True), 1)
         if not (places.truth(name).exists() and name in there_already)
     ]
@@ -241,44 +235,30 @@ def _apart(places: Places) -> None:
         raise InputError(sealed, f"it is not apart from {folder}", "seal into another folder")
 
 
-def _make_one(
-    task: tuple[Places, str, dict[str, Any], list[int], Path | None],
-) -> dict[str, str]:
+def _make_one(task: tuple[Places, str, dict[str, Any], list[int]]) -> dict[str, str]:
     """Make one item; its truth is written last, so that it marks the item as whole."""
-    places, name, recipe, seed, real = task
+    places, name, recipe, seed = task
     if places.truth(name).exists():  # made before an interruption, and not entered yet
         return {"item": name, "recording": _hash_of(places.recording(name))}
-    random = np.random.default_rng(seed)
-    if recipe["family"] == "real" and real is not None:
-        found = make_real(real, recipe["number"], random)
-        text, truth = found.text, found.truth
-        twin = places.recording(f"{name}-twin")
-        with replaced(twin) as stream:
-            stream.write(found.twin)
-    else:
-        item = make_item(recipe, random)
-        text, truth = recording_text(item.scenario, item.codes), item.truth
+    item = make_item(recipe, np.random.default_rng(seed))
+    text = recording_text(item.scenario, item.codes)
     with replaced(places.recording(name)) as stream:
         stream.write(text)
-    write_json(places.truth(name), {"item": name, **truth})
+    write_json(places.truth(name), {"item": name, **item.truth})
     return {"item": name, "recording": of_text(text)}
 
 
 def _seal(places: Places, names: list[str], secret: dict[str, Any]) -> None:
     """Write the manifest: what a laboratory knows, and hashes of what it does not."""
     truths = [read_json(places.truth(name)) for name in names]
-    items = {}
-    for name, truth in zip(names, truths, strict=True):
-        entry = {
+    items = {
+        name: {
             "baseline": truth["baseline"],
             "recording_sha256": _hash_of(places.recording(name)),
             "truth_sha256": salted(truth, secret["salt"]),
         }
-        twin = places.recording(f"{name}-twin")
-        if twin.exists():
-            # The twin's name must not betray the item: both are solved like any other.
-            entry["twin_sha256"] = _hash_of(twin)
-        items[name] = entry
+        for name, truth in zip(names, truths, strict=True)
+    }
     manifest = {
         "schema_version": 1,
         "set": places.folder.name,
@@ -331,11 +311,7 @@ def solve_set(
         Stop after so many (the set stays unfinished).
     """
     manifest = _manifest(folder)
-    tasks = []
-    for name, entry in manifest["items"].items():
-        tasks.append((name, entry["baseline"]))
-        if "twin_sha256" in entry:
-            tasks.append((f"{name}-twin", entry["baseline"]))
+    tasks = [(name, entry["baseline"]) for name, entry in manifest["items"].items()]
     todo = [task for task in tasks if not answer_path(folder, task[0]).exists()][:limit]
     with ThreadPoolExecutor(workers) as pool:
         work = pool.map(lambda task: _solve_one(folder, task[0], task[1], solver), todo)
@@ -470,13 +446,10 @@ def open_set(places: Places) -> Path:
         raise InputError(places.sealed, "the truth is not what was sealed", "distrust this set")
     if salted(secret, salt) != manifest["secret_sha256"]:
         raise InputError(places.secret, "the seed is not what was sealed", "distrust this set")
-    items = {}
-    for truth in truths:
-        name = truth["item"]
-        entry: dict[str, Any] = {"truth": truth, "answer": _answer(places, name, seals)}
-        if "twin_sha256" in manifest["items"][name]:
-            entry["twin"] = _answer(places, f"{name}-twin", seals)
-        items[name] = entry
+    items = {
+        truth["item"]: {"truth": truth, "answer": _answer(places, truth["item"], seals)}
+        for truth in truths
+    }
     write_json(
         opened,
         {
