@@ -3,8 +3,6 @@
 ``--hypothesis-profile=untimed`` draws new ones.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from collections.abc import Callable

@@ -1,8 +1,6 @@
 """A line that plays a script: pairs of bytes expected from the driver and bytes to answer."""
 # ruff: noqa: ARG002 - a line that plays a script has no use for time limits
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import TypeAlias
 

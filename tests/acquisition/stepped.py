@@ -4,8 +4,6 @@ Device, line and recorder run in one thread, so that nothing depends on how busy
 is: a recording comes out the same whenever it is made.
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

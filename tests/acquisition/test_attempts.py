@@ -1,7 +1,5 @@
 """Which of the kept attempts is used, and what is never taken for one."""
 
-from __future__ import annotations
-
 from io import BytesIO
 from pathlib import Path
 

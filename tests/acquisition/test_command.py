@@ -1,7 +1,5 @@
 """``pendpipe acquire`` as a user calls it."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

@@ -1,7 +1,5 @@
 """The decoders alone: worked bytes of the fact sheet (A1, A7, A8), damage, any cutting."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Every fault that a simulated device can have: what the recording then says."""
 
-from __future__ import annotations
-
 from io import BytesIO
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Device and driver share no code, so that no error can be made on both sides alike."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A live recording in a campaign survives unplugging, code changes, failures and kills."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -4,8 +4,6 @@ The faults are pyserial's own: on Linux and macOS it is made to raise them; thos
 written as ``serialwin32.py`` writes them (its text, no number; the words in any language).
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import sys

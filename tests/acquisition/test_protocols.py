@@ -1,7 +1,5 @@
 """Drivers and simulated devices against the worked bytes and sessions of the fact sheet (A1-A8)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The raw file: repeatable, and good up to where it breaks off."""
 
-from __future__ import annotations
-
 import json
 import struct
 import zlib

@@ -1,7 +1,5 @@
 """The recorder against the noise, a full disk, a killed process and a busy terminal."""
 
-from __future__ import annotations
-
 import errno
 import io
 import os

@@ -1,7 +1,5 @@
 """Device, line, driver, recorder and decoder together, over real terminals and sockets."""
 
-from __future__ import annotations
-
 import math
 import os
 from pathlib import Path

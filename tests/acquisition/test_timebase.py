@@ -1,7 +1,5 @@
 """The measured scan rate: true whatever delays the arrivals, and honest about its error."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The live page shows what is recorded, and nothing that happens to it costs a reading."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

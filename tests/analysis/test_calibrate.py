@@ -1,7 +1,5 @@
 """The sensor's line: injected truth, honest errors, and the test of linearity."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

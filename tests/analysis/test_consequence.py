@@ -1,7 +1,5 @@
 """The light says what the misfit does to the numbers, and not how loud it is."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

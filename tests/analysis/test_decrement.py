@@ -1,7 +1,5 @@
 """No law is printed that loses other than the decay loses, unless it is called red."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -3,8 +3,6 @@
 A viscous decay of 200 s: half-life 138.6 s, and Q = pi 200 s/T.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

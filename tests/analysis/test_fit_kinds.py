@@ -1,7 +1,5 @@
 """Motions that real apparatus makes, from the recording to the fit, by another integrator."""
 
-from __future__ import annotations
-
 import math
 import re
 
@@ -19,7 +17,7 @@ TIME = np.arange(0.0, 80.0, 0.01)
 LOSSES = {"quadratic": 0.02, "viscous": 0.02, "coulomb": 0.004}
 
 
-def fitted(values: FloatArray, rms: float = 1e-3, time: FloatArray = TIME) -> pendpipe.FitResult:
+def fitted(values: FloatArray, rms: float = 1e-3, time: FloatArray = TIME) -> "pendpipe.FitResult":
     return pendpipe.fit(recorded(values, time, rms))
 
 
@@ -34,7 +32,7 @@ def viscous(angle: float, speed: float, loss: float, linear: bool = False) -> Fl
     return np.asarray(found.y[0])
 
 
-def holds(result: pendpipe.FitResult, name: str, value: float) -> bool:
+def holds(result: "pendpipe.FitResult", name: str, value: float) -> bool:
     return abs(result[name].value - value) < 4.0 * result[name].sd
 
 

@@ -1,7 +1,5 @@
 """The paper's route: Eq. 14 and Eq. 8's frequency from turning points."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Small bounded problems: steps and intervals against the plain way of finding them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """sin x in the fit: where a recording asks for it, and with the right numbers."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

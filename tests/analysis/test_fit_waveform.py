@@ -1,7 +1,5 @@
 """Eq. 8 on all readings: as precise as the readings allow, and honest about it."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

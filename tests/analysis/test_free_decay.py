@@ -1,7 +1,5 @@
 """A free decay is found where the pendulum swings by itself, and nowhere else."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """The loops of the turning points: kept as machine code, and right."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

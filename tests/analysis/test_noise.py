@@ -1,7 +1,5 @@
 """Noise and step of a recording, from what no slow motion can touch."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

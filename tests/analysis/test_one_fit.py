@@ -1,7 +1,5 @@
 """One law, one fit, one test of it: the numbers of clean recordings at any rate, noise and loss."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What may follow a half cycle freely, to within a few percent of each limit."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

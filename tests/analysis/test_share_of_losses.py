@@ -1,7 +1,5 @@
 """Which loss takes how much, as far as a fit tells it."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

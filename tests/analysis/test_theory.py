@@ -1,7 +1,5 @@
 """Theory stands beside a pendulum that has a sphere in its fluid, and beside no other."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

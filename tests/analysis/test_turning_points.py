@@ -1,7 +1,5 @@
 """Turning points measured from all readings, against those of the engine."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

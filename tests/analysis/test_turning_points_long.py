@@ -1,7 +1,5 @@
 """Long records: followed in one pass where they are plain, with the answer of the whole."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Two damped modes are told apart by their readings."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The apparatus obeys the laws of its books, and its truths are what the files hold."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from benchmarks.apparatus import scores

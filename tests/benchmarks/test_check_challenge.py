@@ -1,7 +1,5 @@
 """CI's small challenge fails on what is broken, and seldom on what is as promised."""
 
-from __future__ import annotations
-
 from math import comb
 from typing import Any
 

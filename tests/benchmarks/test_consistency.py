@@ -1,7 +1,5 @@
 """Clean recordings of the law: they are what the engine says, and what is asked of them holds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

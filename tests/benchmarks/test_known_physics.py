@@ -1,7 +1,5 @@
 """The table of known physics is judged by names and numbers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from benchmarks.apparatus.scores import catalogue

@@ -1,7 +1,5 @@
 """The nulls obey Eq. 8, and each has the noise that its family promises."""
 
-from __future__ import annotations
-
 import json
 from argparse import Namespace
 from pathlib import Path

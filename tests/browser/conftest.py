@@ -1,7 +1,5 @@
 """Pages of every kind, and the system's Chromium with the network cut."""
 
-from __future__ import annotations
-
 import copy
 import json
 import shutil

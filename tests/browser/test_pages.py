@@ -1,7 +1,5 @@
 """Pages in a real browser, from a file, with the network cut."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterator
 from contextlib import contextmanager

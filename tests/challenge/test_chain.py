@@ -1,7 +1,5 @@
 """The measurement chain: each fault does what its name says, and nothing else."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

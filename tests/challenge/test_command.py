@@ -1,7 +1,5 @@
 """`pendpipe challenge` comes with the package beside the library, and only with it."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import tomllib
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The proof may not be the program agreeing with itself."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from pathlib import Path

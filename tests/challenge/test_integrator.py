@@ -1,8 +1,6 @@
 """The challenge's own integrator against scipy's, and against what physics books say."""
 
 # ruff: noqa: ARG005
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Noise, tangent space, sizing and the oracle: what they say comes true."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whether local effects are where the answer puts them."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

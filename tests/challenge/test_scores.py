@@ -1,7 +1,5 @@
 """Scores: known answers give known numbers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Sealing: the solver sees recordings and nothing else; nothing can be changed unseen."""
 
 # ruff: noqa: ARG005
-from __future__ import annotations
-
 import json
 import shutil
 import sys
@@ -81,7 +79,7 @@ class Alone:
     def __init__(self, workers: int) -> None:
         assert workers == 1
 
-    def __enter__(self) -> Alone:
+    def __enter__(self) -> "Alone":
         return self
 
     def __exit__(self, *_: object) -> None:

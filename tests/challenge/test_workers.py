@@ -1,7 +1,5 @@
 """The makers of items stand beside each other: each keeps to one thread."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

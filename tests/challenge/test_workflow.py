@@ -1,7 +1,5 @@
 """The challenge's rules: four jobs of their own, none in the campaign."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

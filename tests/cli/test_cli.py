@@ -1,7 +1,5 @@
 """The command line: help for each command, one line and status 2 for a user's fault."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """`pendpipe diagnose`: the contract's file, key by key, and how the command ends."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

@@ -1,7 +1,5 @@
 """`pendpipe fit` answers: one recording or many, as a summary, a table, JSON or a figure."""
 
-from __future__ import annotations
-
 import io
 import json
 import math

@@ -1,7 +1,5 @@
 """Every command that answers prints one JSON object where it is asked to."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What no user can have meant ends in one line and status 2, and soon."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

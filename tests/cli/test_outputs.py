@@ -1,7 +1,5 @@
 """No command writes over what it was given, nor over what pendpipe did not make."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """`pendpipe page` writes one file that needs nothing outside itself."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

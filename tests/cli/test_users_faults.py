@@ -1,7 +1,5 @@
 """Whatever is wrong with a call is said in one line, about what the user has named."""
 
-from __future__ import annotations
-
 import math
 import pickle
 from pathlib import Path

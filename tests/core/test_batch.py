@@ -1,7 +1,5 @@
 """Many recordings are fitted side by side as each would be alone, and in their order."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import islice
 

@@ -1,7 +1,5 @@
 """A number with its error comes back from a result file as it went in."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import asdict

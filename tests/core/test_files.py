@@ -1,7 +1,5 @@
 """A result is whole or absent."""
 
-from __future__ import annotations
-
 import os
 import threading
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A result that is not what its stage wrote is named, set aside, and never read."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path

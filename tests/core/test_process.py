@@ -1,7 +1,5 @@
 """What a process of ours asks of its system."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Editing the library changes the version of what depends on it, and of nothing else."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

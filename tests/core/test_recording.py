@@ -1,7 +1,5 @@
 """A recording survives the disk unchanged, and a faulty one is refused with its line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

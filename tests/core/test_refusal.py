@@ -1,7 +1,5 @@
 """A record that can't be used leaves its reason and stands in nobody's way."""
 
-from __future__ import annotations
-
 import errno
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """How results are shown and handed on: in notebooks, on axes, as arrays."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Nothing that a Windows machine lacks is imported before it is used."""
 
-from __future__ import annotations
-
 import pkgutil
 import subprocess
 import sys

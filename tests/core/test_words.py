@@ -1,7 +1,5 @@
 """The project speaks the field's English: no retired word comes back."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

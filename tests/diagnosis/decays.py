@@ -1,7 +1,5 @@
 """Decays with known faults, fitted from the truth: quick to make by the hundred."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

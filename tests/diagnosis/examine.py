@@ -1,7 +1,5 @@
 """All tests of the measurement one after the other, as a search makes them on a record."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Noise of many kinds, and faults of the measurement, to be put on a decay."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Short recordings with an effect that Eq. 8 lacks, and their diagnoses, each made once."""
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable

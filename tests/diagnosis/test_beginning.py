@@ -1,7 +1,5 @@
 """A diagnosis begins with the fit: sin x is presumed and fitted, and no finding."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """How often chance alone does as well somewhere in a scan."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

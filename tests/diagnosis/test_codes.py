@@ -1,7 +1,5 @@
 """Which codes occur: coarser lattices, combs, and neither."""
 
-from __future__ import annotations
-
 import math
 import tracemalloc
 from dataclasses import replace

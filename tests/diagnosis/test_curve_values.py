@@ -1,7 +1,5 @@
 """The curve of an effect without a name: its values, band and local exponent."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Red noise or a slow effect: apparent red noise may be a drift."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

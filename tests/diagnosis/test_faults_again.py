@@ -1,7 +1,5 @@
 """What looked like a fault before the physics was known is tested again with it."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Between the instants of a scan: the fit must end where one from the truth does."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

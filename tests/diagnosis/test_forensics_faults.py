@@ -1,7 +1,5 @@
 """Each fault of the measurement is found, measured, and not taken for another."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

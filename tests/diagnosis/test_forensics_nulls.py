@@ -1,7 +1,5 @@
 """Noise alone is not taken for a fault, whatever its kind."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

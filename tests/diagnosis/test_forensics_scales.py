@@ -1,7 +1,5 @@
 """The tests of the measurement know no second and no radian: Eq. 8 looks the same in any unit."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

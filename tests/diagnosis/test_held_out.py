@@ -1,7 +1,5 @@
 """Prediction of blocks that a model was not fitted to."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

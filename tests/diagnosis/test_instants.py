@@ -1,7 +1,5 @@
 """Intervals of instants hold the truth, in whichever half cycle chi^2 has its minimum."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The reported effect is the likelier one in the end, whichever was added first."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import replace
 from typing import Any

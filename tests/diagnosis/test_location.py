@@ -1,7 +1,5 @@
 """Where an effect shows: time, frequency, harmonic."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

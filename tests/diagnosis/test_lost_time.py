@@ -1,7 +1,5 @@
 """A clock that jumps moves angle and velocity along one path; a knock or an offset does not."""
 
-from __future__ import annotations
-
 import math
 import re
 

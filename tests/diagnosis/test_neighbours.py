@@ -1,7 +1,5 @@
 """Of two sets of effects the one with the smaller score is the answer."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The noise of the readings: its variance and colour, whatever the motion's misfit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

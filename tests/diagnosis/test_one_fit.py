@@ -1,7 +1,5 @@
 """Fit, diagnosis and simulation mean one law, and tell one noise: that of a reading."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 
@@ -25,7 +23,7 @@ def simulated(
     drag: Drag = "energy",
     effects: tuple[str, ...] = (),
     **losses: float,
-) -> pp.Recording:
+) -> "pp.Recording":
     """160 s of a pendulum with white noise of 100 urad."""
     described = {
         "seed": seed,
@@ -43,7 +41,7 @@ def simulated(
     return simulate(read_model(described))
 
 
-def judged(recording: pp.Recording) -> tuple[pp.FitResult, dict]:  # type: ignore[type-arg]
+def judged(recording: "pp.Recording") -> "tuple[pp.FitResult, dict]":  # type: ignore[type-arg]
     return pp.fit(recording), pp.diagnose(recording).to_dict()
 
 

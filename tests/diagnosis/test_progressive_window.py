@@ -1,7 +1,5 @@
 """A progressive window finds the motion where a start over the whole record is turns away."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ They are read where they lie (``../shared/recordings``). Here mostly single laws
 is quick; ``docs/recordings.md`` holds whole diagnoses, and what they have found of it.
 """
 
-from __future__ import annotations
-
 import functools
 from dataclasses import replace
 from pathlib import Path

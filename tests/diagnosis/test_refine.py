@@ -1,7 +1,5 @@
 """Maximum likelihood: from far away, within bounds, with valid errors."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Which effects are refitted, and which refits are carried to the end."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

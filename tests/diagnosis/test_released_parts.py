@@ -1,7 +1,5 @@
 """A held part of b that is released moves the readings as that part alone does."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

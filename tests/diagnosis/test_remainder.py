@@ -1,7 +1,5 @@
 """The misfit beyond the noise, and its consequences for names and errors."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Rounded readings: where the noise is too small to hide the steps."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The diagnosis as a whole: the right effect, the right size, and nothing from noise."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Scores: unit columns orthogonal to the derivatives by the baseline's parameters."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

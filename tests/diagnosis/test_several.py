@@ -1,7 +1,5 @@
 """Recordings of one pendulum together: what one alone leaves open, and who contradicts whom."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Lost counts and clock slips: found and undone where they are whole, and else not."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The last cycles are judged by the scatter of all spans of cycles before them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

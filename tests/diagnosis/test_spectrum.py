@@ -1,7 +1,5 @@
 """Tones of any frequency: a line stands out of what lies beside it, a resonance does not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The details of a diagnosis: their lines, names, units and digits."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

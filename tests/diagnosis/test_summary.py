@@ -1,7 +1,5 @@
 """The dozen lines that a diagnosis prints, and the same as fields."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from typing import Any

@@ -3,8 +3,6 @@
 Powers of two are exact in binary numbers, so that little but the search itself could differ.
 """
 
-from __future__ import annotations
-
 import functools
 import re
 from collections.abc import Mapping

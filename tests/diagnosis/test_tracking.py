@@ -1,7 +1,5 @@
 """A mark that is tracked with errors shows them in the distance from the pivot, too."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Readings against a model, along the motion: amplitude and phase, turns counted."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

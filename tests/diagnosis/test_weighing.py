@@ -1,7 +1,5 @@
 """The rivals that share the probability of an effect: those that the final noise allows."""
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import replace

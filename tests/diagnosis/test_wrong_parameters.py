@@ -1,7 +1,5 @@
 """A wrong prediction, missing physics, or both: distinguished from each other."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

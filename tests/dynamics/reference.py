@@ -5,8 +5,6 @@ Coulomb-shifted centre (the engine has another centre), and checks itself by Tay
 time. `heyoka_turning_points` integrates in time and searches for the zeros of the velocity.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import dataclass, replace
@@ -90,7 +88,7 @@ class MpmathPendulum:
     coulomb: Any = 0
 
     @classmethod
-    def of(cls, model: Eq8) -> MpmathPendulum:
+    def of(cls, model: Eq8) -> "MpmathPendulum":
         """Return the same pendulum."""
         numbers = (
             model.angular_frequency,

@@ -1,7 +1,5 @@
 """The engine against slow and trusted ways, over the whole range of pendulums."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Any law on the phase clock: against the Eq. 8 engine, elliptic integrals, and its own order."""
 
-from __future__ import annotations
-
 import math
 
 import mpmath

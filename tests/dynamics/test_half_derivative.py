@@ -1,7 +1,5 @@
 """The half derivative of a sine that begins at rest is made of Fresnel's integrals."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Machine code: kept, found again, renewed, and never trusted when damaged."""
 
-from __future__ import annotations
-
 import math
 import os
 import subprocess

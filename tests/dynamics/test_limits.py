@@ -1,7 +1,5 @@
 """Eq. 8 where theory has closed forms."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ What is integrated is written down here from the paper: f_c, f_h, f_q and b_v, t
 pendulum or of a spring, and v|v| in the place of the energy where the drag follows the speed.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

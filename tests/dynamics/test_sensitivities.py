@@ -1,7 +1,5 @@
 """The derivatives by every parameter, exact through all turning points and the stop."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Eq. 8 with the torque omega^2 sin x, against heyoka, elliptic functions and its energy law."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ It shares nothing with the package: a law is a function of time, angle, velocity
 of the velocity, written down in the test.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -3,8 +3,6 @@
 Least squares on cosines and sines; nothing of the package is used.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Pendulums of the catalogue's tests, without any effect and with one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -2,8 +2,6 @@
 
 # ruff: noqa: ARG005 (a law is given all that it could depend on)
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

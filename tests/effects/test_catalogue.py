@@ -1,7 +1,5 @@
 """The catalogue as a whole: complete, without effect at size zero, its derivatives right."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any

@@ -1,7 +1,5 @@
 """b = b_h + b_v with a part held: what is left of b, and what it does to the readings."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What changes slowly, suddenly, or periodically."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """What frictions do: how the amplitude falls, and the third harmonic in quadrature."""
 
-from __future__ import annotations
-
 import math
 
 import mpmath

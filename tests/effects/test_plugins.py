@@ -1,7 +1,5 @@
 """Other packages add effects; one that can't be loaded is named in a line and passed over."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import pytest

@@ -1,7 +1,5 @@
 """What changes the readings and not the motion."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

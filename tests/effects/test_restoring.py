@@ -1,7 +1,5 @@
 """What a changed restoring torque does: frequency against amplitude, and harmonics in phase."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

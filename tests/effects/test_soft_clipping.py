@@ -1,7 +1,5 @@
 """Readings that fall behind at the ends of the range."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The example campaign, made once for all tests of the figures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The figures of a campaign draw its numbers, and the physics shows in them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures 7 and 8 and each record's decay, and what they work out for themselves."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The figures of a diagnosis show where the readings and the models differ."""
 
-from __future__ import annotations
-
 import math
 import xml.etree.ElementTree as ET
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """All figures of a campaign on disk: complete, reproducible, and honest about what is missing."""
 
-from __future__ import annotations
-
 import shutil
 import xml.etree.ElementTree as ET
 from dataclasses import replace

@@ -3,8 +3,6 @@
 They change where a figure does: look at the new image before it is committed.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """How one swing is written into tables and files, and what has to be read from them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

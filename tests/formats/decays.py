@@ -1,7 +1,5 @@
 """A decaying swing to write into files of every dialect."""
 
-from __future__ import annotations
-
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -5,8 +5,6 @@ decimal sign, the header, the unit, how times are written, which columns stand b
 and in which order. Nothing here is shared with the readers that are tested.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import zip_longest
 from random import Random

@@ -1,7 +1,5 @@
 """What is chosen of a file: columns, runs, spans and units, by the reader and by its user."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

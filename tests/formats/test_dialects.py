@@ -1,7 +1,5 @@
 """Hundreds of dialects: each is read right, or refused, or its first line says what is a guess."""
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 from random import Random

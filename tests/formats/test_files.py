@@ -1,7 +1,5 @@
 """One swing in files of arrays, in workbooks, archives and projects; and what these may not do."""
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import io

@@ -1,7 +1,5 @@
 """Whatever the bytes: a clean error in one line, or a valid recording."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What `inspect` says: uniformity, gaps, step, clipping; and the two commands."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a column of numbers shows by itself, by exact swings on both sides of each limit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lists and signals that are no recordings of a free decay are reported as what they are."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

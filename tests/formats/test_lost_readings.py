@@ -1,7 +1,5 @@
 """Readings that stand for lost ones are marked, and no true reading is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What a column means, and its unit: as the file states it, else as one test of physics shows."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """A dialect of another package is found; one that fails is named in a line and passed over."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Each sample file reads as the expectation beside it says: a folder a dialect."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Real recordings, read where they lie: layouts, counts and cuts that are known of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from benchmarks.files import rows

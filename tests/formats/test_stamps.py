@@ -1,7 +1,5 @@
 """However a logger stamps its rows, they are read at the times at which they were taken."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple

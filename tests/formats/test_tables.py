@@ -1,7 +1,5 @@
 """One swing in the tables that laboratories, loggers, phones and programs write."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

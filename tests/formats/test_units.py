@@ -1,7 +1,5 @@
 """Units of angles and of clocks, each by what it is."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

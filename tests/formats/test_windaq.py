@@ -1,7 +1,5 @@
 """WinDaq's bytes, put together by the format's description, are read back exactly."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

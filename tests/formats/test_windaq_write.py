@@ -1,7 +1,5 @@
 """What is written for WinDaq has the bytes of its description, and is read back exactly."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A sphere oscillating near walls: published limits, symmetry, convergence."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

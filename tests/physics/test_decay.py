@@ -1,7 +1,5 @@
 """Eq. 14 in every regime, against the paper's printed formula at 200 digits."""
 
-from __future__ import annotations
-
 import mpmath as mp
 import numpy as np
 import pytest

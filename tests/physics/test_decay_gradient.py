@@ -1,7 +1,5 @@
 """The derivatives of Eq. 14 against those of its implicit relation, at many digits."""
 
-from __future__ import annotations
-
 import mpmath as mp
 import numpy as np
 import pytest

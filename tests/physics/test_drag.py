@@ -1,7 +1,5 @@
 """Eqs. 1, 2 and 16 at the paper's numbers, and from the complex Stokes solution."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Eq. 8's terms, their quality factors, and the two ways to name the losses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

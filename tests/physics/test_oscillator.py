@@ -1,7 +1,5 @@
 """Eqs. 3-7, and the frequency shifts, against integration of the equations of motion."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """The compound pendulum: textbook bodies, the paper's apparatus, and water."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

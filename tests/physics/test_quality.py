@@ -1,7 +1,5 @@
 """Eqs. 12, 13, 15 and 17 at the paper's numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

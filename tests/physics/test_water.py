@@ -1,7 +1,5 @@
 """Viscosity and density of water against published tables."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pendpipe.physics import viscous_quality_factor, water_density, water_viscosity

@@ -1,7 +1,5 @@
 """The example campaign of the figures' tests, with its page rendered once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

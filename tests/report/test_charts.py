@@ -1,7 +1,5 @@
 """Waveforms: what is packed is what was recorded, and the band invents no beats."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The page is whole, safe, self-contained, and holds every record."""
 
-from __future__ import annotations
-
 import base64
 import copy
 import hashlib

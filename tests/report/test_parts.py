@@ -1,7 +1,5 @@
 """The parts of the page: the traffic light, names of files, SVG inside HTML, remarks."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

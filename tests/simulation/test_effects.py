@@ -1,7 +1,5 @@
 """Simulated recordings with effects: each can be switched on, and what is wrong is refused."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -4,8 +4,6 @@ It needs root, Debian's slurm-wlm and munge, and the extra `slurm` of pendpipe. 
 default; ``PENDPIPE_SLURM_RECORDS=100 pytest tests/slurm`` is the evidence of docs/scale.md.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import re

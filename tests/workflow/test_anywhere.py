@@ -1,7 +1,5 @@
 """The workflow runs in any folder: begun by `init`, run by `campaign`, or used as a module."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """A small campaign runs end to end, finds what was hidden in it, and reruns only what it must."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """A job does a stage for a chunk of records: what is done stays done, whatever happens."""
 
-from __future__ import annotations
-
 import json
 import os
 import random

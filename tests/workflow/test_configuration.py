@@ -1,7 +1,5 @@
 """The configuration refuses what it does not know, and says what was meant."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """`pendpipe doctor` names what is wrong with results, and changes nothing."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

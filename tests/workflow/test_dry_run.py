@@ -1,7 +1,5 @@
 """`snakemake -n` on a clean checkout: no port, no recordings, the campaign's jobs counted."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Where nothing can be written, each command says so in one line and ends with status 2."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

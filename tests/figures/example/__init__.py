@@ -4,8 +4,6 @@ The figures and the page read what other stages have written; their tests must n
 those stages, and must know the truth. Pendulums come from ``config/config.yaml``.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """The example's comparison.json, as the stage `compare` would have written it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The pendulums of ``config/config.yaml``, from the paper's equations: the example's truth."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
