@@ -1,47 +1,38 @@
 """Whether the tests notice when the library is wrong: mutations drawn from a commit's hash.
 
     pip install "pendpipe[mutations]"
-    python -m benchmarks.mutations [--count 30] [--commit HEAD] [--workers 2] [--near]
+    python -m benchmarks.mutations [--number 30] [--commit HEAD] [--place DIR] [--all]
 
-cosmic-ray lists all mutations of `src/pendpipe`; of these some are drawn, the same whenever they
-are drawn. Each is tried in a clone of its own: first by the tests that import the module and by
-those of its folder, then (unless ``--near``) by the whole suite. A test counts that fails with the
-mutation and passes without; a run that takes ten minutes counts as noticed. A mutation
-that leaves the syntax tree as it is but for annotations and texts changes no result: it is listed
-and replaced by the next, as are those of `equivalent_mutations.tsv`, each with its reason. The
-journal lies in ``.evidence/mutations``, so that a run can be broken off.
+Of all mutations of `src/pendpipe` that cosmic-ray lists some are drawn, for one commit always the
+same. Each is tried in a clone, by one test file after the other until a test fails with the
+mutation and passes without: first the files that import the module, then those of its folder, and
+with ``--all`` every other one. A mutation that leaves the syntax tree as it is but for annotations
+and texts changes no result: the next one replaces it, as it replaces those of
+``equivalent_mutations.tsv``, which stand there with the reason. A broken run goes on where it was.
 """
 
 from __future__ import annotations
 
-import argparse
 import ast
-import json
+import difflib
 import os
 import random
 import re
+import resource
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
-from queue import Queue
 from typing import Final, NamedTuple
 
-from benchmarks.house import ROOT, git
+from benchmarks.house import git
+from benchmarks.journal import KEPT, ROOT, answers, judge_parser
 
-PLACE: Final = ROOT / ".evidence" / "mutations"
-EQUIVALENT: Final = Path(__file__).parent / "equivalent_mutations.tsv"
-NEAR_S, ALL_S = 600.0, 1800.0
-CONFIGURATION: Final = """[cosmic-ray]
-module-path = "src/pendpipe"
-timeout = 1000.0
-excluded-modules = []
-test-command = "pytest"
-[cosmic-ray.distributor]
-name = "local"
-"""
+EQUIVALENT: Final = Path(__file__).with_name("equivalent_mutations.tsv")
+CPU_S, CLOCK_S = 600, 3600.0
+"""What a test file may take; more counts as noticed."""
 FOLDERS: Final = {"commands": "cli", "stages": "workflow", "configuration": "workflow"}
 """Tests of a folder whose name is another one."""
 
@@ -51,58 +42,43 @@ class Mutation(NamedTuple):
 
     path: str
     operator: str
-    arguments: str
     occurrence: int
     line: int
 
     def __str__(self) -> str:
-        operator = self.operator.rpartition("/")[2]
-        return f"{self.path}:{self.line} {operator} {self.occurrence}"
+        return f"{self.path}:{self.line} {self.operator.rpartition('/')[2]} {self.occurrence}"
 
-    def applied(self, tree: Path) -> str:
-        """The module's text with the change."""
+    def applied(self, tree: Path) -> tuple[str, str]:
+        """The module's text without and with the change."""
         from cosmic_ray.mutating import mutate_code
         from cosmic_ray.plugins import get_operator
 
-        operator = get_operator(self.operator)(**json.loads(self.arguments))
-        found = mutate_code((tree / self.path).read_text("utf-8"), operator, self.occurrence)
-        return str(found)
+        source = (tree / self.path).read_text("utf-8")
+        return source, str(mutate_code(source, get_operator(self.operator)(), self.occurrence))
+
+    def difference(self, tree: Path) -> str:
+        """The lines that it changes."""
+        texts = (text.splitlines() for text in self.applied(tree))
+        lines = list(difflib.unified_diff(*texts, lineterm="", n=0))[3:]
+        return " ".join(f"`{line[0]} {line[1:].strip()}`" for line in lines).replace("|", "\\|")
 
 
-def changed_line(tree: Path, mutation: Mutation) -> str:
-    """The first line that a mutation changes, before and after."""
-    pairs = zip(
-        (tree / mutation.path).read_text("utf-8").splitlines(),
-        mutation.applied(tree).splitlines(),
-        strict=False,
-    )
-    before, after = next(((old, new) for old, new in pairs if old != new), ("", ""))
-    return f"`{before.strip()}` → `{after.strip()}`".replace("|", "\\|")
-
-
-def listed(tree: Path, session: Path) -> list[Mutation]:
+def listed(tree: Path) -> list[Mutation]:
     """All that the tool knows of a tree, in order."""
-    from cosmic_ray.work_db import WorkDB, use_db
+    from cosmic_ray.ast import ast_nodes, get_ast_from_path
+    from cosmic_ray.plugins import get_operator, operator_names
 
-    if not session.exists():
-        configuration = session.with_suffix(".toml")
-        configuration.write_text(CONFIGURATION, encoding="utf-8")
-        words = [sys.executable, "-m", "cosmic_ray.cli", "init"]
-        made = session.with_suffix(".new")
-        subprocess.run([*words, str(configuration), str(made)], cwd=tree, check=True)
-        made.replace(session)
-    with use_db(session, WorkDB.Mode.open) as database:
-        specs = [spec for item in database.work_items for spec in item.mutations]
-    return sorted(
-        Mutation(
-            Path(spec.module_path).as_posix(),
-            spec.operator_name,
-            json.dumps(spec.operator_args),
-            spec.occurrence,
-            spec.start_pos[0],
+    kinds = {name: get_operator(name) for name in sorted(operator_names())}
+    operators = {name: kind() for name, kind in kinds.items() if not kind.arguments()}
+    return [
+        Mutation(path.relative_to(tree).as_posix(), name, number, at[0])
+        for path in sorted((tree / "src/pendpipe").rglob("*.py"))
+        for nodes in [list(ast_nodes(get_ast_from_path(path)))]
+        for name, operator in operators.items()
+        for number, (at, _) in enumerate(
+            place for node in nodes for place in operator.mutation_positions(node)
         )
-        for spec in specs
-    )
+    ]
 
 
 def meaning(source: str) -> str:
@@ -117,32 +93,49 @@ def meaning(source: str) -> str:
     return ast.dump(tree)
 
 
-def clone(commit: str, name: str) -> Path:
-    """A tree of a commit for one worker, as it was committed."""
-    tree = PLACE / name / "pendpipe"
+def drawn(tree: Path, every: list[Mutation], commit: str) -> Iterator[tuple[Mutation, str]]:
+    """The mutations in the commit's order, each with why it changes no result, or nothing."""
+    lines = EQUIVALENT.read_text("utf-8").splitlines() if EQUIVALENT.exists() else []
+    reasons = dict(line.split("\t", 1) for line in lines if "\t" in line)
+    for mutation in random.Random(commit).sample(every, len(every)):
+        source, changed = mutation.applied(tree)
+        try:
+            same = meaning(source) == meaning(changed)
+        except SyntaxError:
+            continue
+        why = "the syntax tree is the same but for annotations and texts" if same else ""
+        yield mutation, reasons.get(str(mutation), why)
+
+
+def clone(commit: str, place: Path) -> Path:
+    """A tree of a commit, as it was committed; recordings of others beside it."""
+    tree, shared = place / "pendpipe", ROOT.parent / "shared"
     if not tree.exists():
+        place.mkdir(parents=True, exist_ok=True)
         git("clone", "--quiet", "--shared", str(ROOT), str(tree))
-        shared = ROOT.parent / "shared"
         if shared.exists():
-            (tree.parent / "shared").symlink_to(shared.resolve())
+            (place / "shared").symlink_to(shared.resolve())
     git("-C", str(tree), "checkout", "--quiet", "--force", commit)
     return tree
 
 
-def near(tree: Path, path: str) -> list[str]:
-    """Test files that import a module, and the folder of tests that bears its folder's name."""
+def test_files(tree: Path, path: str, *, every: bool) -> Iterator[str]:
+    """Test files that import a module, those of the folder of its name, and (if asked) the rest."""
     parts = Path(path).with_suffix("").parts[1:]
     module, home = ".".join(parts).removesuffix(".__init__"), parts[1]
     parent, _, name = module.rpartition(".")
     wanted = re.compile(rf"\b{re.escape(module)}\b|from {re.escape(parent)} import .*\b{name}\b")
-    tests = sorted((tree / "tests").rglob("test_*.py"))
-    found = [p.relative_to(tree).as_posix() for p in tests if wanted.search(p.read_text("utf-8"))]
-    folder = f"tests/{FOLDERS.get(home, home if len(parts) > 2 else 'core')}"
-    return [*found, folder] if (tree / folder).is_dir() else [*found, "tests/core"]
+    folder = tree / "tests" / FOLDERS.get(home, home if len(parts) > 2 else "core")
+    order = {}
+    for file in sorted((tree / "tests").rglob("test_*.py")):
+        order[file] = 2 - (folder in file.parents) - 2 * bool(wanted.search(file.read_text()))
+    for file in sorted(order, key=lambda each: order[each]):
+        if every or order[file] < 2:
+            yield file.relative_to(tree).as_posix()
 
 
-def run_tests(tree: Path, words: list[str], seconds: float) -> tuple[int, str]:
-    """Run pytest in a tree; status -1 where it ran out of its time, with all it started."""
+def run_tests(tree: Path, words: list[str]) -> tuple[int, str]:
+    """Status and output of pytest in a tree; it is ended where it exceeds its time."""
     paths = os.pathsep.join([f"{tree / 'src'}", f"{tree / 'challenge/src'}", str(tree)])
     call = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "--tb=no"]
     with subprocess.Popen(
@@ -155,100 +148,75 @@ def run_tests(tree: Path, words: list[str], seconds: float) -> tuple[int, str]:
         text=True,
         start_new_session=True,
     ) as process:
+        resource.prlimit(process.pid, resource.RLIMIT_CPU, (CPU_S, CPU_S))
         try:
-            output, _ = process.communicate(timeout=seconds)
+            output, _ = process.communicate(timeout=CLOCK_S)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
             return -1, ""
     return process.returncode, output
 
 
-def caught(tree: Path, mutation: Mutation, words: list[str], seconds: float) -> str:
+def caught(key: tuple[str, str, Mutation], tree: Path) -> str:
     """The test that notices a mutation, or nothing."""
-    path, excused = tree / mutation.path, list[str]()
-    source, changed = path.read_text("utf-8"), mutation.applied(tree)
-    while True:
-        path.write_text(changed, encoding="utf-8")
-        try:
-            status, output = run_tests(tree, [*words, *excused], seconds)
-        finally:
-            path.write_text(source, encoding="utf-8")
-        if status in (0, 5):
-            return ""
-        names = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", output, re.M)[:1]
-        if not names or run_tests(tree, names, seconds)[0] == 0:
-            return names[0] if names else "the time it takes" if status < 0 else "pytest's end"
-        # It fails without the mutation as well.
-        excused.append(f"--deselect={names[0]}")
-
-
-def drawn(tree: Path, every: list[Mutation], commit: str) -> Iterator[tuple[Mutation, str]]:
-    """The mutations in the commit's order, each with why it changes no result, or nothing."""
-    lines = EQUIVALENT.read_text("utf-8").splitlines() if EQUIVALENT.exists() else []
-    reasons = dict(line.split("\t", 1) for line in lines if "\t" in line)
-    order = random.Random(commit).sample(every, len(every))
-    for mutation in order:
-        source, changed = (tree / mutation.path).read_text("utf-8"), mutation.applied(tree)
-        try:
-            same = meaning(source) == meaning(changed)
-        except SyntaxError:
-            continue
-        why = "the syntax tree is the same but for annotations and texts" if same else ""
-        yield mutation, reasons.get(str(mutation), why)
+    _, tests, mutation = key
+    path, (source, changed) = tree / mutation.path, mutation.applied(tree)
+    for file in test_files(tree, mutation.path, every=tests == "all"):
+        excused: list[str] = []
+        while True:
+            path.write_text(changed, encoding="utf-8")
+            try:
+                status, output = run_tests(tree, [file, *excused])
+            finally:
+                path.write_text(source, encoding="utf-8")
+            if status in (0, 5):
+                break
+            if status < 0:
+                return f"the time of {file}"
+            names = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", output, re.M)[:1]
+            if run_tests(tree, names or [file])[0] == 0:
+                return names[0] if names else f"pytest's end in {file}"
+            # It fails without the mutation as well.
+            if not names or names[0] == file:
+                break
+            excused.append(f"--deselect={names[0]}")
+    return ""
 
 
 def main() -> None:
     """Draw, try what the journal does not hold, print the table."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser = judge_parser(__doc__, "mutations", 30)
     parser.add_argument("--commit", default="HEAD", help="whose library is mutated (%(default)s)")
-    parser.add_argument("--count", type=int, default=30, help="how many (%(default)s)")
-    parser.add_argument("--workers", type=int, default=2, help="clones at work (%(default)s)")
-    parser.add_argument("--near", action="store_true", help="without the whole suite")
+    parser.add_argument("--place", type=Path, default=KEPT / "mutations", help="of the clone")
+    parser.add_argument("--all", action="store_true", help="try survivors by every other test")
     arguments = parser.parse_args()
+    arguments.processes = 1
     # A shell's background ignores Ctrl-C, and a test that interrupts a recording would hang.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     commit = git("rev-parse", arguments.commit).decode().strip()
-    PLACE.mkdir(parents=True, exist_ok=True)
-    trees: Queue[Path] = Queue()
-    for number in range(arguments.workers):
-        trees.put(clone(commit, f"worker-{number}"))
-    first, journal = trees.queue[0], PLACE / f"{commit}.jsonl"
-    every = listed(first, PLACE / f"{commit}.sqlite")
-    lines = journal.read_text("utf-8").splitlines() if journal.exists() else []
-    known: dict[str, str] = dict(map(json.loads, lines))
-    chosen: list[Mutation] = []
+    tree = clone(commit, arguments.place.resolve())
+    every = listed(tree)
     print(f"{len(every)} mutations of {commit[:12]}", flush=True)
-    for mutation, why in drawn(first, every, commit):
+    chosen: list[Mutation] = []
+    for mutation, why in drawn(tree, every, commit):
+        if len(chosen) == arguments.number:
+            break
         if why:
             print(f"{mutation}: changes no result: {why}; replaced", flush=True)
         else:
             chosen.append(mutation)
-        if len(chosen) == arguments.count:
-            break
-
-    def meets(mutation: Mutation, words: list[str] | None, stage: str) -> None:
-        key = f"{mutation} {stage}"
-        if key not in known:
-            tree = trees.get()
-            limit_s = ALL_S if words else NEAR_S
-            by = caught(tree, mutation, words or near(tree, mutation.path), limit_s)
-            trees.put(tree)
-            known[key] = by
-            with journal.open("a", encoding="utf-8") as stream:
-                stream.write(json.dumps([key, by]) + "\n")
-        print(f"{key}: {known[key] or 'not caught'}", flush=True)
-
-    with ThreadPoolExecutor(arguments.workers) as pool:
-        list(pool.map(lambda each: meets(each, None, "near"), chosen))
-    left = [each for each in chosen if not known[f"{each} near"]]
-    for mutation in [] if arguments.near else left:
-        meets(mutation, ["-n", str(arguments.workers), "--dist", "worksteal", "tests"], "all")
+    found: dict[Mutation, str] = {}
+    for tests in ("near", "all") if arguments.all else ("near",):
+        left = [(commit, tests, each) for each in chosen if not found.get(each)]
+        tried = answers(arguments, left, partial(caught, tree=tree), ())
+        for (*_, mutation), by in zip(left, tried, strict=True):
+            found[mutation] = by
+            print(f"{mutation} {tests}: {by or 'not caught'}", flush=True)
     print("\n| mutation | change | noticed by |\n|---|---|---|")
-    for mutation in chosen:
-        by = known[f"{mutation} near"] or known.get(f"{mutation} all", "")
-        print(f"| {mutation} | {changed_line(first, mutation)} | {by or '**nothing**'} |")
-    missed = sum(not (known[f"{m} near"] or known.get(f"{m} all")) for m in chosen)
-    print(f"\n{len(chosen) - missed} of {len(chosen)} caught at {commit[:12]}")
+    for mutation, by in found.items():
+        print(f"| {mutation} | {mutation.difference(tree)} | {by or '**nothing**'} |")
+    print(f"\n{sum(map(bool, found.values()))} of {len(found)} caught at {commit[:12]}")
 
 
 if __name__ == "__main__":
