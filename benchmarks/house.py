@@ -23,7 +23,7 @@ import tarfile
 import tempfile
 import tokenize
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 from statistics import median
@@ -33,7 +33,9 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-ROOT: Final = Path(__file__).parents[1]
+from benchmarks.journal import ROOT
+from benchmarks.table import head, table_row
+
 SAME_LINES, SAME_TOKENS = 6, 40
 STARTS: Final = 9
 USES: Final = ("*.py", "*.smk", "Snakefile", "*.html", "*.j2", "*.toml", "*.yaml", "run")
@@ -267,11 +269,6 @@ def copy_of(commit: str | None, folder: Path) -> Path:
     return folder / str(commit)
 
 
-def table_row(what: str, cells: Iterable[object]) -> str:
-    """A row of a Markdown table."""
-    return f"| {what} | {' | '.join(map(str, cells))} |"
-
-
 def main() -> None:
     """Print the tables; a commit's beside the working tree's."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -287,10 +284,10 @@ def main() -> None:
         prices = {name: costs(tree, tests=arguments.tests) for name, tree in trees.items()}
     parts = list(found["here"][0])
     heads = [f"{part}, {name}" for part in parts for name in trees]
-    print(table_row("", heads), table_row("---", ["---"] * len(heads)), sep="\n")
+    print(head("", *heads))
     for what in found["here"][0]["library"]:
         print(table_row(what, [found[n][0][part][what] for part in parts for n in trees]))
-    print("", table_row("", trees), table_row("---", ["---"] * len(trees)), sep="\n")
+    print("", head("", *trees), sep="\n")
     for what in prices["here"]:
         print(table_row(what, [prices[name][what] for name in trees]))
     if arguments.list:

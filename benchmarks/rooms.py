@@ -19,7 +19,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import Final
 
-from benchmarks.house import ROOT, copy_of, table_row
+from benchmarks.house import copy_of
+from benchmarks.journal import ROOT
+from benchmarks.table import head, table_row
 
 COMMANDS: Final = {"fit": ["--out", "fit.json"], "diagnose": ["--no-figures", "--out", "answer"]}
 TRACED: Final = """
@@ -62,8 +64,7 @@ def main() -> None:
     parser.add_argument("recording", type=Path, nargs="?", default=known)
     parser.add_argument("--commit", metavar="REF", help="a commit to set beside what is here")
     arguments = parser.parse_args()
-    heads = ["commit", "stays", "rooms", "returns"]
-    print(table_row("command", heads), table_row("---", ["---"] * len(heads)), sep="\n")
+    print(head("command", "commit", "stays", "rooms", "returns"))
     with tempfile.TemporaryDirectory() as folder:
         trees = {"here": copy_of(None, Path(folder))}
         if arguments.commit:

@@ -1,0 +1,193 @@
+"""What engine, fit, diagnosis and campaign cost in CPU time, as ratios where others do the same.
+
+    python -m benchmarks.speed [--rounds 15] [--campaign]
+
+The reference record: f 0.516 Hz, y0 0.068 rad, b 0.01192 1/s (half hysteretic, half viscous),
+a 0.45 1/(rad s), c 1.4e-6 rad/s, 32,768 readings over 300 s, noise 0.1 mrad. Contenders take turns,
+and the lower quartiles are compared, since others at work on the machine only add. The default
+campaign is planned, run and planned again where it is asked for.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from itertools import cycle, islice
+from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
+from typing import Final
+
+import numpy as np
+
+import pendpipe as pp
+from benchmarks.scale import ROOT, cost
+from benchmarks.table import head, table_row
+from pendpipe.arrays import FloatArray as Array
+from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian, turning_points
+
+OMEGA: Final = 2.0 * math.pi * 0.516
+MODEL: Final = Eq8(OMEGA, quadratic=0.45, hysteretic=0.00596, viscous=0.00596, coulomb=1.4e-6)
+SINE: Final = Eq8(OMEGA, 0.02, 0.00596, 0.00596, 1.4e-6, restoring="sine")
+START: Final = Release(0.0, 0.068)
+END_S, NOISE = 300.0, 1e-4
+SAMPLES: Final = np.linspace(0.0, END_S, 32768)
+MANY: Final = 200
+"""Decays of 2,048 readings that are fitted at once."""
+
+
+def solve_ivp_turning_points(count: int) -> Array:
+    """Turning points by scipy's DOP853 at rtol 1e-12, each half cycle ended by an event."""
+    from scipy.integrate import solve_ivp
+
+    omega, a, b_h, b_v, c = OMEGA, 0.45, 0.00596, 0.00596, 1.4e-6
+
+    def turn(_t: float, state: Array, _sign: float) -> float:
+        return float(state[1])
+
+    turn.terminal = True  # type: ignore[attr-defined]
+
+    def rates(_t: float, state: Array, sign: float) -> tuple[float, float]:
+        x, v = state
+        square = (omega * x) ** 2 + v * v
+        loss = 0.5 * math.pi * (omega * c + b_h * math.sqrt(square) + a / omega * square)
+        return v, -(omega**2) * x - loss * sign - 2.0 * b_v * v
+
+    at_s, angle, sign, found = 0.0, START.angle_rad, -1.0, [START.angle_rad]
+    while len(found) < count:
+        turn.direction = -sign  # type: ignore[attr-defined]
+        half = solve_ivp(
+            *(rates, (at_s, at_s + 2.0 * math.pi / omega), (angle, 0.0), "DOP853"),
+            rtol=1e-12,
+            atol=1e-18,
+            events=turn,
+            args=(sign,),
+        )
+        at_s, angle, sign = half.t_events[0][0], half.y_events[0][0][0], -sign
+        found.append(angle)
+    return np.array(found)
+
+
+def fit_of_peaks(values: Array) -> Array:
+    """a, b, c by find_peaks, told of the noise, and curve_fit of the paper's Eq. 14."""
+    from scipy.optimize import curve_fit
+    from scipy.signal import find_peaks
+
+    def eq_14(t: Array, y0: float, a: float, b: float, c: float) -> Array:
+        r = np.sqrt(complex(b * b - 4.0 * a * c))
+        p = (2.0 * a * y0 + b - r) / (2.0 * a * y0 + b + r) * np.exp(-r * t)
+        return np.real((b * (p - 1.0) + r * (p + 1.0)) / (2.0 * a * (1.0 - p)))
+
+    size = np.abs(values - np.median(values))
+    at, _ = find_peaks(size, prominence=5.0 * NOISE)
+    start = [size[at[0]], 0.4, 0.01, 1e-6]
+    return np.asarray(curve_fit(eq_14, SAMPLES[at] - SAMPLES[at[0]], size[at], start)[0][1:])
+
+
+def cpu_s(contenders: dict[str, Callable[[], object]], rounds: int) -> dict[str, float]:
+    """Lower quartile of the CPU time of each contender; each is called once before."""
+    times: dict[str, list[float]] = {name: [] for name in contenders}
+    for number in range(rounds + 1):
+        for name, run in contenders.items():
+            begun = time.process_time()
+            run()
+            times[name] += [time.process_time() - begun] * bool(number)
+    return {name: float(np.quantile(values, 0.25)) for name, values in times.items()}
+
+
+def decays(count: int) -> list[pp.Recording]:
+    """Decays of some 60 swings in 2,048 readings: frequency, loss and noise differ."""
+    random, time_s = np.random.default_rng(1), np.arange(2048) / 30.0
+    made = []
+    for _ in range(count):
+        size, loss, frequency = random.uniform((0.1, 0.005, 0.8), (0.2, 0.02, 0.9))
+        swing = size * np.exp(-loss * time_s) * np.cos(2.0 * np.pi * frequency * time_s)
+        noise = 3e-4 * random.standard_normal(len(time_s))
+        made.append(pp.Recording(time_s=time_s, angle_rad=swing + noise))
+    return made
+
+
+def many_s() -> float:
+    """CPU seconds a fit in `fit_many` of two processes, those of the processes too."""
+
+    def spent() -> float:
+        each = (getrusage(RUSAGE_SELF), getrusage(RUSAGE_CHILDREN))
+        return sum(used.ru_utime + used.ru_stime for used in each)
+
+    made, before = cycle(decays(60)), spent()
+    assert sum(1 for _ in pp.fit_many(islice(made, MANY), processes=2, progress=False)) == MANY
+    return (spent() - before) / MANY
+
+
+def rows(rounds: int) -> list[tuple[str, str, str, bool]]:
+    """What was measured, the figure, the bound, and whether it is kept."""
+    noise = NOISE * np.random.default_rng(0).standard_normal(len(SAMPLES))
+    values = sample(MODEL, START, SAMPLES) + noise
+    recording = pp.Recording(time_s=SAMPLES, angle_rad=values)
+    plain = decays(1)[0]
+    shaken = pp.Recording(
+        time_s=plain.time_s, angle_rad=plain.values + 0.001 * np.cos(7.0 * plain.time_s)
+    )
+    count = turning_points(MODEL, START, until_s=END_S).time_s.size
+    contenders: dict[str, Callable[[], object]] = {
+        "cos": lambda: np.cos(SAMPLES),
+        "turns": lambda: turning_points(MODEL, START, until_s=END_S),
+        "samples": lambda: sample(MODEL, START, SAMPLES),
+        "jacobian": lambda: sample_with_jacobian(MODEL, START, SAMPLES),
+        "sine": lambda: sample(SINE, Release(0.0, 1.0), SAMPLES),
+        "sine jacobian": lambda: sample_with_jacobian(SINE, Release(0.0, 1.0), SAMPLES),
+        "fit": lambda: pp.fit(recording),
+        "peaks": lambda: fit_of_peaks(values),
+        "one": lambda: pp.fit(plain),
+    }
+    t = cpu_s(contenders, rounds)
+    t |= cpu_s({"solve_ivp": lambda: solve_ivp_turning_points(count)}, 1)
+    t |= cpu_s({"null": lambda: pp.diagnose(plain), "line": lambda: pp.diagnose(shaken)}, 2)
+    found = (
+        (f"`solve_ivp` DOP853 over {count} turning points", t["solve_ivp"] / t["turns"], 1e4, 1),
+        ("32,768 samples over one `np.cos` of them", t["samples"] / t["cos"], 0.5, 0),
+        ("with 8 columns of derivatives", t["jacobian"] / t["cos"], 3.0, 0),
+        ("32,768 samples with sin x from 1 rad", t["sine"] / t["cos"], 3.0, 0),
+        ("with 8 columns of derivatives", t["sine jacobian"] / t["cos"], 3.0, 0),
+        ("`pp.fit` of 32,768 readings, ms", 1e3 * t["fit"], 5.0, 0),
+        ("over `find_peaks`, `curve_fit`", t["fit"] / t["peaks"], 1.0, 0),
+        ("`fit_many` in two processes over `fit`, a recording", many_s() / t["one"], 2.0, 0),
+        ("`pp.diagnose` where nothing is missing, 2,048 readings, s", t["null"], 1.0, 0),
+        ("`pp.diagnose` where a line is missing, s", t["line"], 3.0, 0),
+    )
+    return [
+        (what, f"{value:.3g}", f"at {'least' if least else 'most'} {bound:g}", kept)
+        for what, value, bound, least in found
+        for kept in [value >= bound if least else value <= bound]
+    ]
+
+
+def campaign() -> None:
+    """Print what the default campaign costs, run from nothing."""
+    with tempfile.TemporaryDirectory() as results:
+        for what, words in (("plan", ["-n"]), ("run", []), ("plan when done", ["-n"])):
+            where = ("--", "--nolock", "--config", f"results={results}")
+            spent = cost(ROOT, "--cores", "2", *words, *where)
+            print(
+                f"{what}: {spent.cpu_s:.1f} s of CPU, {spent.clock_s:.0f} s by the clock at load"
+                f" {os.getloadavg()[0]:.0f}, {spent.memory_mb:.0f} MB in the largest process"
+            )
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=15)
+    parser.add_argument("--campaign", action="store_true", help="the default campaign too")
+    arguments = parser.parse_args()
+    print(head("what", "measured", "bound", "kept"))
+    for what, *cells, kept in rows(arguments.rounds):
+        print(table_row(what, [*cells, "yes" if kept else "**no**"]))
+    if arguments.campaign:
+        campaign()
+
+
+if __name__ == "__main__":
+    main()
