@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -290,8 +291,6 @@ def fit(
     check(clock_ppm=clock_ppm, scale_percent=scale_percent)
     method = None if method == "auto" else method
     restoring = None if restoring == "auto" else restoring
-    from dataclasses import replace
-
     from pendpipe.analysis.fit import fit_recording, fit_turning_points
     from pendpipe.analysis.fit.by_amplitudes import fit_amplitudes
     from pendpipe.analysis.fit.by_points import as_angles
@@ -307,7 +306,7 @@ def fit(
         recording = read_turning_points(recording)
     if isinstance(recording, TurningPoints):
         found = fit_turning_points(recording, restoring=restoring, baseline=baseline, fixed=fixed)
-        return replace(found, name=name or "")
+        return replace(found, name=name or "", drawn_by=_figures_of_a_fit)
     recording = _source(recording, angle_rad)
     place, motion = name or _place(recording), _motion(recording, volts_per_radian)
     own = "" if isinstance(recording, Recording) else Path(recording).name
@@ -320,7 +319,7 @@ def fit(
             fixed=fixed,
             place=place,
         )
-        return replace(found, name=own)
+        return replace(found, name=own, drawn_by=_figures_of_a_fit)
     refuse_if(
         period is not None, "period", "the recording shows its own", "leave it out (--fix holds it)"
     )
@@ -348,7 +347,20 @@ def fit(
         cuts=(*(cut._asdict() for cut in points.cuts), *result.cuts),
         name=own,
         decay=decay,
+        drawn_by=_figures_of_a_fit,
     )
+
+
+def _figures_of_a_fit() -> Any:
+    from pendpipe.figures import decays
+
+    return decays
+
+
+def _figures_of_a_diagnosis() -> Any:
+    from pendpipe.figures import diagnosis
+
+    return diagnosis
 
 
 def _given_period(period: float | Estimate | None) -> Estimate | None:
@@ -440,7 +452,7 @@ def diagnose(
                 for number, each in enumerate(recording, 1)
             ]
             recording = dict(zip(distinct_names(files), recording, strict=True))
-        return diagnose_several(
+        joint = diagnose_several(
             [_motion(each, volts_per_radian) for each in recording.values()],
             list(recording),
             diagnose=diagnose_recording,
@@ -451,7 +463,8 @@ def diagnose(
             own=own,
             same_sensor=same_sensor,
         )
-    return diagnose_recording(
+        return replace(joint, drawn_by=_figures_of_a_diagnosis)
+    outcome = diagnose_recording(
         _motion(recording, volts_per_radian),
         baseline=baseline,
         fixed=fixed or {},
@@ -460,6 +473,7 @@ def diagnose(
         seed=seed,
         place=name or _place(recording),
     )
+    return replace(outcome, drawn_by=_figures_of_a_diagnosis)
 
 
 @documented

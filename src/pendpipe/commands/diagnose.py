@@ -10,6 +10,7 @@ its own (docs/several.md).
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any, Final
@@ -21,8 +22,8 @@ from pendpipe.diagnosis.result import FILE_NAME, Diagnosis, not_analysable
 from pendpipe.diagnosis.run import diagnose_decay, diagnose_recording
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.errors import DamagedError, InputError, refuse_if
-from pendpipe.figures import OF_EVERY_DIAGNOSIS, OF_SOME_DIAGNOSES
-from pendpipe.files import check_output, distinct_names, make_folder, write_json, write_whole
+from pendpipe.figures import OF_A_DIAGNOSIS
+from pendpipe.files import check_output, distinct_names, make_folder, write_json
 from pendpipe.manifest import check, job
 from pendpipe.options import FILES, OUTPUTS, Flags, flags
 from pendpipe.process import keep_memory
@@ -32,13 +33,6 @@ from pendpipe.stages.refusal import reason_of, within_results
 
 FOUND = 3
 """Exit status where ``--fail-on`` asks for it."""
-_EMPTY: Final = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 520 60">
-<desc>pendpipe</desc>
-<text x="260" y="34" text-anchor="middle" font-family="sans-serif" font-size="13" fill="#5F6670">\
-{}</text></svg>
-"""
-
-
 _OWN: Final[Flags] = {
     "--out": {"type": Path, "metavar": "DIR", "help": "write diagnosis.json and the figures there"}
     | OUTPUTS,
@@ -231,10 +225,11 @@ def _write(arguments: Arguments, outcome: Diagnosis) -> dict[str, Any]:
     )
     _remove_figures(arguments.out)
     if wanted:
+        from pendpipe.figures import diagnosis
+
         _print_progress("drawing")
-    content = outcome.save(arguments.out, figures=wanted)
-    _write_placeholders(arguments, "Not drawn: nothing is missing here.")
-    return content
+        outcome = replace(outcome, drawn_by=lambda: diagnosis)
+    return outcome.save(arguments.out, figures=wanted)
 
 
 def _remove_figures(folder: Path) -> None:
@@ -245,17 +240,7 @@ def _remove_figures(folder: Path) -> None:
 
 def _figures_in(folder: Path) -> list[Path]:
     """The places of all figures that a diagnosis may have."""
-    names = product((*OF_EVERY_DIAGNOSIS, *OF_SOME_DIAGNOSES), (".svg", ".png"))
-    return [folder / f"{name}{form}" for name, form in names]
-
-
-def _write_placeholders(arguments: Arguments, reason: str) -> None:
-    """Write one line instead of each figure that a workflow waits for and that was not drawn."""
-    of_a_record = arguments.record is not None and len(arguments.files) == 1
-    wanted = of_a_record and arguments.figures != "none"
-    paths = [arguments.out / f"{name}.svg" for name in OF_EVERY_DIAGNOSIS if wanted]
-    for path in (path for path in paths if not path.exists()):
-        write_whole(path, _EMPTY.format(reason))
+    return [folder / f"{name}{form}" for name, form in product(OF_A_DIAGNOSIS, (".svg", ".png"))]
 
 
 def _not_analysable(arguments: Arguments, reason: str, provenance: dict[str, Any]) -> int:
@@ -263,7 +248,6 @@ def _not_analysable(arguments: Arguments, reason: str, provenance: dict[str, Any
     content = not_analysable(arguments.baseline, reason, provenance)
     if arguments.out is not None:
         _remove_figures(arguments.out)
-        _write_placeholders(arguments, "Not drawn: this record can't be analysed.")
         write_json(arguments.out / FILE_NAME, content)
     if arguments.json:
         print_json(content)

@@ -413,7 +413,7 @@ def completion(arguments: Arguments) -> None:
     """
     import shtab
 
-    from pendpipe.cli import COMMANDS, STAGES, command_of
+    from pendpipe.commands.main import COMMANDS, STAGES, command_of
 
     parser = argparse.ArgumentParser(prog="pendpipe")
     commands = parser.add_subparsers()

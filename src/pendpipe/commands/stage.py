@@ -75,16 +75,12 @@ def _of_record(campaign: Campaign, stage: Stage, record: Record, configuration: 
 
 def _logged(log: Path, words: list[str]) -> int:
     """Run a command; what it prints goes to the log, the traceback of a fault too."""
+    from pendpipe.commands.main import main
+
     make_folder(log.parent)
     with log.open("w", encoding="utf-8") as out, redirect_stdout(out), redirect_stderr(out):
         try:
-            return _main(words)
+            return main(words)
         except Exception:
             traceback.print_exc()
             return 1
-
-
-def _main(words: list[str]) -> int:
-    from pendpipe.cli import main
-
-    return main(words)

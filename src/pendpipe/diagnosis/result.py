@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
@@ -301,6 +301,8 @@ class Diagnosis:
         The fits and readings behind it, for the figures.
     alone, recordings
         Of several recordings: each one's own diagnosis, and what is said of it.
+    drawn_by
+        Imports what draws it (`pendpipe.api`): a result knows no figures.
     restoring, drag_form
         The baseline's torque, and the form of drag that the readings prefer.
     """
@@ -329,6 +331,7 @@ class Diagnosis:
     search: Hypothesis | None = field(default=None, repr=False, compare=False)
     alone: tuple[Diagnosis, ...] = field(default=(), repr=False, compare=False)
     recordings: tuple[dict[str, Any], ...] = ()
+    drawn_by: Callable[[], Any] | None = field(default=None, repr=False, compare=False)
 
     @property
     def missing(self) -> tuple[FoundEffect, ...]:
@@ -421,10 +424,8 @@ class Diagnosis:
 
         target, whole = Path(folder), self
         with writing(force=force):
-            if figures and not self.alone:
-                from pendpipe.figures.diagnosis import draw_diagnosis
-
-                drawn = draw_diagnosis(self, target)
+            if figures and self.drawn_by and not self.alone:
+                drawn = self.drawn_by().draw_diagnosis(self, target)
                 whole = replace(self, figures=tuple(path.name for path in drawn))
             content = whole.to_dict()
             write_json(target / FILE_NAME, content)
@@ -437,9 +438,9 @@ class Diagnosis:
         -------
         matplotlib.figure.Figure
         """
-        from pendpipe.figures.diagnosis import draw_decay, shown
-
-        return draw_decay(shown(self))
+        assert self.drawn_by is not None
+        figure: Figure = self.drawn_by().plot(self)
+        return figure
 
 
 def not_analysable(

@@ -7,7 +7,8 @@ its name below, where it can be read without matplotlib.
 
 from typing import Final
 
-OF_EVERY_DIAGNOSIS: Final = ("residual_map", "residual_spectrum", "damping", "frequency")
-"""The figures that the diagnosis of every record has."""
-OF_SOME_DIAGNOSES: Final = ("decay", "curve")
-"""The figures that are drawn where they have something to show."""
+OF_A_DIAGNOSIS: Final = (
+    *("decay", "residual_map", "residual_spectrum"),
+    *("damping", "frequency", "curve"),
+)
+"""The figures of a diagnosis, each drawn where it has something to show."""

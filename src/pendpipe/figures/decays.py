@@ -41,6 +41,7 @@ from pendpipe.figures.style import (
     measured,
     plain_text,
     quantity_of,
+    save,
     stretch_of,
     styled,
     words,
@@ -227,6 +228,8 @@ def _residual(
     return Panel([level(0.0), points], {**about, "ylabel": f"Data − fit ({unit})"})
 
 
+write = save
+"""What `FitResult.save` writes its figure with."""
 MANY = 150
 """From this many points on they are drawn as pixels inside the SVG, to keep it small."""
 
@@ -420,8 +423,10 @@ def draw_fit(decay: Decay, recording: Recording) -> Figure:
     )
 
 
-def draw_readings(axes: Axes, decay: Decay, recording: Recording) -> Figure:
-    """Draw a decay with its fitted amplitude on axes that are handed in; return their figure."""
+def plot(decay: Decay, recording: Recording, axes: Axes | None = None) -> Figure:
+    """Draw a fit (`draw_fit`); on axes that are handed in the decay with its amplitude alone."""
+    if axes is None:
+        return draw_fit(decay, recording)
     shown = _readings(decay, recording, rasterized=False)
     for mark in shown.marks:
         mark(axes)

@@ -520,6 +520,11 @@ def draw_each(outcome: Diagnosis) -> Iterator[tuple[str, Figure]]:
             yield name, draw(content)
 
 
+def plot(outcome: Diagnosis) -> Figure:
+    """Draw the decay with both models, and what each of them leaves."""
+    return draw_decay(shown(outcome))
+
+
 def draw_diagnosis(outcome: Diagnosis, folder: Path) -> list[Path]:
     """Draw what there is to show into a folder.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -152,6 +152,8 @@ class FitResult:
     points, decay
         The turning points and the readings of the fitted decay; None where the fit was read
         from a file.
+    drawn_by
+        Imports what draws it (`pendpipe.api`): a result knows no figures.
     """
 
     method: Method
@@ -191,6 +193,7 @@ class FitResult:
     motion: tuple[Eq8, Release] | None = field(default=None, repr=False, compare=False)
     points: TurningPoints | None = field(default=None, repr=False, compare=False)
     decay: Recording | None = field(default=None, repr=False, compare=False)
+    drawn_by: Callable[[], Any] | None = field(default=None, repr=False, compare=False)
 
     def __getitem__(self, name: str) -> Estimate:
         """Return one number: a parameter, ``"Q"`` at the amplitude released, or ``"period"``.
@@ -297,12 +300,11 @@ class FitResult:
         matplotlib.figure.Figure
             It shows itself in a notebook; ``.show()`` opens a window, ``.savefig(path)`` writes.
         """
-        from pendpipe.figures.decays import Decay, draw_fit, draw_readings
-
         points, decay = self._readings("plot")
-        if ax is None:
-            return draw_fit(Decay("", points, self), decay)
-        return draw_readings(ax, Decay("", points, self), decay)
+        assert self.drawn_by is not None
+        drawer = self.drawn_by()
+        figure: Figure = drawer.plot(drawer.Decay("", points, self), decay, ax)
+        return figure
 
     def predict(self, time_s: ArrayLike) -> FloatArray:
         """Return the fitted motion at some times, in the unit of the amplitude, shape (n,).
@@ -383,11 +385,9 @@ class FitResult:
         target = Path(folder)
         with writing(force=force):
             write_json(target / "fit.json", self.to_dict())
-            if self.points is not None and self.decay is not None:
-                from pendpipe.figures.style import save
-
+            if self.points is not None and self.drawn_by is not None:
                 write_turning_points(target / "turning_points.csv", self.points)
-                save(self.plot(), target / "fit")
+                self.drawn_by().write(self.plot(), target / "fit")
         return target
 
     def value(self, name: str) -> float:
