@@ -11,7 +11,7 @@ import pytest
 from benchmarks.faulty_device import Fault, FaultyDevice
 
 import pendpipe.acquisition.recorder
-from pendpipe.acquisition.clock import SimulatedClock
+from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.acquisition.devices.simulated import Signal, SimulatedDevice
 from pendpipe.acquisition.line import Line
 from pendpipe.acquisition.recorder import record
@@ -20,7 +20,7 @@ from pendpipe.recording import Recording
 STEP_S = 0.001
 
 
-class SteppedClock(SimulatedClock):
+class SteppedClock(ScaledClock):
     """Stands still until somebody sleeps."""
 
     def __init__(self) -> None:

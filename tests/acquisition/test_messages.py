@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from serial import SerialException
 
-from pendpipe.acquisition.drivers import no_ports, without_port
+from pendpipe.acquisition.drivers import without_port
 from pendpipe.acquisition.line import Line, cannot_open
 from pendpipe.errors import InputError
 
@@ -53,34 +53,17 @@ def test_a_port_that_another_program_has_locked_is_busy(monkeypatch: pytest.Monk
 
     _, end = os.openpty()
     monkeypatch.setattr("serial.serialposix.fcntl.flock", locked)
-    with pytest.raises(InputError, match=r"busy; close the program that uses it \(lsof /dev"):
+    with pytest.raises(
+        InputError, match=r"busy; close the program .* \(lsof /dev"
+    ):
         Line(os.ttyname(end), 4800)
-
-
-@posix
-def test_on_linux_the_ports_own_group_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import grp
-
-    class Uucp:
-        gr_name = "uucp"
-
-    port = tmp_path / "ttyS0"
-    port.touch()
-    port.chmod(0o660)
-    monkeypatch.setattr(grp, "getgrgid", lambda _: Uucp())
-    fault = SerialException(errno.EACCES, "could not open port")
-    assert "-aG uucp $USER" in cannot_open(str(port), fault, "linux").remedy
-    assert "-aG dialout $USER" in cannot_open("/dev/no-such", fault, "linux").remedy
-    assert "/dev/cu.*" in cannot_open("/dev/no-such", fault, "darwin").remedy
 
 
 @pytest.mark.parametrize(
     ("original", "problem", "remedy"),
     [
         ("PermissionError(13, 'Access is denied.', None, 5)", "the port is busy", "WinDaq"),
-        ("PermissionError(13, 'Zugriff verweigert', None, 5)", "the port is busy", "only one may"),
+        ("PermissionError(13, 'Zugriff verweigert', None, 5)", "the port is busy", "terminal"),
         (
             "FileNotFoundError(2, 'The system cannot find the file specified.', None, 2)",
             "there is no such port",
@@ -102,7 +85,7 @@ def test_on_linux_the_ports_own_group_is_named(
 )
 def test_windows_says_it_in_the_text_alone(original: str, problem: str, remedy: str) -> None:
     fault = SerialException(f"could not open port 'COM3': {original}")
-    said = cannot_open("COM3", fault, "win32")
+    said = cannot_open("COM3", fault)
     assert problem in said.problem
     assert remedy in said.remedy
 
@@ -131,13 +114,3 @@ def test_a_device_without_a_driver_is_found_on_linux(tmp_path: Path) -> None:
     assert "DI-1110" in said[1]
     assert "hold its button" in said[1]
     assert without_port(tmp_path / "nowhere") == []
-
-
-@pytest.mark.parametrize(
-    ("platform", "words"),
-    [("linux", "lsusb -d 0683:"), ("win32", "Device Manager"), ("darwin", "CDC mode")],
-)
-def test_where_there_is_no_port_the_list_says_where_to_look(platform: str, words: str) -> None:
-    said = no_ports(platform)
-    assert words in said
-    assert "simulated:di2108" in said

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pendpipe.acquisition.clock import ScaledClock, SimulatedClock
+from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.devices.simulated import SimulatedDevice
 from pendpipe.acquisition.drivers import identify
@@ -148,7 +148,7 @@ def test_a_failing_signal_is_not_called_a_silent_device(monkeypatch: pytest.Monk
 
 
 def test_simulated_time_stands_still_while_held() -> None:
-    clock = SimulatedClock(1000.0)
+    clock = ScaledClock(1000.0)
     clock.hold()
     before = clock.now()
     ScaledClock().sleep(0.01)

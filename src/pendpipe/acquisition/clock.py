@@ -4,10 +4,12 @@ import time
 
 
 class ScaledClock:
-    """The host's monotonic clock, `scale` times as fast.
+    """The host's monotonic clock, `scale` times as fast, which can be stopped.
 
     Two clocks of one scale agree in rate and differ in their zero, as the clock of an
-    instrument and that of a computer do.
+    instrument and that of a computer do. A simulated line that is full stops the world: else the
+    data would come late, and the recorder would see a device slower than it is. Real lines do not
+    wait; there the recorder's clock goes on.
 
     Parameters
     ----------
@@ -20,34 +22,18 @@ class ScaledClock:
             raise ValueError(f"a clock's scale is positive, not {scale}")
         self.scale = scale
         self._origin_s = time.perf_counter()
+        self._held_at_s: float | None = None
 
     def now(self) -> float:
-        """Return the seconds of this clock since it was made."""
-        return (time.perf_counter() - self._origin_s) * self.scale
+        """Return the seconds of this clock since it was made, pauses left out."""
+        held_at_s = self._held_at_s
+        running_s = (time.perf_counter() - self._origin_s) * self.scale
+        return running_s if held_at_s is None else held_at_s
 
     def sleep(self, duration_s: float) -> None:
         """Wait `duration_s` seconds of this clock."""
         if duration_s > 0:
             time.sleep(duration_s / self.scale)
-
-
-class SimulatedClock(ScaledClock):
-    """The clock of a simulated device and its recorder, which can be stopped.
-
-    A simulated line that is full stops the world: else the data would come late, and the
-    recorder would see a device slower than it is. Real lines do not wait; there the
-    recorder's clock goes on.
-    """
-
-    def __init__(self, scale: float = 1.0) -> None:
-        super().__init__(scale)
-        self._held_at_s: float | None = None
-        self._held_s = 0.0
-
-    def now(self) -> float:
-        """Return the seconds of this clock since it was made, pauses left out."""
-        held_at_s = self._held_at_s
-        return super().now() - self._held_s if held_at_s is None else held_at_s
 
     def hold(self) -> None:
         """Stop the clock; stopping it again changes nothing."""
@@ -58,5 +44,5 @@ class SimulatedClock(ScaledClock):
         """Run on from where the clock stands."""
         if self._held_at_s is not None:
             # In this order a reader in another thread never sees time go back.
-            self._held_s = super().now() - self._held_at_s
+            self._origin_s = time.perf_counter() - self._held_at_s / self.scale
             self._held_at_s = None

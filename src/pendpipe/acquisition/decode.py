@@ -248,14 +248,15 @@ def _rows(
     for segment, begin_s in zip(segments, offsets_s(segments, rate_hz), strict=True):
         scans = segment.scans
         count = len(scans.counts)
-        most = max(_MOST_ROWS, count)
         if len(times) > 1:
             last_s = float(times[-1][-1])
             # Late stamps must not make time stand still.
             begin_s = max(begin_s, last_s + 1.0 / rate_hz)
             rows = max(0, math.ceil((begin_s - last_s) * rate_hz - 0.5) - 1)
-            gap = _numbers(1, rows, most)
-            put(last_s + gap / rate_hz, np.full(len(gap), np.nan), np.full(len(gap), MISSING, "u1"))
+            # A long break (the computer slept) gets its first and last row alone.
+            gap = np.arange(rows) if rows <= max(_MOST_ROWS, count) else np.array([0, rows - 1])
+            missing = np.full(len(gap), MISSING, "u1")
+            put(last_s + (gap + 1) / rate_hz, np.full(len(gap), np.nan), missing)
         lost = np.zeros(count, dtype=np.int64)
         for loss in scans.losses:
             # What came before the first scan was never one, unless its frame was damaged.
@@ -265,24 +266,15 @@ def _rows(
         doubt = scans.suspect.copy()
         for delay in segment.delays:
             doubt |= (number >= segment.made[delay.begin] - 1) & (number < segment.made[delay.end])
-        gaps = [_numbers(number[at] - lost[at], lost[at], most) for at in np.flatnonzero(lost)]
-        missing = np.concatenate([np.empty(0, dtype=np.int64), *gaps])
-        every = np.append(number, missing)
-        order = np.argsort(every, kind="stable")
-        values = np.append(scans.counts[:, column] * step, np.full(len(missing), np.nan))
-        quality = np.append(np.where(doubt, SUSPECT, GOOD), np.full(len(missing), MISSING))
-        put(begin_s + every[order] / rate_hz, values[order], quality[order].astype(np.uint8))
+        every = np.arange(number[-1] + 1)
+        values, quality = np.full(len(every), np.nan), np.full(len(every), MISSING, "u1")
+        values[number] = scans.counts[:, column] * step
+        quality[number] = np.where(doubt, SUSPECT, GOOD)
+        put(begin_s + every / rate_hz, values, quality)
     return np.concatenate(times), np.concatenate(readings), np.concatenate(qualities)
 
 
 _MOST_ROWS: Final = 1 << 20
-
-
-def _numbers(first: int, count: int, most: int) -> IntArray:
-    """Number the rows of a gap; a long one (the computer slept) gets its first and last alone."""
-    return first + (np.arange(count) if count <= most else np.array([0, count - 1]))
-
-
 SHORT: Final = ("the recording was cut short", "ended early")
 
 

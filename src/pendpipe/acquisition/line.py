@@ -10,7 +10,6 @@ another does not depend on the scale of a simulated clock.
 import errno
 import re
 import stat
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -174,38 +173,35 @@ class Line(AbstractContextManager["Line"]):
 _ARE_BUSY: Final = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)
 _FORBID: Final = (errno.EACCES, errno.EPERM)
 _WINDOWS: Final = re.compile(r"Error\(\d+, .*, None, (\d+)\)")
-_BUSY: Final = {
-    "linux": "close the program that uses it (lsof {port} names it; ModemManager tries new ports"
-    " for some seconds)",
-    "darwin": "close the program that uses it (lsof {port} names it)",
-    "win32": "close the program that uses it (WinDaq, a terminal); only one may",
-}
-_NO_DRIVER: Final = {
-    "linux": "unplug the device and plug it in again; dmesg shows what became of it",
-    "darwin": "unplug the device and plug it in again, and give its /dev/cu.* name",
-    "win32": "unplug the device and plug it in again; if its entry in the Device Manager bears a"
-    " warning, install its driver",
-}
+_BUSY: Final = (
+    "close the program that uses it: WinDaq, a terminal (lsof {port} names it; ModemManager tries"
+    " new ports for some seconds)"
+)
+_NO_DRIVER: Final = (
+    "unplug the device and plug it in again; dmesg, or the Device Manager, shows what became of it"
+)
+_FORBIDDEN: Final = (
+    "join its group, which ls -l {port} shows (sudo usermod -aG dialout $USER), log out and in"
+    " again; on macOS give the /dev/cu.* name"
+)
 
 
-def cannot_open(port: str, fault: Exception, platform: str = sys.platform) -> InputError:
+def cannot_open(port: str, fault: Exception) -> InputError:
     """Turn pyserial's fault into where, what and what to do."""
     text = " ".join(str(fault).split())[:160]
     number = getattr(fault, "errno", None)
     found = _WINDOWS.search(text)
     windows = int(found[1]) if found else None
-    no_device = _NO_DRIVER.get(platform, _NO_DRIVER["darwin"])
-    busy = _BUSY.get(platform, _BUSY["darwin"]).format(port=port)
     no_setting = "check that it is the instrument's port; if so, install its driver anew"
     cases = (
         (number == errno.ENOENT or windows in (2, 3), "there is no such port", _LIST),
         # Windows lets one program at a time have a port, and calls that a denied access.
-        (number in _ARE_BUSY or windows in (5, 32), "the port is busy", busy),
-        (number in _FORBID, "you may not open the port", _permission(port, platform)),
+        (number in _ARE_BUSY or windows in (5, 32), "the port is busy", _BUSY.format(port=port)),
+        (number in _FORBID, "you may not open the port", _FORBIDDEN.format(port=port)),
         (
             number in (errno.ENXIO, errno.ENODEV, errno.EIO) or windows in (31, 121, 433, 995),
             "no working device is behind the port",
-            no_device,
+            _NO_DRIVER,
         ),
         (windows == 87, "the port's driver refuses the setting of the line", no_setting),
         ("refused" in text, "nothing listens there", "start the device, or correct the address"),
@@ -213,22 +209,3 @@ def cannot_open(port: str, fault: Exception, platform: str = sys.platform) -> In
         (True, f"the port can't be opened ({text})", _LIST),
     )
     return next(InputError(port, problem, remedy) for met, problem, remedy in cases if met)
-
-
-def _permission(port: str, platform: str) -> str:
-    """Say how to be let in."""
-    group = _group(port) or "dialout"
-    remedies = {
-        "linux": f"join its group (sudo usermod -aG {group} $USER), log out and in again",
-        "darwin": "give the /dev/cu.* name of the port; its owner must be you (ls -l)",
-    }
-    return remedies.get(platform, "ask the owner of the machine")
-
-
-def _group(port: str) -> str | None:
-    """The group that may use the port (dialout, uucp, ...), if it is a group of that kind."""
-    try:
-        mode, name = Path(port).stat().st_mode, Path(port).group()
-    except (NotImplementedError, OSError, KeyError):  # no groups on Windows
-        return None
-    return name if mode & stat.S_IWGRP and name != "root" else None

@@ -1,6 +1,6 @@
 """The bytes off the wire, kept as they came, with the time at which they came.
 
-A file (version 2) is one line of JSON that describes it, then frames::
+A file is one line of JSON that describes it, then frames::
 
     mark (4 bytes)  kind (1 byte)  length (u32)  stream (u16)  at_byte (u64)  time_s (f64)
     CRC-32 (u32)  content
@@ -13,8 +13,7 @@ by its mark, and what is missing between them is known to the byte. The event th
 recording is written twice.
 
 A file is only appended to; where it ends in the midst of a frame (power lost, process killed,
-disk full), what stands before is good. In version 1 frames have neither mark, stream nor
-at_byte and the description no check sum; it is read up to the first damage.
+disk full), what stands before is good.
 """
 
 import json
@@ -37,12 +36,9 @@ _BEGINNING: Final = b'{"format": "pendpipe-raw"'
 _LONGEST_HEADER: Final = 1 << 16
 _LONGEST_FRAME: Final = 1 << 22
 """What claims to be longer is damaged; no device sends as much in a second."""
-_LARGEST_HOLE: Final = 1 << 40
-"""No recording misses more bytes than that: a frame that claims so is not believed."""
 _MARK: Final = b"\xf5\x0aPp"
 _HEAD: Final = struct.Struct("<4scIHQd")
-_HEAD_1: Final = struct.Struct("<0scId")
-"""What stands before the check sum of a frame, in version 2 and in version 1."""
+"""What stands before the check sum of a frame."""
 _CHECK: Final = struct.Struct("<I")
 _SYNC_S: Final = 1.0
 COMPLETE: Final = ("scans", "time", "noise")
@@ -269,9 +265,9 @@ def read_raw(source: str | Path | bytes) -> RawRecording:
     holes: list[Hole] = []
     arrival: tuple[int, float] | None = None
     total = missing = starts = sound = 0
-    for size, frame in _frames(content, begin, _HEAD if header["version"] > 1 else _HEAD_1):
+    for size, frame in _frames(content, begin):
         hole = frame.at_byte - total - missing
-        if hole > _LARGEST_HOLE:
+        if hole > len(content):  # it can't miss more than its damaged frames held
             continue
         sound += size
         if frame.kind == b"D" and frame.stream > starts:
@@ -378,10 +374,10 @@ def _header(place: str, content: bytes) -> tuple[Mapping[str, Any], int]:
         )
         raise InputError(place, problem, "give another copy")
     refuse_if(
-        header.get("version") not in (1, 2),
+        header.get("version") != 2,
         place,
-        "it was made by a newer version",
-        "install a newer pendpipe",
+        "it was made by another version",
+        "decode it with that pendpipe",
     )
     return header, end + 1
 
@@ -391,10 +387,8 @@ def _description(line: bytes) -> dict[str, Any] | None:
     header = _json(line)
     if header is None or header.get("format") != _FORMAT:
         return None
-    check = header.pop("crc32", None)
     text, _, _ = line.rpartition(b', "crc32": "')
-    unchecked = check is None and header.get("version") == 1
-    return header if unchecked or check == f"{zlib.crc32(text):08x}" else None
+    return header if header.pop("crc32", None) == f"{zlib.crc32(text):08x}" else None
 
 
 def _json(body: bytes) -> dict[str, Any] | None:
@@ -406,21 +400,18 @@ def _json(body: bytes) -> dict[str, Any] | None:
     return content if isinstance(content, dict) else None
 
 
-def _frames(content: bytes, begin: int, form: struct.Struct = _HEAD) -> Iterator[tuple[int, Frame]]:
-    """Find the sound frames and how many bytes they take, whatever stands between them.
-
-    Those of version 1 have no mark by which the next one could be found behind a damaged one.
-    """
-    while 0 <= begin <= len(content) - form.size - _CHECK.size:
-        mark, kind, length, *place, time_s = form.unpack_from(content, begin)
-        start = begin + form.size + _CHECK.size
+def _frames(content: bytes, begin: int) -> Iterator[tuple[int, Frame]]:
+    """Find the sound frames and how many bytes they take, whatever stands between them."""
+    while 0 <= begin <= len(content) - _HEAD.size - _CHECK.size:
+        mark, kind, length, *place, time_s = _HEAD.unpack_from(content, begin)
+        start = begin + _HEAD.size + _CHECK.size
         body = content[start : start + min(length, _LONGEST_FRAME)]
-        known = zlib.crc32(content[begin + len(mark) : begin + form.size])
+        known = zlib.crc32(content[begin + len(mark) : begin + _HEAD.size])
         check = _CHECK.pack(zlib.crc32(body, known))
-        if len(body) == length and content.startswith(check, begin + form.size):
+        if len(body) == length and content.startswith(check, begin + _HEAD.size):
             # A damaged mark does no harm, but is noticed.
             unmarked = 0 if mark == _MARK else len(mark)
             yield start + length - begin - unmarked, Frame(kind, time_s, body, *place)
             begin = start + length
         else:
-            begin = content.find(_MARK, begin + 1) if mark else -1
+            begin = content.find(_MARK, begin + 1)

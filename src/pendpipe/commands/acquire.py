@@ -2,7 +2,7 @@
 
 pendpipe acquire --list
 pendpipe acquire --port /dev/ttyUSB0 --model di154rs --rate 60 --duration 300 --out decay.csv
-pendpipe acquire --device simulated:di2108 --rate 110 --duration 60 --view --out decay.csv
+pendpipe acquire --device simulated:di2108 --rate 110 --duration 60 --out decay.csv
 pendpipe acquire --recover decay.raw --out decay.csv
 pendpipe acquire --campaign config/config.yaml --record decay-1 --anew
 pendpipe acquire --serve di2108 --signal config/model.toml
@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import Any, Final
@@ -62,10 +62,6 @@ _OWN: Final[Flags] = {
         "action": "store_true",
         "help": "take what was kept when the line was lost for the recording",
     },
-    "--view": {
-        "action": "store_true",
-        "help": "show what is recorded on a page of this machine; its address is printed",
-    },
     "--signal": {
         "metavar": "TOML",
         "help": "with --serve: what it reads, as for pendpipe simulate",
@@ -94,12 +90,6 @@ def run(arguments: Arguments) -> None:
     if arguments.list:
         _list(arguments.port)
         return
-    refuse_if(
-        arguments.view and not (arguments.port or arguments.device),
-        "--view",
-        "nothing is recorded here that could be shown",
-        "give --port PORT or --device simulated:di2108",
-    )
     kinds = {"serve": _serve, "caliper": _caliper, "campaign": _stage}
     work = next((each for name, each in kinds.items() if getattr(arguments, name)), _record)
     with _signals_end_like_ctrl_c():
@@ -162,8 +152,7 @@ def _record(arguments: Arguments) -> None:
         )
     else:
         raw = Path(arguments.raw) if arguments.raw else attempts.new_path_beside(out)
-        with _view(arguments, raw):
-            _from_device(arguments, raw)
+        _from_device(arguments, raw)
         if not arguments.accept_short:
             (attempt,) = attempts.read_attempts([raw])
             remedy = "call again to record anew, or with --accept-short to take what is kept"
@@ -231,15 +220,6 @@ def _stage(arguments: Arguments) -> None:
     )
 
 
-def _view(arguments: Arguments, raw: Path) -> AbstractContextManager[None]:
-    """Show the recording meanwhile, where that is asked for."""
-    if not arguments.view:
-        return nullcontext()
-    from pendpipe.acquisition.view import shown
-
-    return shown(raw)
-
-
 def _from_device(arguments: Arguments, raw: Path) -> None:
     """Record into a raw file."""
     from pendpipe import api
@@ -302,7 +282,7 @@ def _list(port: str | None) -> None:
     """Print the ports; ask the device on one of them who it is."""
     from serial.tools.list_ports import comports
 
-    from pendpipe.acquisition.drivers import VENDOR, identify, no_ports, without_port
+    from pendpipe.acquisition.drivers import NO_PORTS, VENDOR, identify, without_port
 
     if port:
         identity = identify(port)
@@ -320,4 +300,4 @@ def _list(port: str | None) -> None:
                 shown = f"Dataq, {fault.problem}"
         lines.append(f"{entry.device}: {shown}")
     lines += without_port()
-    print("\n".join(lines or [no_ports()]))
+    print("\n".join(lines or [NO_PORTS]))

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Final, Self, TypeAlias
 
 import numpy as np
 
-from pendpipe.acquisition.clock import ScaledClock, SimulatedClock
+from pendpipe.acquisition.clock import ScaledClock
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import refuse_if
 
@@ -328,7 +328,7 @@ class SimulatedDevice:
         clock_scale: float = 1.0,
         link: str | Link | None = None,
         rate_error: float = 0.0,
-        clock: SimulatedClock | None = None,
+        clock: ScaledClock | None = None,
     ) -> None:
         refuse_if(
             kind not in DEVICES,
@@ -338,7 +338,7 @@ class SimulatedDevice:
         )
         self.kind = kind
         self.dialect = DEVICES[kind]()
-        self.clock = clock or SimulatedClock(clock_scale)
+        self.clock = clock or ScaledClock(clock_scale)
         self.failure: BaseException | None = None
         self._signal = signal
         self._rate_error = rate_error

@@ -2,7 +2,6 @@
 
 import importlib
 import pkgutil
-import sys
 from pathlib import Path
 from typing import Final
 
@@ -66,23 +65,22 @@ def identify(port: str) -> Identity:
 
 VENDOR: Final = 0x0683
 """The vendor's USB number."""
-_DI245: Final = 0x2450
-_OF_WINDAQ: Final = {
-    0x1100: "DI-1100",
-    0x1110: "DI-1110",
-    0x1120: "DI-1120",
-    0x2008: "DI-2008",
-    0x2108: "DI-2108",
-    0x2109: "DI-2108-P",
-    0x4108: "DI-4108",
-    0x4208: "DI-4208",
-    0x4718: "DI-4718B",
-}
-"""Product numbers in the mode for WinDaq (LibUSB)."""
 _CDC: Final = (
     "hold its button within 5 s of the green blinking until it is red: blinking yellow is the"
     " CDC mode, green the mode for WinDaq"
 )
+_UNBOUND: Final = "sudo modprobe cdc_acm, or unplug it and plug it in again"
+_WITHOUT: Final = {
+    number: (f"DI-{number}", f"it is in the mode for WinDaq; {_CDC}")
+    for number in ("1100", "1110", "1120", "2008", "2108", "2109", "4108", "4208", "4718")
+} | {
+    "2450": (
+        "DI-245",
+        "sudo modprobe ftdi_sio, then"
+        " echo 0683 2450 | sudo tee /sys/bus/usb-serial/drivers/ftdi_sio/new_id",
+    )
+}
+"""Name and remedy by product number: in the mode for WinDaq (2109 is the DI-2108-P), or unbound."""
 
 
 def without_port(devices: Path = Path("/sys/bus/usb/devices")) -> list[str]:
@@ -94,45 +92,22 @@ def without_port(devices: Path = Path("/sys/bus/usb/devices")) -> list[str]:
         Where the kernel lists USB devices; each is a folder with ``idVendor`` and
         ``idProduct``, its interfaces are folders in it, and a serial port is a ``tty`` there.
     """
-    numbers = {
-        device: (_number(device / "idVendor"), _number(device / "idProduct"))
+    products = [
+        (device / "idProduct").read_text(encoding="ascii").strip().lower()
         for device in sorted(devices.glob("*"))
         if not any(device.glob("*/tty*"))
-    }
+        if (given := device / "idVendor").is_file() and int(given.read_text(), 16) == VENDOR
+    ]
     return [
-        f"Dataq {_OF_WINDAQ.get(product, 'DI-245' if product == _DI245 else 'device')}"
-        f" (0683:{product:04x}) without a serial port: {_remedy(product)}"
-        for vendor, product in numbers.values()
-        if vendor == VENDOR and product is not None
+        f"Dataq {name} (0683:{product}) without a serial port: {remedy}"
+        for product in products
+        for name, remedy in (_WITHOUT.get(product, ("device", _UNBOUND)),)
     ]
 
 
-def no_ports(platform: str = sys.platform) -> str:
-    """Explain where to look when there is no port at all."""
-    try_this = "to try without one: --device simulated:di2108"
-    hints = {
-        "win32": "a device with a warning in the Device Manager lacks its driver (Dataq's page"
-        f" has it); a DI-1100 to DI-4718B must be in CDC mode: {_CDC}",
-        "darwin": f"a DI-1100 to DI-4718B needs no driver but must be in CDC mode: {_CDC};"
-        " a DI-245 needs a driver of FTDI's that knows 0683:2450",
-    }
-    hint = hints.get(platform, "lsusb -d 0683: shows whether a device is seen at all")
-    return f"no serial ports; {hint}; {try_this}"
-
-
-def _remedy(product: int) -> str:
-    if product == _DI245:
-        return (
-            "sudo modprobe ftdi_sio, then"
-            " echo 0683 2450 | sudo tee /sys/bus/usb-serial/drivers/ftdi_sio/new_id"
-        )
-    in_windaq = f"it is in the mode for WinDaq; {_CDC}"
-    unbound = "sudo modprobe cdc_acm, or unplug it and plug it in again"
-    return in_windaq if product in _OF_WINDAQ else unbound
-
-
-def _number(path: Path) -> int | None:
-    try:
-        return int(path.read_text(encoding="ascii").strip(), 16)
-    except (OSError, ValueError):
-        return None
+NO_PORTS: Final = (
+    "no serial ports; lsusb -d 0683:, or the Device Manager, shows whether a device is seen at all;"
+    f" a DI-1100 to DI-4718B must be in CDC mode: {_CDC}; to try without one:"
+    " --device simulated:di2108"
+)
+"""Where to look when there is no port at all."""
