@@ -53,9 +53,7 @@ def test_a_port_that_another_program_has_locked_is_busy(monkeypatch: pytest.Monk
 
     _, end = os.openpty()
     monkeypatch.setattr("serial.serialposix.fcntl.flock", locked)
-    with pytest.raises(
-        InputError, match=r"busy; close the program .* \(lsof /dev"
-    ):
+    with pytest.raises(InputError, match=r"busy; close the program .* \(lsof /dev"):
         Line(os.ttyname(end), 4800)
 
 

@@ -2,7 +2,7 @@
 
 pendpipe acquire --list
 pendpipe acquire --port /dev/ttyUSB0 --model di154rs --rate 60 --duration 300 --out decay.csv
-pendpipe acquire --device simulated:di2108 --rate 110 --duration 60 --out decay.csv
+pendpipe acquire --device simulated:di2108 --rate 110 --duration 60 --view --out decay.csv
 pendpipe acquire --recover decay.raw --out decay.csv
 pendpipe acquire --campaign config/config.yaml --record decay-1 --anew
 pendpipe acquire --serve di2108 --signal config/model.toml
@@ -62,6 +62,10 @@ _OWN: Final[Flags] = {
         "action": "store_true",
         "help": "take what was kept when the line was lost for the recording",
     },
+    "--view": {
+        "action": "store_true",
+        "help": "show what is recorded on a page of this machine; its address is printed",
+    },
     "--signal": {
         "metavar": "TOML",
         "help": "with --serve: what it reads, as for pendpipe simulate",
@@ -90,6 +94,12 @@ def run(arguments: Arguments) -> None:
     if arguments.list:
         _list(arguments.port)
         return
+    refuse_if(
+        arguments.view and not (arguments.port or arguments.device),
+        "--view",
+        "nothing is recorded here that could be shown",
+        "give --port PORT or --device simulated:di2108",
+    )
     kinds = {"serve": _serve, "caliper": _caliper, "campaign": _stage}
     work = next((each for name, each in kinds.items() if getattr(arguments, name)), _record)
     with _signals_end_like_ctrl_c():
@@ -152,7 +162,13 @@ def _record(arguments: Arguments) -> None:
         )
     else:
         raw = Path(arguments.raw) if arguments.raw else attempts.new_path_beside(out)
-        _from_device(arguments, raw)
+        if arguments.view:
+            from pendpipe.acquisition.view import shown
+
+            with shown(raw):
+                _from_device(arguments, raw)
+        else:
+            _from_device(arguments, raw)
         if not arguments.accept_short:
             (attempt,) = attempts.read_attempts([raw])
             remedy = "call again to record anew, or with --accept-short to take what is kept"

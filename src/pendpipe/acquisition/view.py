@@ -1,0 +1,132 @@
+"""A page that shows a recording while it is made: the last minute, the amplitude, the time left.
+
+It is a process of its own that opens nothing but the raw file, and that for reading: closed, slow,
+stopped or killed, it can't keep the recorder from anything. It ends with the recorder, whose
+end of a pipe then closes, however the recorder ended.
+"""
+
+import json
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition.raw import read_raw
+from pendpipe.arrays import FloatArray
+from pendpipe.errors import InputError
+from pendpipe.templates import render
+
+_LAST_S: Final = 60.0
+_COLUMNS: Final = 600
+"""Most extremes that the last minute is drawn by."""
+_STRETCHES: Final = 200
+_SHORTEST_STRETCH_S: Final = 5.0
+"""Amplitudes are half the range of a stretch: a 200th of the recording, and no less than that."""
+
+
+@contextmanager
+def shown(raw: Path) -> Iterator[None]:
+    """Show a recording that is being made; its page's address goes to standard error."""
+    viewer = subprocess.Popen(
+        [sys.executable, "-m", "pendpipe.acquisition.view", str(raw)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        start_new_session=True,  # Ctrl-C is the recorder's
+    )
+    try:
+        yield
+    finally:
+        with suppress(OSError, subprocess.TimeoutExpired):
+            viewer.communicate(timeout=2.0)
+        if viewer.poll() is None:  # stopped, or at a loss
+            viewer.kill()
+            viewer.wait()
+
+
+def state(path: Path) -> dict[str, Any]:
+    """Return what the page draws of a raw file so far: times in s, readings in V."""
+    try:
+        raw = read_raw(path)
+        recording = decode_recording(raw)
+    except InputError:
+        return {"scans": 0}
+    read = np.isfinite(recording.values)
+    time_s, volts = recording.time_s[read], recording.values[read]
+    duration_s = float(raw.header["duration_s"])
+    # Whole stretches alone: the last one is still growing.
+    stretch_s = max(_SHORTEST_STRETCH_S, duration_s / _STRETCHES)
+    number, first = np.unique(time_s // stretch_s, return_index=True)
+    extent = np.maximum.reduceat(volts, first) - np.minimum.reduceat(volts, first)
+    recent = time_s > time_s[-1] - _LAST_S
+    return {
+        "elapsed_s": float(raw.arrival_s[-1]),
+        "duration_s": duration_s,
+        "model": raw.header["model"],
+        "scans": len(time_s),
+        "lost": len(recording) - len(time_s),
+        "bytes": len(raw.data),
+        "reason": (raw.event("stopped") or raw.event("broken")).get("reason", ""),
+        "last": thinned(time_s[recent], volts[recent]),
+        "amplitude": np.stack([(number + 0.5) * stretch_s, 0.5 * extent], axis=1)[:-1].tolist(),
+    }
+
+
+def thinned(time_s: FloatArray, values: FloatArray) -> list[tuple[float, float]]:
+    """Return points that look like all: of many the least and the largest of a few each."""
+    each = -(-len(values) // _COLUMNS)
+    if each > 2:
+        starts = np.arange(0, len(values), each)
+        parts = zip(starts.tolist(), [*starts[1:].tolist(), len(values)], strict=True)
+        keep = [{a + int(values[a:b].argmin()), a + int(values[a:b].argmax())} for a, b in parts]
+        index = sorted(set[int]().union(*keep))
+        time_s, values = time_s[index], values[index]
+    return list(zip(time_s.tolist(), values.tolist(), strict=True))
+
+
+class _Handler(BaseHTTPRequestHandler):
+    raw: Path
+    page: bytes
+    lock = threading.Lock()
+
+    def do_GET(self) -> None:
+        """Answer a browser of this machine."""
+        host = self.headers.get("Host", "").rpartition(":")[0]
+        if host not in ("127.0.0.1", "localhost") or self.path not in ("/", "/data"):
+            self.send_error(404)
+            return
+        kind, content = "text/html; charset=utf-8", self.page
+        if self.path == "/data":
+            with self.lock:
+                kind, content = "application/json", json.dumps(state(self.raw)).encode()
+        self.send_response(200)
+        self.send_header("Content-Type", kind)
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+        self.wfile.write(content)
+
+    def log_message(self, *_: Any) -> None:
+        """Say nothing: the terminal is the recorder's."""
+
+
+def main(raw: str) -> None:
+    """Serve the page of a raw file until standard input ends."""
+    _Handler.raw = Path(raw)
+    _Handler.page = render("pendpipe.acquisition", "view.html", file=Path(raw).name).encode()
+    with ThreadingHTTPServer(("127.0.0.1", 0), _Handler) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        address = f"http://127.0.0.1:{server.server_address[1]}/"
+        print(f"pendpipe: the recording is shown at {address}", file=sys.stderr, flush=True)
+        sys.stdin.read()
+        server.shutdown()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
