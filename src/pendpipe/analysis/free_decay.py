@@ -564,7 +564,7 @@ def _beating(
     if not np.max(smooth - np.minimum.accumulate(smooth)) > 0.2 * np.max(smooth):
         return None
     start, stop = float(cycles.turn_time_s[first]), float(cycles.turn_time_s[last + 1])
-    from pendpipe.analysis.two_modes import two_modes
+    from pendpipe.effects.two_modes import two_modes
 
     inside = (time >= start) & (time <= stop)
     usual = float(np.median(half))
@@ -644,7 +644,7 @@ def _fall_of_all(time: FloatArray, values: FloatArray, middle: FloatArray) -> tu
 
     That of a straight line through the amplitudes of `_BLOCKS` parts, over the first.
     """
-    from pendpipe.analysis.two_modes import slow_amplitude
+    from pendpipe.effects.two_modes import slow_amplitude
 
     phase = np.pi * np.interp(time, middle, np.arange(len(middle)))
     parts = np.searchsorted(time, np.linspace(middle[0], middle[-1], _BLOCKS + 1))

@@ -13,7 +13,6 @@ from pendpipe.analysis.fit.result import Baseline, FitResult
 from pendpipe.analysis.torque import restoring_of
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
-from pendpipe.analysis.two_modes import two_modes
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data, gather
 from pendpipe.diagnosis.unwrapped import anchored
@@ -33,6 +32,8 @@ from pendpipe.effects.baseline import (
     pendulum_of,
     with_parts,
 )
+from pendpipe.effects.catalogue import CATALOGUE
+from pendpipe.effects.effect import Start
 from pendpipe.effects.model import Evaluated, Model
 from pendpipe.physics.decay import time_at
 
@@ -64,8 +65,8 @@ class Beginning:
         The turning points.
     fit
         What ``pendpipe fit`` prints of the same readings; None where it refuses.
-    second_mode
-        Start values of a second mode that beats with the first, behind the baseline's.
+    starts
+        What effects declare where the turning points beat.
     """
 
     data: Data
@@ -75,7 +76,7 @@ class Beginning:
     noise_rms: float
     points: TurningPoints
     fit: FitResult | None = None
-    second_mode: FloatArray | None = None
+    starts: tuple[Start, ...] = ()
 
 
 def begin(
@@ -100,12 +101,15 @@ def begin(
     if beats:
         torque = "linear"
     start = start_values(angles, held_rates, fixed, baseline, torque, samples=samples)
-    value, drag, second = start.value[: len(BASELINE)].copy(), None, None
+    value, drag = start.value[: len(BASELINE)].copy(), None
+    starts: tuple[Start, ...] = ()
     span = usable_span(samples, angles, start)
     if beats:
         # The turning points of a beat tell nothing of either mode.
         span = slice(None)
-        value, second = _modes_start(samples, value)
+        readings = samples.time_s, samples.values, 2.0 * math.pi / float(value[OMEGA])
+        starts = tuple(each for effect in CATALOGUE if (each := effect.start(*readings)))
+        value = _values_of(starts[0].law, starts[0].release, float(value[OFFSET]))
     elif fit is not None and fit.motion is not None and fit.light != "red":
         law, release = fit.motion
         drag, value = law.drag, _values_of(law, release, fit.value("offset"))
@@ -143,10 +147,10 @@ def begin(
     data, model, at = _before_the_stop(data, model, value)
     if not np.ptp(at.reading) < _FAR_BEYOND * np.ptp(data.values):
         raise NoMotionError("it would swing far beyond the readings")
-    if second is None:
+    if not starts:
         data = replace(data, anchor=anchored(data, at))
     held = _held(held_rates, fixed, parts, baseline)
-    return Beginning(data, model, value, held, data.noise_rms, points, fit, second)
+    return Beginning(data, model, value, held, data.noise_rms, points, fit, starts)
 
 
 def _values_of(law: Eq8, release: Release, offset: float) -> FloatArray:
@@ -155,22 +159,6 @@ def _values_of(law: Eq8, release: Release, offset: float) -> FloatArray:
     share = law.hysteretic / b if b > 0.0 else 0.5
     losses = law.quadratic, b, law.coulomb, share
     return np.array([*losses, law.angular_frequency, release.angle_rad, release.time_s, offset])
-
-
-def _modes_start(samples: Samples, value: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Start values of Eq. 8 for the stronger of two modes that beat, and of the other beside it."""
-    modes = two_modes(samples.time_s, samples.values, math.pi / float(value[OMEGA]))
-    assert modes is not None
-    own, other = modes
-    omega = 2.0 * math.pi * own.frequency.value
-    turn = (-own.phase_rad % (2.0 * math.pi)) / omega
-    start = value.copy()
-    start[[A, B, C, OMEGA]] = 0.0, own.loss.value, 0.0, omega
-    start[START] = own.amplitude.value * math.exp(-own.loss.value * turn)
-    start[TIME] = samples.time_s[0] + turn
-    size, phase = other.amplitude.value, other.phase_rad
-    sizes = size * math.cos(phase), -size * math.sin(phase)
-    return start, np.array([*sizes, other.frequency.value, 1.0 / other.loss.value])
 
 
 def _far_from_the_stop(data: Data, value: FloatArray) -> Data:

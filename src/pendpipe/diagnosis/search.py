@@ -33,7 +33,6 @@ from pendpipe.diagnosis.weighing import Weighed, likelier, weigh
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C
-from pendpipe.effects.catalogue.in_time import BEATING_MODE
 
 _MOST_EFFECTS: Final = 4
 LESS_FRICTION: Final = (1.0, 0.9, 0.7, 0.4)
@@ -126,20 +125,18 @@ def _starts(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
 
     Without its phase a model's chi^2 says less than the squares of what it leaves.
     """
-    second, before = state.beginning.second_mode, state.fit
-    if second is None or state.steps:
-        return
-    task.progress(f"the turning points beat: fitting {BEATING_MODE.name} first")
-    start = np.concatenate([state.beginning.value, second])
-    model, data, noise = before.model.adding(BEATING_MODE), state.data, state.noise
-    fit = fitted_from(model, data, noise, start, held=state.held)
-    if fit is None:
-        return
-    lead = Lead(BEATING_MODE, (), before.chi2 - fit.chi2, 0.0)
-    rival = Rival.of(lead, fit, before.chi2, Scale.of(fit, data, noise), NO_SCAN)
-    other = replace(state, fit=fit, steps=(Step((rival,), state.unexplained, before),))
-    squares = [np.sum((data.residual(f.at.reading) * data.weight) ** 2) for f in (before, fit)]
-    yield Neighbour(other, float(squares[0] - squares[1]), f"beginning with {rival.name}")
+    before, data, noise = state.fit, state.data, state.noise
+    for start in () if state.steps else state.beginning.starts:
+        task.progress(f"the turning points beat: fitting {start.effect.name} first")
+        value = np.concatenate([state.beginning.value, start.values])
+        fit = fitted_from(before.model.adding(start.effect), data, noise, value, held=state.held)
+        if fit is None:
+            continue
+        lead = Lead(start.effect, (), before.chi2 - fit.chi2, 0.0)
+        rival = Rival.of(lead, fit, before.chi2, Scale.of(fit, data, noise), NO_SCAN)
+        other = replace(state, fit=fit, steps=(Step((rival,), state.unexplained, before),))
+        squares = [np.sum((data.residual(f.at.reading) * data.weight) ** 2) for f in (before, fit)]
+        yield Neighbour(other, float(squares[0] - squares[1]), f"beginning with {rival.name}")
 
 
 def _additions(state: Hypothesis, task: Task, *, names_first: bool = False) -> Iterator[Neighbour]:

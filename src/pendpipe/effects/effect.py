@@ -3,6 +3,8 @@
 Behind it stands what the scans and the shapes of several effects have in common.
 """
 
+from __future__ import annotations
+
 import itertools
 import math
 import re
@@ -14,6 +16,7 @@ from typing import Any, ClassVar, Final, Literal, NamedTuple, TypeVar, cast
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Release
 from pendpipe.dynamics.any_law import Motion, Sampled
 from pendpipe.dynamics.eq8 import Eq8
 
@@ -90,6 +93,16 @@ class Pendulum(Eq8):
         if self.restoring == "sine":
             found = found + self.angular_frequency**2 * motion.angle - self.torque(motion.angle)
         return found
+
+
+class Start(NamedTuple):
+    """Where a fit with an effect begins that would not find it from the motion without it."""
+
+    effect: Effect
+    law: Eq8
+    release: Release
+    values: FloatArray
+    """Of the effect."""
 
 
 class Span(NamedTuple):
@@ -266,6 +279,10 @@ class Effect:
 
         `decay_time_s` is inf for a steady tone.
         """
+        return None
+
+    def start(self, time_s: FloatArray, values: FloatArray, period_s: float) -> Start | None:
+        """Return where a fit with it begins, if these readings beat and a fit would not find it."""
         return None
 
     def small(self, span: Span) -> float:

@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Eq8, Release
 from pendpipe.dynamics.any_law import Motion, Sampled
 from pendpipe.effects.effect import (
     INSTANT,
@@ -16,6 +17,7 @@ from pendpipe.effects.effect import (
     Pendulum,
     Relaxing,
     Span,
+    Start,
     Sudden,
     between,
     elapsed,
@@ -28,6 +30,23 @@ from pendpipe.effects.effect import (
     unusual_drift,
     without_template,
 )
+from pendpipe.effects.two_modes import two_modes
+
+
+def _beating(time_s: FloatArray, values: FloatArray, period_s: float) -> Start | None:
+    """Start at Eq. 8 for the stronger of two modes that beat, and at the other beside it."""
+    modes = two_modes(time_s, values, 0.5 * period_s)
+    if modes is None:
+        return None
+    own, other = modes
+    omega = 2.0 * math.pi * own.frequency.value
+    turn = (-own.phase_rad % (2.0 * math.pi)) / omega
+    largest = own.amplitude.value * math.exp(-own.loss.value * turn)
+    law = Eq8(omega, hysteretic=0.5 * own.loss.value, viscous=0.5 * own.loss.value)
+    size, phase = other.amplitude.value, other.phase_rad
+    sizes = size * math.cos(phase), -size * math.sin(phase)
+    found = np.array([*sizes, other.frequency.value, 1.0 / other.loss.value])
+    return Start(BEATING_MODE, law, Release(float(time_s[0] + turn), largest), found)
 
 
 def tone_at(cosine: float, sine: float, phase: FloatArray) -> FloatArray:
@@ -75,6 +94,7 @@ def plane_band_hz(span: Span) -> float:
     shapes=lambda span: rows(
         tried_frequencies(span, 1.5 / span.period_s), span.duration_s * np.array([0.02, 0.1, 0.5])
     ),
+    start=_beating,
 )
 def second_mode(
     sampled: Sampled, pendulum: Pendulum, cosine: float, sine: float, f_2: float, tau_2: float

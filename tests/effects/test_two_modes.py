@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pendpipe.analysis.free_decay import measure_recording
-from pendpipe.analysis.two_modes import two_modes
 from pendpipe.dynamics import Eq8, Release, sample
+from pendpipe.effects.two_modes import two_modes
 from pendpipe.recording import Recording
 
 TIME = np.arange(0.0, 80.0, 0.01)
