@@ -3,6 +3,8 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from pendpipe.arrays import FloatArray
 
 _SI_UNITS = ("rad", "m", "V", "s", "Hz", "kg")
@@ -30,8 +32,8 @@ def prefixed(largest: float, unit: str) -> tuple[float, str]:
 
 def axis_unit(values: FloatArray, unit: str) -> tuple[float, str]:
     """Factor and unit for the axis of some values (NaN does not count)."""
-    finite = [abs(float(value)) for value in values.ravel() if math.isfinite(value)]
-    return prefixed(max(finite, default=0.0), unit)
+    finite = np.isfinite(values)
+    return prefixed(float(np.max(np.abs(values), initial=0.0, where=finite)), unit)
 
 
 def compact(value: float, unit: str) -> str:
