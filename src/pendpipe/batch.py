@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import os
-from collections import deque
 from collections.abc import Iterable, Iterator, Sized
 from functools import partial
-from itertools import islice
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from pendpipe.errors import InputError, refuse_if
+from pendpipe.process import cores, in_order
 from pendpipe.recording import Recording
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
-
     from pendpipe.analysis.fit.result import FitResult
     from pendpipe.api import Source
-
-_AHEAD: Final = 4
-"""Recordings a process that are read before the first of their fits is taken."""
 
 
 def fit_many(
@@ -77,7 +70,7 @@ def _with_bar(
     silent = None if progress is None else not progress
     jobs = enumerate(recordings, start=1)
     with tqdm(total=total, unit=" fits", disable=silent) as bar:
-        for result in map(work, jobs) if number == 1 else _in_order(work, jobs, number):
+        for result in in_order(work, jobs, number):
             bar.update()
             yield result
 
@@ -91,26 +84,3 @@ def _fit(options: dict[str, Any], numbered: tuple[int, Source]) -> FitResult | I
         return fit(recording, name=name, **options)
     except InputError as error:
         return error
-
-
-def _in_order(work: Any, jobs: Iterator[Any], number: int) -> Iterator[Any]:
-    """Map over `jobs` with `number` processes; as many jobs as can be used are taken ahead."""
-    from concurrent.futures import ProcessPoolExecutor
-
-    with ProcessPoolExecutor(number) as pool:
-        waiting: deque[Future[Any]] = deque()
-        try:
-            waiting.extend(pool.submit(work, job) for job in islice(jobs, _AHEAD * number))
-            while waiting:
-                yield waiting.popleft().result()
-                waiting.extend(pool.submit(work, job) for job in islice(jobs, 1))
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
-
-
-def cores() -> int:
-    """How many cores this process may use: a cluster's job has fewer than its node."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # Windows, macOS
-        return os.cpu_count() or 1

@@ -1,8 +1,14 @@
-"""What our processes ask of the system: one thread, and memory that is kept."""
+"""Our processes: one thread each, memory that is kept, and how many do something side by side."""
 
 import os
 import sys
-from typing import Final
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from itertools import islice
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
 
 ONE_THREAD: Final = {
     "OMP_NUM_THREADS": "1",
@@ -42,3 +48,37 @@ def keep_memory() -> None:
     if mallopt is not None:
         mallopt(_MMAP_THRESHOLD, _KEPT)
         mallopt(_TRIM_THRESHOLD, _KEPT)
+
+
+_AHEAD: Final = 4
+"""Jobs a process that are taken before the first result is."""
+
+
+def cores() -> int:
+    """How many cores this process may use: a cluster's job has fewer than its node."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # Windows, macOS
+        return os.cpu_count() or 1
+
+
+def in_order(work: Callable[[Any], Any], jobs: Iterable[Any], number: int) -> Iterator[Any]:
+    """Map over `jobs`, `number` of them side by side; as many as can be used are taken ahead.
+
+    1 starts no process.
+    """
+    if number == 1:
+        yield from map(work, jobs)
+        return
+    from concurrent.futures import ProcessPoolExecutor
+
+    left = iter(jobs)
+    with ProcessPoolExecutor(number) as pool:
+        waiting: deque[Future[Any]] = deque()
+        try:
+            waiting.extend(pool.submit(work, job) for job in islice(left, _AHEAD * number))
+            while waiting:
+                yield waiting.popleft().result()
+                waiting.extend(pool.submit(work, job) for job in islice(left, 1))
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)

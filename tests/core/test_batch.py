@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import pendpipe as pp
-from pendpipe.batch import _AHEAD
+from pendpipe.process import _AHEAD
 
 
 def decay(number: int) -> pp.Recording:

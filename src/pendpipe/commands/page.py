@@ -4,14 +4,15 @@ The page is a single HTML file that needs no network. Several FILEs get a sheet 
 all that links to them.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from pendpipe.arguments import Arguments, read_motion, tell
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.options import FILES, OUTPUT, flags
+from pendpipe.process import cores, in_order
 
 ARGUMENTS: Final = (
     FILES
@@ -100,7 +101,9 @@ def _class(arguments: Arguments) -> int:
     folder = out.with_name(f"{out.stem}_pages")
     names = [f"{name}.html" for name in distinct_names(arguments.files)]
     fits, links = [], []
-    for name, sheet in zip(names, _sheets(arguments), strict=True):
+    number = min(cores(), len(arguments.files))
+    sheets = in_order(partial(_of_file, arguments), arguments.files, number)
+    for name, sheet in zip(names, sheets, strict=True):
         fits.append(sheet.fitted)
         links.append(f"{folder.name}/{name}" if sheet.page else None)
         for note in sheet.notes:
@@ -112,20 +115,3 @@ def _class(arguments: Arguments) -> int:
     made = sum(link is not None for link in links)
     tell(f"{out}: written, with {made} pages in {folder}")
     return 0 if made else 2
-
-
-def _sheets(arguments: Arguments) -> Iterator[Sheet]:
-    """Make the pages side by side, in the order of the files."""
-    from concurrent.futures import ProcessPoolExecutor
-
-    from pendpipe.batch import cores
-
-    if (number := cores()) == 1:
-        yield from (_of_file(arguments, file) for file in arguments.files)
-        return
-    with ProcessPoolExecutor(min(number, len(arguments.files))) as pool:
-        waiting = [pool.submit(_of_file, arguments, file) for file in arguments.files]
-        try:
-            yield from (each.result() for each in waiting)
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)

@@ -1,9 +1,8 @@
 """All the figures of a campaign, and which of them could not be drawn."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from operator import methodcaller
+from operator import call, methodcaller
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -48,6 +47,7 @@ from pendpipe.figures.style import (
     words,
 )
 from pendpipe.files import read_json
+from pendpipe.process import in_order
 from pendpipe.quantities import axis_unit, with_error
 from pendpipe.recording import read_plain
 
@@ -111,11 +111,7 @@ def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int 
         )
         for entry in comparison["records"]
     ]
-    if processes < 2:
-        parts = [task() for task in tasks]
-    else:
-        with ProcessPoolExecutor(processes) as pool:
-            parts = [draw.result() for draw in [pool.submit(task) for task in tasks]]
+    parts = list(in_order(call, tasks, max(processes, 1)))
     return Drawn(
         [path for part in parts for path in part.files],
         dict(reason for part in parts for reason in part.left_out.items()),
