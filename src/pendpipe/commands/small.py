@@ -110,21 +110,20 @@ def _lines(file: str, found: "Inspection") -> list[str]:
         "out": {
             "metavar": "OUT",
             "type": Path,
-            "help": "OUT.csv: the plain form (- writes it to standard output); OUT.wdh: WinDaq",
+            "help": "OUT.csv, the plain form; - writes it to standard output",
         }
         | OUTPUT
     }
 )
 def convert(arguments: Arguments) -> None:
-    """Write any supported recording in the plain CSV form, or as a WinDaq file (.wdh)."""
+    """Write any supported recording in the plain CSV form."""
     from pendpipe.formats import read
-    from pendpipe.formats.writing import check_name, write
+    from pendpipe.recording import check_name, write_plain
 
     check_name(arguments.out)
     recording = read(arguments.file, read_options(arguments))
     announce(arguments, recording)
-    for note in write(arguments.out, recording):
-        print(f"{arguments.out}: {note}", file=sys.stderr)
+    write_plain(arguments.out, recording)
     tell_written(arguments.out, f"{len(recording)} samples, {recording.quantity}")
 
 
