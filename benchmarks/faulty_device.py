@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal, Self
+from typing import Any, Final, Literal
 
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.devices.simulated import (
@@ -259,12 +259,9 @@ class FaultyDevice(SimulatedDevice):
         self._first_start_s: float | None = None
         self._until_s = 0.0  # the end of a stall or a silence
         self._condition = ""
-
-    def __enter__(self) -> Self:
         if self._path.stale:
             self.dialect.streaming = True
             self._begin()
-        return super().__enter__()
 
     def unplug(self) -> None:
         """End the device and its line."""

@@ -58,33 +58,6 @@ def test_a_recording_is_the_signal_to_half_a_step(
     assert error.max() <= 0.5 * step_volts(recording) * (1 + 1e-9) + 4 * math.pi * 1e-9
 
 
-@pytest.mark.parametrize(
-    ("kind", "bits", "rate_hz", "scale", "duration_s"),
-    [(*KINDS[0], 500.0, 300.0), (*KINDS[1], 500.0, 300.0), (*KINDS[1], 1.0, 3.0)],
-)
-def test_the_measured_rate_is_true(
-    kind: str, bits: int, rate_hz: float, scale: float, duration_s: float
-) -> None:
-    """Also of a device whose clock is wrong: by a quarter, far beyond the error."""
-    for error in (0.0, 0.25, -0.25) if scale > 1 else (0.25,):
-        recording = acquire_simulated(
-            kind, swing, rate_hz=110.0, duration_s=duration_s, clock_scale=scale, rate_error=error
-        )
-        measured, sd, nominal, used = (
-            recording.number(f"sample_rate{name}_hz")
-            for name in ("_measured", "_measured_sd", "_nominal", "")
-        )
-        assert measured is not None
-        assert sd is not None
-        assert nominal == pytest.approx(rate_hz, rel=1e-6)
-        assert sd < 0.03 * rate_hz
-        assert measured == pytest.approx(rate_hz * (1 + error), abs=6 * sd)
-        assert used == (measured if error else nominal)
-        # As long as was asked by the recorder's clock, and with as many scans as that needs.
-        assert recording.time_s[-1] > 0.9 * duration_s
-        assert len(recording) >= 0.99 * duration_s * rate_hz
-
-
 @pytest.mark.parametrize("kind", ["di154", "di2108"])
 def test_every_channel_gets_its_own_signal_and_decodes_again_alike(
     kind: str, tmp_path: Path
