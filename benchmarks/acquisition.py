@@ -1,6 +1,11 @@
 """What a recorder keeps: flipped bits, lost bytes, kills, full disks; nothing is lost in silence.
 
-``python -m benchmarks.acquisition [faults] [flips] [kill] [disk]`` prints the tables.
+    python -m benchmarks.acquisition [faults] [flips] [kill] [disk]
+
+prints the tables: one fault in each of 100,000 recordings of 24 scans of random codes (a protocol
+that can't mark it gives no decoder a sign), a flipped bit in each of 2,000 raw files, 200 recorders
+killed at random instants, and three disks that get full. Status 1 where something is lost in
+silence that the protocol marks, or a raw file does not open.
 """
 
 from __future__ import annotations
@@ -9,18 +14,19 @@ import os
 import random
 import resource
 import signal
-import sys
 import tempfile
 import time
 from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from benchmarks import journal
 from benchmarks.acquisition_live import flip, recorded_bytes, slow
 from benchmarks.faulty_device import Fault, FaultyPath
+from benchmarks.journal import answers, commit, judge_parser
+from benchmarks.table import head, table_row
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.drivers import DRIVERS, find_driver
@@ -30,9 +36,8 @@ from pendpipe.acquisition.recorder import acquire_simulated
 from pendpipe.errors import InputError
 from pendpipe.recording import Recording
 
-KILLS, FLIPS, FAULTS, SCANS = 200, 500, 100_000, 24
-JOURNAL = "acquisition-kills"
-"""The kills done so far: a run that is broken off goes on from there."""
+SCANS = 24
+SOURCES = ("pendpipe.acquisition.recorder", "benchmarks/acquisition*.py")
 KINDS = {
     "one byte lost": ("drop", 1),
     "two bytes lost": ("drop", 2),
@@ -70,46 +75,42 @@ def one_fault(random: np.random.Generator, model: str, label: str) -> tuple[bool
     return bool(scans.losses), SCANS - len(set(good) & true), sum(row not in true for row in good)
 
 
-def fault_table() -> str:
-    """Count, over all families of devices; what a protocol can't mark, no decoder sees."""
+def faults(told: Any) -> bool:
+    """Count over all families of devices."""
     random = np.random.default_rng(20261121)
     marked = {m: find_driver(m).scans_of is marked_scans for m in DRIVERS}
     cells = [(m, k) for m in DRIVERS for k in KINDS if not (marked[m] and "stop" in k)]
     tally = defaultdict(list)
     for model, label in cells:
-        found = [one_fault(random, model, label) for _ in range(-(-FAULTS // len(cells)))]
+        found = [one_fault(random, model, label) for _ in range(-(-told.faults // len(cells)))]
         tally[label, marked[model]] += found
-    lines = [
-        f"One fault in each of {FAULTS} recordings of {SCANS} scans of random codes.\n",
-        "| fault | family | faults | marked | scans lost, mean (most) | not marked, false scans |",
-        "|---" * 6 + "|",
-    ]
+    print(head("fault", "family", "faults", "marked, %", "scans lost, mean (most)", "silent, %"))
     for (label, mark), found in sorted(tally.items()):
         lost = [scans for seen, scans, _ in found if seen] or [0]
-        silent = sum(not seen and false > 0 for seen, _, false in found)
-        lines.append(
-            f"| {label} | {'frame mark' if mark else 'CDC words'} | {len(found)} |"
-            f" {sum(seen for seen, *_ in found) / len(found):.2%} |"
-            f" {np.mean(lost):.2f} ({max(lost)}) | {silent / len(found):.2%} |"
-        )
-    return "\n".join(lines)
+        shares = [100.0 * np.mean([seen for seen, *_ in found])]
+        shares += [100.0 * np.mean([not seen and false > 0 for seen, _, false in found])]
+        cost = f"{np.mean(lost):.2f} ({max(lost)})"
+        kind = "frame mark" if mark else "CDC words"
+        print(table_row(label, [kind, len(found), f"{shares[0]:.2f}", cost, f"{shares[1]:.2f}"]))
+    flagged = [false for found in tally.values() for seen, _, false in found if seen]
+    print(f"\n{sum(map(bool, flagged))} of {len(flagged)} flagged faults left a false scan beside")
+    return not any(flagged)
 
 
-def flip_table() -> str:
-    """One flipped bit at random places of raw files: the check sums see each."""
-    lines = [
-        "| device | flips | noticed | frames lost, most | scans lost, most | false samples |",
-        "|---" * 6 + "|",
-    ]
+def flips(told: Any) -> bool:
+    """Flip one bit at random places of raw files: the check sums see each."""
+    print(head("device", "flips", "noticed", "frames lost, most", "scans lost", "false samples"))
+    good = True
     for kind in ("di154", "di149", "di245", "di2108"):
         whole, places = recorded_bytes(kind), random.Random(7)
-        flips = [flip(whole, places.randrange(8 * len(whole))) for _ in range(FLIPS)]
-        lines.append(
-            f"| {kind} | {FLIPS} | {sum(one.noticed for one in flips)} |"
-            f" {max(one.frames_lost for one in flips)} | {max(one.scans_lost for one in flips)} |"
-            f" {sum(one.false_samples for one in flips)} |"
-        )
-    return "\n".join(lines)
+        found = [flip(whole, places.randrange(8 * len(whole))) for _ in range(told.flips)]
+        noticed, false = sum(each.noticed for each in found), sum(e.false_samples for e in found)
+        most = [
+            max(getattr(each, name) for each in found) for name in ("frames_lost", "scans_lost")
+        ]
+        print(table_row(kind, [len(found), noticed, *most, false]), flush=True)
+        good &= noticed == len(found) and not false and most[0] <= 1
+    return good
 
 
 def worst_steps(recording: Recording) -> float:
@@ -118,60 +119,52 @@ def worst_steps(recording: Recording) -> float:
     return float(np.nanmax(off)) / (recording.resolution or 1.0)
 
 
-def one_kill(raw: Path, instants: random.Random) -> dict[str, float | bool]:
-    """Kill a recorder, and look at what it left."""
-    kind, process = instants.choice(["di154", "di2108"]), os.fork()
-    if not process:
-        try:
-            options = {"rate_hz": 200.0, "duration_s": 1e6, "clock_scale": 50.0}
-            acquire_simulated(kind, slow, raw_path=raw, **options)
-        finally:
-            os._exit(1)
-    while not raw.exists() or not raw.stat().st_size:
-        time.sleep(0.002)
-    time.sleep(instants.uniform(0.0, 0.4))
-    size = raw.stat().st_size
-    os.kill(process, signal.SIGKILL)
-    os.waitpid(process, 0)
-    kept = read_raw(raw)
-    found: dict[str, float | bool] = {
-        "whole": raw.stat().st_size - kept.damaged_bytes >= size,
-        "torn": kept.damaged_bytes > 0,
-        "empty": not kept.data,
-        "opens": True,
-    }
-    try:
-        found["worst"] = worst_steps(decode_recording(raw))
-    except InputError as fault:
-        # Killed before the first scan: nothing there is to be opened.
-        found["opens"] = "no scan was recorded" in str(fault) and not kept.data
-    raw.unlink()
-    return found
-
-
-def kill_table() -> str:
-    """Kill with signal 9 at random instants; results are kept as they come."""
-    done = journal.read(JOURNAL, [])
+def one_kill(number: int) -> dict[str, float | bool]:
+    """Kill a recorder at a random instant, and look at what it left."""
+    instants = random.Random(number)
     with tempfile.TemporaryDirectory() as folder:
-        for number in range(len(done), KILLS):
-            done.append(one_kill(Path(folder, "killed.raw"), random.Random(number)))
-            journal.keep(JOURNAL, done)
-    counts = [sum(each[key] for each in done) for key in ("opens", "whole", "torn", "empty")]
-    return (
-        "| kills | opened | all written before is there | torn last frames | before a scan |"
-        f" worst error |\n{'|---' * 6}|\n| {len(done)} | {' | '.join(map(str, counts))} |"
-        f" {max(each.get('worst', 0.0) for each in done):.2f} steps |"
-    )
+        raw = Path(folder, "killed.raw")
+        kind, process = instants.choice(["di154", "di2108"]), os.fork()
+        if not process:
+            try:
+                options = {"rate_hz": 200.0, "duration_s": 1e6, "clock_scale": 50.0}
+                acquire_simulated(kind, slow, raw_path=raw, **options)
+            finally:
+                os._exit(1)
+        while not raw.exists() or not raw.stat().st_size:
+            time.sleep(0.002)
+        time.sleep(instants.uniform(0.0, 0.4))
+        size = raw.stat().st_size
+        os.kill(process, signal.SIGKILL)
+        os.waitpid(process, 0)
+        kept = read_raw(raw)
+        whole = raw.stat().st_size - kept.damaged_bytes >= size
+        found = {"whole": whole, "torn": kept.damaged_bytes > 0, "empty": not kept.data}
+        try:
+            return {**found, "opens": True, "worst": worst_steps(decode_recording(raw))}
+        except InputError as fault:
+            # Killed before the first scan: nothing there is to be opened.
+            return {**found, "opens": "no scan was recorded" in str(fault) and not kept.data}
 
 
-def disk_table() -> str:
-    """A limit on the file's size stands for a disk that is full."""
-    lines = ["| room | message | scans opened | worst error |", "|---" * 4 + "|"]
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+def kill(told: Any) -> bool:
+    """Kill with signal 9 at random instants."""
+    done = list(answers(told, range(told.kills), one_kill, SOURCES))
+    counts = {key: sum(each[key] for each in done) for key in ("opens", "whole", "torn", "empty")}
+    print(head("kills", "opened", "all that was written is there", "torn", "empty", "worst, steps"))
+    worst = max(each.get("worst", 0.0) for each in done)
+    print(table_row(len(done), [*counts.values(), f"{worst:.2f}"]))
+    return counts["opens"] == counts["whole"] == len(done)
+
+
+def disk(_told: Any) -> bool:
+    """Record where a limit on the file's size stands for a disk that is full."""
+    print(head("room, B", "message", "scans opened", "worst, steps"))
+    before, good = resource.getrlimit(resource.RLIMIT_FSIZE), True
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     for room in (5_000, 50_000, 500_000):
         with tempfile.TemporaryDirectory() as folder:
-            raw, said = Path(folder, "full.raw"), "**nothing**"
+            raw, said = Path(folder, "full.raw"), ""
             resource.setrlimit(resource.RLIMIT_FSIZE, (room, before[1]))
             try:
                 acquire_simulated("di2108", slow, rate_hz=5e3, duration_s=120.0, raw_path=raw)
@@ -180,23 +173,30 @@ def disk_table() -> str:
             finally:
                 resource.setrlimit(resource.RLIMIT_FSIZE, before)
             kept = decode_recording(raw)
-        lines.append(f"| {room} B | {said} | {len(kept)} | {worst_steps(kept):.2f} steps |")
-    return "\n".join(lines)
+        print(table_row(room, [said or "**nothing**", len(kept), f"{worst_steps(kept):.2f}"]))
+        good &= bool(said)
+    return good
 
 
-PARTS: dict[str, Callable[[], str]] = {
-    "faults": fault_table,
-    "flips": flip_table,
-    "kill": kill_table,
-    "disk": disk_table,
+PARTS: dict[str, Callable[[Any], bool]] = {
+    each.__name__: each for each in (faults, flips, kill, disk)
 }
 
 
-def main() -> None:
+def main() -> int:
     """Print the parts that are named, or all."""
-    for part in sys.argv[1:] or PARTS:
-        print(f"\n{part}\n\n{PARTS[part]()}\n\nMade by commit {journal.commit()}.", flush=True)
+    parser = judge_parser(__doc__, "acquisition", 0)
+    parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help="all, if none is named")
+    for name, number in (("faults", 100_000), ("flips", 500), ("kills", 200)):
+        parser.add_argument(f"--{name}", type=int, default=number, help="how many (%(default)s)")
+    told = parser.parse_args()
+    missed = []
+    for name in told.parts or PARTS:
+        print(f"\n{name}\n")
+        missed += [] if PARTS[name](told) else [name]
+    print(f"\nmissed: {', '.join(missed) or 'none'}. Made by commit {commit()}.")
+    return len(missed)
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

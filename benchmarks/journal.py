@@ -17,15 +17,10 @@ from pendpipe.provenance import code_version
 
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / ".evidence"
-READERS = (
-    "pendpipe.acquisition.recorder",
-    "benchmarks/acquisition*.py",
-)
-"""The acquisition, and what tries it."""
 
 
 @cache
-def code(sources: tuple[str, ...] = READERS) -> str:
+def code(sources: tuple[str, ...]) -> str:
     """Digest of code: modules with all that they import, and files by pattern."""
     digest = hashlib.sha256()
     for source in sources:
@@ -46,23 +41,6 @@ def commit() -> str:
     ).stdout.strip()
     changed = subprocess.run([*git, "diff", "--quiet", "HEAD", "--", ".", ":!docs"], check=False)
     return name + ("-dirty" if changed.returncode else "")
-
-
-def read(name: str, nothing: Any, sources: tuple[str, ...] = READERS) -> Any:
-    """Return what is kept under a name; `nothing` if it is of other code."""
-    path = KEPT / f"{name}.json"
-    if not path.exists():
-        return nothing
-    kept = json.loads(path.read_text(encoding="utf-8"))
-    return kept["done"] if kept.get("code") == code(sources) else nothing
-
-
-def keep(name: str, done: Any, sources: tuple[str, ...] = READERS) -> None:
-    """Keep it; what was there before gives way at once or not at all."""
-    KEPT.mkdir(exist_ok=True)
-    beside = KEPT / f"{name}.new"
-    beside.write_text(json.dumps({"code": code(sources), "done": done}), encoding="utf-8")
-    beside.replace(KEPT / f"{name}.json")
 
 
 def judge_parser(doc: str | None, name: str, number: int) -> argparse.ArgumentParser:
