@@ -17,7 +17,7 @@ GROUPS = {
         *("consistency", "null_families --number 15", "known_physics", "campaign_challenge"),
         *("apparatus", "acquisition faults"),
     ),
-    "robustness": ("acquisition flips kill disk", "kills", "torn_files --apart", "hostile", "fuzz"),
+    "robustness": ("acquisition flips kill disk", "kills", "hostile", "fuzz"),
 }
 
 

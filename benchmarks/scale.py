@@ -2,69 +2,39 @@
 
     python -m benchmarks.scale                              10, 100, 1,000; 10,000 are planned
     python -m benchmarks.scale --run --diagnose             the plans of 10,000 alone
-    python -m benchmarks.scale --profile slurm              on a Slurm of one node (tests/slurm)
 
-Records are files of 2,048 readings. CPU seconds count, since others may use the machine; on a
-cluster those of the jobs are not seen, and the clock stands for them. The second plan is that after
-one more record; where a number of records is planned only, what its stages would have left is
-pretended. Each row is written into the table of docs/scale.md when it is there, and kept in
-``.evidence`` for as long as the code is the same: a stopped run goes on.
+Records are files of 2,048 readings. CPU seconds count, since others may use the machine. The second
+plan is that after one more record; where a number of records is planned only, what its stages would
+have left is pretended. The rows are those of docs/scale.md; a stopped run goes on.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import os
-import platform
 import re
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
 from itertools import product
 from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from benchmarks import journal
+from benchmarks.journal import ROOT, answers, commit, judge_parser
+from benchmarks.table import head, table_row
 from pendpipe.configuration.load import load_campaign, read_configuration
 from pendpipe.files import write_json
 from pendpipe.manifest import Manifest, sum_of
 from pendpipe.stages.chunks import STAGES, chunks_of, write_chunk
 
-ROOT: Final = Path(__file__).resolve().parents[1]
-PAGE: Final = ROOT / "docs" / "scale.md"
-SAMPLES: Final = 2048
 FILES: Final = 100
 """Decays that are made; more records are of the same files."""
-
-
-SLURM: Final = (
-    *("--", "--slurm-status-command", "squeue", "--slurm-no-account"),
-    *("--slurm-init-seconds-before-status-checks", "1", "--seconds-between-status-checks", "1"),
-)
-"""The node has no accounting, and its scheduler nothing else to do."""
-
-
-@contextmanager
-def one_node() -> Iterator[None]:
-    """A Slurm on this machine while it is measured."""
-    script = str(ROOT / "tests/slurm/cluster.sh")
-    with tempfile.TemporaryDirectory() as place:
-        subprocess.run([script, "up", place], check=True)
-        try:
-            yield
-        finally:
-            subprocess.run([script, "down", place], check=True)
-
-
-GUARDS: Final = (
-    *("pendpipe.manifest", "pendpipe.commands.stage", "pendpipe.commands.small"),
-    *("workflow/rules/*.smk", "workflow/Snakefile"),
+SOURCES: Final = (
+    *("pendpipe.manifest", "pendpipe.commands.stage", "workflow/rules/*.smk", "workflow/Snakefile"),
+    "benchmarks/scale.py",
 )
 """What plans and runs: other code has other costs."""
 
@@ -77,9 +47,18 @@ class Cost(NamedTuple):
     memory_mb: float
 
 
+def write_decay(path: Path, size: float, loss: float, frequency_hz: float, seed: int = 1) -> None:
+    """Write 2,048 readings of a viscous decay with noise, 30 a second."""
+    time_s = np.arange(2048) / 30.0
+    swing = size * np.exp(-loss * time_s) * np.cos(2.0 * np.pi * frequency_hz * time_s)
+    angle = swing + 3e-4 * np.random.default_rng(seed).standard_normal(len(time_s))
+    columns = np.column_stack([time_s, angle])
+    np.savetxt(path, columns, ("%.4f", "%.6f"), ",", header="time_s,angle_rad", comments="")
+
+
 def write_campaign(folder: Path, records: int, *, diagnosed: bool) -> None:
     """Write a configuration, its table, and the files of decays."""
-    random, time_s = np.random.default_rng(1), np.arange(SAMPLES) / 30.0
+    random = np.random.default_rng(1)
     (folder / "config").mkdir()
     (folder / "config/config.yaml").write_text(
         f"title: {records} records\nrecords: records.tsv\n"
@@ -88,10 +67,7 @@ def write_campaign(folder: Path, records: int, *, diagnosed: bool) -> None:
     )
     for number in range(min(records, FILES)):
         loss, frequency = random.uniform(0.005, 0.02), random.uniform(0.8, 0.9)
-        swing = 0.15 * np.exp(-loss * time_s) * np.cos(2.0 * np.pi * frequency * time_s)
-        angle = swing + 3e-4 * random.standard_normal(SAMPLES)
-        rows = (f"{t:.4f},{y:.6f}\n" for t, y in zip(time_s.tolist(), angle.tolist(), strict=True))
-        (folder / f"{number}.csv").write_text("time_s,angle_rad\n" + "".join(rows), "utf-8")
+        write_decay(folder / f"{number}.csv", 0.15, loss, frequency, number)
     lines = (f"r{number:05d}\t{number % FILES}.csv\n" for number in range(records))
     (folder / "records.tsv").write_text("record\tsource\n" + "".join(lines), encoding="utf-8")
 
@@ -139,75 +115,41 @@ def pretend(folder: Path) -> None:
     cost(folder, "--", "--touch", "--until", "fit", "diagnose")
 
 
-def measure(records: int, *, diagnosed: bool, to_end: bool, profile: str) -> list[str]:
+def measure(key: tuple[int, bool, bool]) -> list[str]:
     """Plan a campaign of so many records, run it, plan it with one more; return a row."""
+    records, diagnosed, to_end = key
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         write_campaign(folder, records, diagnosed=diagnosed)
-        first = cost(folder, "-n")
-        row = [f"{records:,}", "yes" if diagnosed else "no"]
-        row += [f"{first.cpu_s:.1f}", f"{first.memory_mb:.0f}"]
+        first, ran, size = cost(folder, "-n"), [""] * 4, ""
         if to_end:
-            asked = SLURM if profile == "slurm" else ()
-            run = cost(folder, "--cores", "2", "--profile", profile, *asked)
-            cpu = [f"{run.cpu_s:.0f}", f"{run.cpu_s / records:.2f}"]
-            row += cpu if profile == "default" else ["", ""]
-            row += [f"{run.clock_s:.0f}", f"{run.memory_mb:.0f}"]
+            run = cost(folder, "--cores", "2")
+            ran = [f"{run.cpu_s:.0f}", f"{run.cpu_s / records:.2f}"]
+            ran += [f"{run.clock_s:.0f}", f"{run.memory_mb:.0f}"]
+            size = f"{(folder / 'results/report.html').stat().st_size / 1e6:.1f}"
         else:
             pretend(folder)
-            row += [""] * 4
         with (folder / "records.tsv").open("a", encoding="utf-8") as table:
             table.write("added\t0.csv\n")
-        page = folder / "results/report.html"
-        size = f"{page.stat().st_size / 1e6:.1f}" if to_end else ""
-        return [*row, f"{cost(folder, '-n').cpu_s:.1f}", size]
-
-
-def write_page(rows: list[list[str]], profile: str) -> None:
-    """Write the rows into the page's table; what was not measured again stays."""
-    head = (
-        *("records", "diagnosis", "first plan, CPU s", "MB", "run, CPU s", "a record"),
-        *("clock, s", "largest process, MB", "plan after one more, CPU s", "page, MB"),
-        *("load", "commit"),
-    )
-    begin, end = f"<!-- {profile}: begin -->", f"<!-- {profile}: end -->"
-    page = PAGE.read_text(encoding="utf-8")
-    before, _, rest = page.partition(begin)
-    old, _, after = rest.partition(end)
-    kept = [[cell.strip() for cell in line.split("|")[1:-1]] for line in old.split("\n")]
-    all_rows = [row for row in kept if row and row[0].replace(",", "").isdigit()] + rows
-    # By what was run: the last of each counts.
-    found = {(row[1], row[6] == "", int(row[0].replace(",", ""))): row for row in all_rows}
-    table = [head, ["---"] * len(head), *(found[what] for what in sorted(found))]
-    text = "\n".join(f"| {' | '.join(cells)} |" for cells in table)
-    machine = f"{platform.python_version()}, {os.cpu_count()} cores, {platform.machine()}."
-    PAGE.write_text(f"{before}{begin}\n\n{text}\n\n{machine}\n\n{end}{after}", encoding="utf-8")
+        again = f"{cost(folder, '-n').cpu_s:.1f}"
+    row = ["yes" if diagnosed else "no", f"{first.cpu_s:.1f}", f"{first.memory_mb:.0f}", *ran]
+    return [*row, again, size, f"{os.getloadavg()[0]:.0f}", commit()]
 
 
 def main() -> None:
-    """Measure what is not kept, print, and write the table into the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Measure what is not kept, and print."""
+    parser = judge_parser(__doc__, "scale", 0)
     parser.add_argument("--run", type=int, nargs="*", default=[10, 100, 1000])
     parser.add_argument("--plan", type=int, nargs="*", default=[10000])
     parser.add_argument("--diagnose", type=int, nargs="*", default=[100])
-    parser.add_argument("--profile", default="default")
-    arguments = parser.parse_args()
-    asked = [(n, False, True) for n in arguments.run]
-    asked += [(n, True, True) for n in arguments.diagnose]
-    asked += [(n, True, False) for n in arguments.plan]
-    name = f"scale-{arguments.profile}"
-    kept: dict[str, list[str]] = journal.read(name, {}, GUARDS)
-    with one_node() if arguments.profile == "slurm" else nullcontext():
-        for records, diagnosed, to_end in asked:
-            what = f"{records} {diagnosed} {to_end}"
-            if what not in kept:
-                row = measure(
-                    records, diagnosed=diagnosed, to_end=to_end, profile=arguments.profile
-                )
-                kept[what] = [*row, f"{os.getloadavg()[0]:.0f}", journal.commit()]
-                journal.keep(name, kept, GUARDS)
-            print(f"| {' | '.join(kept[what])} |", flush=True)
-            write_page(list(kept.values()), arguments.profile)
+    told = parser.parse_args()
+    keys = [(n, False, True) for n in told.run] + [(n, True, True) for n in told.diagnose]
+    keys += [(n, True, False) for n in told.plan]
+    titles = ("records", "diagnosis", "first plan, CPU s", "MB", "run, CPU s", "a record")
+    more = ("clock, s", "largest process, MB", "plan after one more, CPU s", "page, MB", "load")
+    print(head(*titles, *more, "commit"))
+    for (records, *_), row in zip(keys, answers(told, keys, measure, SOURCES), strict=True):
+        print(table_row(f"{records:,}", row), flush=True)
 
 
 if __name__ == "__main__":
