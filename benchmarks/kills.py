@@ -8,7 +8,8 @@ disturbs the run, does what ``pendpipe doctor`` says about a lock, runs the same
 compares every file of the results, byte for byte, with an undisturbed run. One project suffers
 five kills before it may end; after each, what its manifests call sound is compared. A
 result of a finished run that is torn, emptied or altered must be named and set aside as well. Left
-out are the logs, which carry the dates, and temporary files that a killed process left.
+out are logs and manifests, which carry dates and repairs, and temporary files that a killed process
+left.
 """
 
 from __future__ import annotations
@@ -135,7 +136,7 @@ class Project:
         return {
             path.relative_to(self.results).as_posix(): sha256(path)
             for path in sorted(self.results.rglob("*"))
-            if path.is_file() and path.parent.name != "logs"
+            if path.is_file() and path.parent.name not in ("logs", "manifest")
             if not TEMPORARY.fullmatch(path.name) and SET_ASIDE not in path.name
         }
 
@@ -271,8 +272,10 @@ def two(trial: Trial, folder: Path, draw: random.Random) -> Case:
 def torn(trial: Trial, folder: Path, draw: random.Random) -> Case:
     """A result of a finished run is torn, emptied or altered, its old time put back or not."""
     shutil.copytree(trial.kept, folder, dirs_exist_ok=True)
-    project, name = Project(folder), draw.choice(sorted(trial.sums))
-    path = project.results / name
+    project = Project(folder)
+    files = [each for each in project.results.rglob("*") if each.is_file()]
+    path = draw.choice(sorted(each for each in files if each.parent.name != "logs"))
+    name = path.relative_to(project.results).as_posix()
     content, status = path.read_bytes(), path.stat()
     at = draw.randrange(len(content))
     altered = content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]

@@ -2,27 +2,61 @@
 
 import copy
 import json
+import os
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from benchmarks.pages import browser, installed, repeated
+import yaml
 
 from pendpipe.cli import main
+from pendpipe.report.page import OWN_PAGE, render
 
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="session")
 def chromium() -> Iterator[Any]:
-    """The browser; tests are skipped where there is none."""
-    pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    if installed() is None:
+    """The browser as it is installed; tests are skipped where there is none."""
+    library = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    names = (os.environ.get("CHROMIUM", ""), "chromium", "chromium-browser", "google-chrome")
+    path = next((path for name in names if name and (path := shutil.which(name))), None)
+    if path is None:
         pytest.skip("no Chromium is installed")
-    with browser() as running:
+    with library.sync_playwright() as driver:
+        # A container's user may be root, which Chromium's sandbox refuses.
+        running = driver.chromium.launch(executable_path=path, args=["--no-sandbox"])
         yield running
+        running.close()
+
+
+def repeated(results: Path, home: Path, count: int) -> tuple[Path, list[str]]:
+    """Make a campaign of so many records of another; return its page and the own pages."""
+    comparison = json.loads((results / "comparison.json").read_text())
+    entries, own = comparison["records"], list[str]()
+    comparison["records"] = []
+    for index in range(count):
+        again, which = divmod(index, len(entries))
+        like = entries[which]
+        name = f"{like['record']}-{again}" if again else like["record"]
+        comparison["records"].append({**like, "record": name})
+        if (results / like["record"]).is_dir():
+            shutil.copytree(results / like["record"], home / name)
+
+    def own_page(record: str, page: str) -> None:
+        (home / record / OWN_PAGE).write_text(page)
+        own.append(record)
+
+    home.mkdir(exist_ok=True)
+    settings = yaml.safe_load((ROOT / "config/config.yaml").read_text())
+    numbers = json.loads((results / "campaign.json").read_text())
+    page = home / "report.html"
+    figures = results / "figures"
+    made = render(settings, comparison, numbers, home, figures, home=page, own_page=own_page)
+    page.write_text(made)
+    return page, own
 
 
 @pytest.fixture(scope="session")
@@ -66,7 +100,7 @@ def pages(campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
     return {
         "campaign": report,
         "many records": many,
-        "record": many.parent / next(iter(own)) / "record.html",
+        "record": many.parent / own[0] / "record.html",
         "recording": folder / "one.html",
         "class": folder / "class.html",
         "documents": ROOT / "docs/_build/html/index.html",
