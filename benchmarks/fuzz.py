@@ -1,6 +1,6 @@
 """Damage every kind of input: each ends in one clean line or in a valid recording.
 
-    python -m benchmarks.fuzz [--inputs 20000] [--seconds S] [--case NUMBER]
+    python -m benchmarks.fuzz [--number 20000] [--case NUMBER]
 
 Seeds are the sample files of `tests/formats`, the small files of ../shared/recordings, raw
 recordings of simulated devices, and bytes of every device's stream, of which each must be accounted
@@ -10,16 +10,13 @@ processor and 3 GB.
 
 from __future__ import annotations
 
-import argparse
 import resource
 import signal
 import sys
 import tempfile
-import time
 import traceback
 import warnings
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -27,7 +24,7 @@ from random import Random
 import numpy as np
 
 from benchmarks.acquisition_live import recorded_bytes
-from benchmarks.journal import ROOT, commit
+from benchmarks.journal import ROOT, answers, commit, judge_parser
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.drivers import DRIVERS, find_driver
@@ -95,6 +92,7 @@ def decode_stream(model: str, data: bytes) -> None:
 
 def answer(number: int, *, show: bool = False) -> tuple[str, str]:
     """The seed of an input, and ``read``, ``refused`` or what is wrong."""
+    begin()
     random = Random(number)
     name = random.choice(sorted(seeds()))
     data, (kind, _, suffix) = damaged(seeds()[name], random), name.rpartition(".")
@@ -136,6 +134,7 @@ def _alarm(*_: object) -> None:
     raise HangError
 
 
+@cache
 def begin() -> None:
     """Set up a worker: limits, and every warning an error."""
     warnings.simplefilter("error")
@@ -145,27 +144,19 @@ def begin() -> None:
 
 def main() -> int:
     """Print how many inputs were read, refused and wrong; status 1 where one is wrong."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--inputs", type=int, default=20_000)
-    parser.add_argument("--seconds", type=float, default=1e9, help="stop after so long")
+    parser = judge_parser(__doc__, "fuzz", 20_000)
     parser.add_argument("--case", type=int, metavar="NUMBER", help="one input, with its traceback")
-    arguments = parser.parse_args()
-    if arguments.case is not None:
-        begin()
-        print(*answer(arguments.case, show=True))
+    told = parser.parse_args()
+    if told.case is not None:
+        print(*answer(told.case, show=True))
         return 0
-    said, until, number = Counter[str](), time.monotonic() + arguments.seconds, 0
-    with ProcessPoolExecutor(2, initializer=begin) as pool:
-        while number < arguments.inputs and time.monotonic() < until:
-            block = range(number, min(number + 1000, arguments.inputs))
-            for case, (name, outcome) in zip(
-                block, pool.map(answer, block, chunksize=50), strict=True
-            ):
-                said[outcome.partition(":")[0]] += 1
-                if outcome not in ("read", "refused"):
-                    print(f"{case} ({name}): {outcome}", file=sys.stderr, flush=True)
-            number = block.stop
-    print(f"{number} inputs of {len(seeds())} seeds: {dict(said)}. Made by commit {commit()}.")
+    said = Counter[str]()
+    sources = ("src/pendpipe/**/*.py", "benchmarks/fuzz.py")
+    for case, (name, outcome) in enumerate(answers(told, range(told.number), answer, sources)):
+        said[outcome.partition(":")[0]] += 1
+        if outcome not in ("read", "refused"):
+            print(f"{case} ({name}): {outcome}", file=sys.stderr, flush=True)
+    print(f"{told.number} inputs of {len(seeds())} seeds: {dict(said)}. Made by commit {commit()}.")
     return int(set(said) > {"read", "refused"})
 
 

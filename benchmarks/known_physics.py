@@ -15,6 +15,7 @@ import json
 import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -25,6 +26,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.journal import ROOT, answers, judge_parser
+from benchmarks.table import head, table_row
 from pendpipe.files import without_folders
 
 RECORDINGS: Final = ROOT.parent / "shared/recordings"
@@ -245,6 +247,7 @@ def judge(row: Mapping[str, str], kept: Mapping[str, Any]) -> dict[str, Any]:
         "answered": bool(answers.effects) or content.get("verdict") == "consistent",
         "refused": "" if status in (0, 3) else without_folders(refused),
         "restoring": kept["fit"]["content"].get("restoring", "none"),
+        "light": kept["fit"]["content"].get("light", "refused"),
         "cpu_s": (kept["fit"]["cpu_s"], kept["diagnosis"]["cpu_s"]),
     }
     if judged["answered"]:
@@ -267,22 +270,15 @@ def line(row: Mapping[str, str], kept: Mapping[str, Any], judged: Mapping[str, A
         missed.append("**not followed**")
     hand = [each for each, hit in judged["by_hand"].items() if hit]
     cells = [
-        row["record"],
         shown if judged["answered"] else f"refused: {judged['refused'][:120]}",
         group,
         ", ".join(found),
         ", ".join(missed),
         f"{len(hand)} of {len(judged['by_hand'])}" if judged["by_hand"] else "",
-        judged["restoring"],
+        f"{judged['restoring']}, {judged['light']}",
         "{:.1f}, {:.1f}".format(*judged["cpu_s"]),
     ]
-    return f"| {' | '.join(cells)} |"
-
-
-HEAD: Final = (
-    "| record | named | class of the first | known: found | missed | by hand, found"
-    " | fit's torque | CPU s: fit, diagnose |\n" + "|---" * 8 + "|"
-)
+    return table_row(row["record"], cells)
 
 
 def summary(judged: list[tuple[Mapping[str, str], dict[str, Any]]]) -> str:
@@ -305,6 +301,7 @@ def summary(judged: list[tuple[Mapping[str, str], dict[str, Any]]]) -> str:
         f"driven and refused as such: {sum('driv' in each['refused'] for each in driven)}"
         f" of {len(driven)}",
         f"fit takes sin x where it is known: {agree} of {len(sine)}",
+        f"lights of fit: {dict(Counter(each['light'] for _, each in judged))}",
         f"CPU of diagnose: median {median(cpu_s):.1f} s, largest {max(cpu_s):.1f} s",
     ]
     return "\n".join(f"* {each}" for each in lines)
@@ -318,7 +315,8 @@ def main() -> None:
     arguments = parser.parse_args()
     wanted = arguments.only or [""]
     rows = [row for row in table() if any(each in row["record"] for each in wanted)]
-    print(HEAD, flush=True)
+    titles = ("record", "named", "class of the first", "known: found", "missed", "by hand, found")
+    print(head(*titles, "torque and light of fit", "CPU s: fit, diagnose"), flush=True)
     judged = []
     asked = answers(arguments, rows, partial(ask, limit_s=arguments.limit))
     for row, kept in zip(rows, asked, strict=True):
