@@ -27,7 +27,7 @@ report: .venv/installed
 	$(RUN) snakemake --report results/snakemake-report.html
 
 bench: .venv/installed-bench
-	$(RUN) python -m benchmarks speed
+	$(RUN) python -m benchmarks speed --campaign
 
 evidence: .venv/installed-bench
 	$(RUN) python -m benchmarks judge

@@ -1,6 +1,6 @@
 """What a recorder keeps: flipped bits, lost bytes, kills, full disks; nothing is lost in silence.
 
-    python -m benchmarks.acquisition [faults] [flips] [kill] [disk]
+    python -m benchmarks.acquisition [faults] [flips] [kill] [disk] [--number N]
 
 prints the tables: one fault in each of 100,000 recordings of 24 scans of random codes (a protocol
 that can't mark it gives no decoder a sign), a flipped bit in each of 2,000 raw files, 200 recorders
@@ -82,7 +82,10 @@ def faults(told: Any) -> bool:
     cells = [(m, k) for m in DRIVERS for k in KINDS if not (marked[m] and "stop" in k)]
     tally = defaultdict(list)
     for model, label in cells:
-        found = [one_fault(random, model, label) for _ in range(-(-told.faults // len(cells)))]
+        found = [
+            one_fault(random, model, label)
+            for _ in range(-(-(told.number or 100_000) // len(cells)))
+        ]
         tally[label, marked[model]] += found
     print(head("fault", "family", "faults", "marked, %", "scans lost, mean (most)", "silent, %"))
     for (label, mark), found in sorted(tally.items()):
@@ -103,7 +106,7 @@ def flips(told: Any) -> bool:
     good = True
     for kind in ("di154", "di149", "di245", "di2108"):
         whole, places = recorded_bytes(kind), random.Random(7)
-        found = [flip(whole, places.randrange(8 * len(whole))) for _ in range(told.flips)]
+        found = [flip(whole, places.randrange(8 * len(whole))) for _ in range(told.number or 500)]
         noticed, false = sum(each.noticed for each in found), sum(e.false_samples for e in found)
         most = [
             max(getattr(each, name) for each in found) for name in ("frames_lost", "scans_lost")
@@ -149,7 +152,7 @@ def one_kill(number: int) -> dict[str, float | bool]:
 
 def kill(told: Any) -> bool:
     """Kill with signal 9 at random instants."""
-    done = list(answers(told, range(told.kills), one_kill, SOURCES))
+    done = list(answers(told, range(told.number or 200), one_kill, SOURCES))
     counts = {key: sum(each[key] for each in done) for key in ("opens", "whole", "torn", "empty")}
     print(head("kills", "opened", "all that was written is there", "torn", "empty", "worst, steps"))
     worst = max(each.get("worst", 0.0) for each in done)
@@ -187,8 +190,6 @@ def main() -> int:
     """Print the parts that are named, or all."""
     parser = judge_parser(__doc__, "acquisition", 0)
     parser.add_argument("parts", nargs="*", choices=[*PARTS, []], help="all, if none is named")
-    for name, number in (("faults", 100_000), ("flips", 500), ("kills", 200)):
-        parser.add_argument(f"--{name}", type=int, default=number, help="how many (%(default)s)")
     told = parser.parse_args()
     missed = []
     for name in told.parts or PARTS:

@@ -1,6 +1,6 @@
 """Campaigns with a hidden cause or none, drawn by other equations than the judge's.
 
-    python -m benchmarks.campaign_challenge [--campaigns 300] [--journal FILE]
+    python -m benchmarks.campaign_challenge [--number 300] [--journal FILE]
 
 Geometry, masses, temperature, air drag and loss torques are drawn from the priors that the
 configuration states; half of the campaigns lack nothing, the others hide one cause. The
@@ -13,8 +13,8 @@ table are in docs/paper-case.md.
 
 from __future__ import annotations
 
-import sys
 import time
+from collections import defaultdict
 from typing import Any, Final
 
 import numpy as np
@@ -24,7 +24,7 @@ from scipy.special import kv
 
 from benchmarks import journal
 from benchmarks.journal import ROOT
-from benchmarks.table import share
+from benchmarks.table import head, share, table_row
 
 Array = NDArray[np.float64]
 RELATIVE_SD_B: Final = {"water": 1e-3, "air": 1.5e-4}
@@ -58,21 +58,6 @@ CAUSES: Final[dict[str, tuple[float, float]]] = {
 OTHERWISE_MODELLED: Final = ("wall-confinement", "free-surface")
 """Hidden as a concentric shell with thin layers, and with a mode at 1.3 Hz: the judge has a tank,
 and modes at three frequencies. They test the class; sizes and loss torques mean something else."""
-
-
-QUANTITIES: Final = (
-    "k",
-    "kappa",
-    "uniform-drag-excess",
-    "history-term",
-    "k of the table",
-    "kappa of the table",
-    "theory_factor",
-    "C_H of the table",
-    "Q_v",
-)
-"""Coverage is asked of each: of the joint fit with the cause, and of the first table where nothing
-is missing; Q_v of each record in the water."""
 
 
 class Generator:
@@ -388,81 +373,47 @@ def table(results: list[dict[str, Any]]) -> str:
     plain = [one for one in results if one["cause"] is None]
     hidden = [one for one in results if one["cause"]]
     sure = [one for one in hidden if one["oracle"]["gain"] >= COULD_SAY]
+    counted = {
+        "false alarms": [one["missing"] for one in plain],
+        "found where the oracle could say": [one["missing"] for one in sure],
+        "cause in the class, where it could say": [one["cause"] in one["class"] for one in sure],
+        "cause in the oracle's class": [one["cause"] in one["oracle"]["class"] for one in sure],
+        "a second effect claimed": [one["found"] > 1 for one in hidden],
+        "a record left out": [bool(one["left_out"]) for one in hidden],
+    }
     lines = [f"campaigns: {len(results)}, of which {len(plain)} lack nothing"]
-    lines.append(f"false alarms: {share(sum(one['missing'] for one in plain), len(plain))}")
-    lines.append(
-        f"found where the oracle could say: {share(sum(one['missing'] for one in sure), len(sure))}"
-    )
-    inside = sum(one["cause"] in one["class"] for one in sure)
-    lines.append(f"cause in the class, where it could say: {share(inside, len(sure))}")
-    seen = sum(one["cause"] in one["oracle"]["class"] for one in sure)
-    lines.append(f"cause in the oracle's class: {share(seen, len(sure))}")
-    for whose, sizes in (
-        ("judge", [len(one["class"]) for one in sure if one["missing"]]),
-        ("oracle", [len(one["oracle"]["class"]) for one in sure]),
-    ):
-        lines.append(f"mean size of the class, {whose}: {np.mean(sizes):.2f}")
-    more = sum(one["found"] > 1 for one in hidden)
-    lines.append(f"a second effect claimed: {share(more, len(hidden))}")
-    lines.append(
-        f"a record left out: {share(sum(bool(one['left_out']) for one in hidden), len(hidden))}"
-    )
+    lines += [f"{what}, %: {share(sum(hits), len(hits))}" for what, hits in counted.items()]
     known = [one for one in results if one["cause"] not in OTHERWISE_MODELLED]
-    everything: dict[str, list[float]] = {}
-    for one in known:
-        for key, value in one["pulls"].items():
-            everything.setdefault("Q_v" if key.startswith("Q_v") else key, []).append(value)
-    for key in (*QUANTITIES, "size"):
-        pulls = np.array(everything.get(key, []))
-        if not len(pulls):
-            continue
-        one_sd, two_sd = (int(np.sum(np.abs(pulls) < limit)) for limit in (1.0, 1.96))
+    pulls: dict[str, list[float]] = defaultdict(list)
+    for name, value in (each for one in known for each in one["pulls"].items()):
+        pulls["Q_v" if name.startswith("Q_v") else name].append(value)
+    for name, found in pulls.items():
+        within = (share(int(np.sum(np.abs(found) < sds)), len(found)) for sds in (1.0, 1.96))
         lines.append(
-            f"{key}: within 1 sd {share(one_sd, len(pulls))}, within 1.96 sd"
-            f" {share(two_sd, len(pulls))}, pulls {np.mean(pulls):+.2f} +- {np.std(pulls):.2f}"
+            f"{name}, %: within 1 and 1.96 sd {' and '.join(within)},"
+            f" pulls {np.mean(found):+.2f} +- {np.std(found):.2f}"
         )
-    ratios = [
-        one["sd"] / one["oracle"]["bound"]
-        for one in sure
-        if "sd" in one and one["cause"] not in OTHERWISE_MODELLED
-    ]
+    ratios = [one["sd"] / one["oracle"]["bound"] for one in sure if one in known and "sd" in one]
     if ratios:
         low, middle, high = np.quantile(ratios, [0.05, 0.5, 0.95])
-        lines.append(
-            f"sd of the size over the Cramer-Rao bound: {middle:.2f} ({low:.2f} to {high:.2f})"
-        )
-    lines.append(
-        f"processor seconds a campaign: {np.mean([one['seconds'] for one in results]):.2f}"
-    )
-    lines.append("")
-    lines.append("| cause | could say | found | in the class | class, judge | class, oracle |")
-    lines.append("|---|---|---|---|---|---|")
+        lines.append(f"size's sd over the Cramer-Rao bound: {middle:.2f} ({low:.2f} to {high:.2f})")
+    lines.append(f"CPU s a campaign: {np.mean([one['seconds'] for one in results]):.2f}")
+    lines.append("\n" + head("cause", "could say", "found", "in class", "class, judge", "oracle"))
     for cause in CAUSES:
-        part = [one for one in sure if one["cause"] == cause]
-        if part:
+        if part := [one for one in sure if one["cause"] == cause]:
             sizes = [np.mean([len(one["class"]) for one in part])]
             sizes.append(np.mean([len(one["oracle"]["class"]) for one in part]))
-            found = sum(one["missing"] for one in part)
-            named_ = sum(cause in one["class"] for one in part)
-            lines.append(
-                f"| {cause} | {len(part)} | {found} | {named_} | {sizes[0]:.1f} | {sizes[1]:.1f} |"
-            )
+            found = sum(one["missing"] for one in part), sum(cause in one["class"] for one in part)
+            lines.append(table_row(cause, [len(part), *found, *(f"{each:.1f}" for each in sizes)]))
     return "\n".join(lines)
 
 
 def main() -> None:
     """Draw, judge, print."""
     parser = journal.judge_parser(__doc__, "campaign_challenge", 300)
-    parser.add_argument("--campaigns", type=int, dest="number", help="the same as --number")
-    parser.set_defaults(number=300)
-    arguments = parser.parse_args()
+    told = parser.parse_args()
     sources = ("src/pendpipe/**/*.py", "benchmarks/campaign_challenge.py", "config/*")
-    results = []
-    for one in journal.answers(arguments, range(arguments.number), draw, sources):
-        results.append(one)
-        if one["number"] % 20 == 0:
-            print(one["number"], one["cause"], one["class"], file=sys.stderr, flush=True)
-    print(table(results))
+    print(table(list(journal.answers(told, range(told.number), draw, sources))))
 
 
 if __name__ == "__main__":

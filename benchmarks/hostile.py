@@ -169,6 +169,7 @@ def main() -> int:
     chosen = [
         name for name, _ in rows() if not told.words or any(word in name for word in told.words)
     ]
+    chosen = chosen[: told.number or None]
     # The first fit on a machine compiles the engine: that is no row's time.
     subprocess.run([sys.executable, "-m", "pendpipe.warm_up"], check=True)
     print(head("input", "s", "s of the processor", "MB", "exit", "answer"))

@@ -1,6 +1,6 @@
 """What is known of real recordings, and whether the library finds it.
 
-    python -m benchmarks.known_physics [--only NAME] [--limit SECONDS] [--journal FILE]
+    python -m benchmarks.known_physics [--only NAME] [--limit SECONDS] [--number N]
 
 `known_physics.tsv` lists the free decays of ../shared/recordings with what their README states
 (`known`), what was worked out by hand (`by_hand`), and names that would be wrong. `pendpipe fit`
@@ -315,6 +315,7 @@ def main() -> None:
     arguments = parser.parse_args()
     wanted = arguments.only or [""]
     rows = [row for row in table() if any(each in row["record"] for each in wanted)]
+    rows = rows[: arguments.number or None]
     titles = ("record", "named", "class of the first", "known: found", "missed", "by hand, found")
     print(head(*titles, "torque and light of fit", "CPU s: fit, diagnose"), flush=True)
     judged = []

@@ -1,6 +1,6 @@
 """What engine, fit, diagnosis and campaign cost in CPU time, as ratios where others do the same.
 
-    python -m benchmarks.speed [--rounds 15] [--campaign]
+    python -m benchmarks.speed [--number 15] [--campaign]
 
 The reference record: f 0.516 Hz, y0 0.068 rad, b 0.01192 1/s (half hysteretic, half viscous),
 a 0.45 1/(rad s), c 1.4e-6 rad/s, 32,768 readings over 300 s, noise 0.1 mrad. Contenders take turns,
@@ -10,7 +10,6 @@ campaign is planned, run and planned again where it is asked for.
 
 from __future__ import annotations
 
-import argparse
 import math
 import os
 import tempfile
@@ -23,7 +22,8 @@ from typing import Final
 import numpy as np
 
 import pendpipe as pp
-from benchmarks.scale import ROOT, cost
+from benchmarks.journal import ROOT, judge_parser
+from benchmarks.scale import cost
 from benchmarks.table import head, table_row
 from pendpipe.arrays import FloatArray as Array
 from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian, turning_points
@@ -178,12 +178,11 @@ def campaign() -> None:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--rounds", type=int, default=15)
+    parser = judge_parser(__doc__, "speed", 15)
     parser.add_argument("--campaign", action="store_true", help="the default campaign too")
     arguments = parser.parse_args()
     print(head("what", "measured", "bound", "kept"))
-    for what, *cells, kept in rows(arguments.rounds):
+    for what, *cells, kept in rows(arguments.number):
         print(table_row(what, [*cells, "yes" if kept else "**no**"]))
     if arguments.campaign:
         campaign()
