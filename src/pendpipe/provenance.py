@@ -44,7 +44,8 @@ def _files(module: str) -> tuple[Path, ...]:
     package, *parts = module.split(".")
     path = PACKAGE.joinpath(*parts)
     candidates = (path.with_suffix(".py"), path / "__init__.py")
-    ours = parts and package == PACKAGE.name
+    # The version counts commits: another one is no other code.
+    ours = parts and package == PACKAGE.name and parts != ["_version"]
     source = [each for each in candidates if ours and each.is_file()][:1]
     templates = path.glob("templates/*") if source == [path / "__init__.py"] else ()
     return (*source, *sorted(file for file in templates if file.is_file()))

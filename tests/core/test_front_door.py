@@ -14,6 +14,7 @@ import pytest
 
 import pendpipe as pp
 from pendpipe import cli
+from pendpipe.recording import write_plain
 
 README = Path(__file__).parents[2] / "README.md"
 
@@ -54,9 +55,13 @@ INSTRUMENT = re.compile(r"--port|--anew")
 def test_the_commands_of_the_pages_run(page: Path, tmp_path: Path) -> None:
     """Those that need an instrument have options that there are; CI does what the set-up says."""
     blocks = re.findall(r"```sh\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
-    for folder in ("examples", "data"):
-        shutil.copytree(README.parent / "examples", tmp_path / folder)
-    shutil.copy(tmp_path / "examples/string-pendulum.csv", tmp_path / "swing.csv")
+    shutil.copytree(README.parent / "examples", tmp_path / "examples")
+    (tmp_path / "data").mkdir()
+    time_s = np.arange(600) / 20.0
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(600)
+    angle_rad = 0.1 * np.exp(-0.02 * time_s) * np.cos(4.0 * time_s) + noise
+    for name in ("swing.csv", "data/rod.csv", "data/string.csv"):
+        write_plain(tmp_path / name, pp.Recording(time_s, angle_rad, "angle_rad"))
     angles = "\n".join(f"{0.4 * step:g},{0.1 * step:g}" for step in range(-4, 5))
     (tmp_path / "caliper.csv").write_text(f"volts,angle_rad\n{angles}\n", encoding="utf-8")
     heights = "\n".join(f"{1.42 * cycle:g},{20 - 0.8 * cycle:g}" for cycle in range(15))

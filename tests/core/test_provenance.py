@@ -36,6 +36,7 @@ OWN = 'import importlib\nfound = [importlib.import_module(f"{__name__}.{n}") for
         ("", "used.py", True),
         ("", "stage.py", True),
         ("", "other.py", False),
+        ("from pendpipe._version import version\n", "_version.py", False),
         ("from pendpipe.readers import draw\n", "readers/templates/page.html", True),
         # Which reader a file needs is known only at run time: each of them counts.
         (BY_NAME.format('"pendpipe.readers.text"'), "readers/text.py", True),

@@ -52,9 +52,12 @@ _BLANK: Final = re.compile(
     re.I,
 )
 """What programs write where they have no reading."""
-_NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.I)
+# Digits are taken whole (++): of hundreds of them no pattern tries every length.
+_NUMBER: Final = re.compile(
+    r"[+-]?(\d++(\.\d*+)?|\.\d++)([eEdD][+-]?\d++)?|[+-]?(nan|inf(inity)?)", re.I
+)
 WITH_UNIT: Final = re.compile(
-    r"([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(?![eEdD][+-]?\d)([^\d\s.,;+-]\S{0,5})"
+    r"([+-]?[\d.]++(?:[eE][+-]?\d++)?)\s*+(?![eEdD][+-]?\d)([^\d\s.,;+-]\S{0,5})"
 )
 """``12.3°``; but ``5.9E-01`` is a number, not 5.9 of the unit E-01."""
 _DRESSED: Final = re.compile(
