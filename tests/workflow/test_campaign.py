@@ -275,7 +275,7 @@ def test_a_campaign_of_refused_records_ends_with_its_figures_places(
 
 def test_a_lost_result_is_made_again(campaign: Campaign) -> None:
     """Snakemake knows what the job of a chunk leaves, and no record's files."""
-    names = ("calibration.json", "diagnosis/damping.svg")
+    names = ("calibration.json", "diagnosis/diagnosis.json")
     lost = [campaign.results / "air-07" / name for name in names]
     for path in lost:
         path.rename(path.with_name("lost"))
