@@ -1,5 +1,6 @@
-"""The README's and the pages' lines do what they say, those of Python and those of the shell."""
+"""The lines of the README, the pages and the notebook do what they say."""
 
+import json
 import os
 import re
 import shlex
@@ -81,3 +82,16 @@ def test_the_commands_of_the_pages_run(page: Path, tmp_path: Path) -> None:
             check=False,
         )
         assert done.returncode == 0, f"{block}\n{done.stderr}"
+
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def test_every_cell_of_the_notebook_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(EXAMPLES)
+    notebook = json.loads((EXAMPLES / "first_steps.ipynb").read_text(encoding="utf-8"))
+    cells = ["".join(cell["source"]) for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    assert len(cells) > 5
+    names: dict[str, object] = {}
+    for source in cells:
+        exec(compile(source, "first_steps.ipynb", "exec"), names)

@@ -7,11 +7,22 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from pendpipe.cli import main
-from pendpipe.figures.campaign import draw_all, draw_fig03, draw_fig09
-from pendpipe.figures.decays import draw_decay, read_decay
+from pendpipe.figures.campaign import (
+    draw_all,
+    draw_fig03,
+    draw_fig04,
+    draw_fig05,
+    draw_fig06,
+    draw_fig09,
+    draw_fig10,
+)
+from pendpipe.figures.data import NothingToDrawError
+from pendpipe.figures.decays import draw_decay, draw_fig08, read_decay
 from pendpipe.figures.style import save
 from pendpipe.quantities import prefixed, with_error
 
@@ -130,3 +141,84 @@ def test_axes_have_a_prefix_instead_of_a_power_of_ten() -> None:
     assert prefixed(0.068, "rad") == (1e3, "mrad")
     assert prefixed(1.4e-6, "rad/s") == (1e6, "µrad/s")
     assert prefixed(1.0, "rad") == (1.0, "rad")
+
+
+looked_at = pytest.mark.mpl_image_compare(
+    style="default", tolerance=1, savefig_kwargs={"dpi": 50}, baseline_dir="baseline"
+)
+
+
+@looked_at
+@pytest.mark.parametrize(
+    "draw", [draw_fig04, draw_fig05, draw_fig06, draw_fig09, draw_fig10], ids=lambda f: f.__name__
+)
+def test_of_the_campaign(example: Any, draw: Any) -> Figure:
+    return draw(example.content)
+
+
+@looked_at
+def test_of_the_sensor(example: Any) -> Figure:
+    return draw_fig03(example.content["calibration"])
+
+
+@looked_at
+@pytest.mark.parametrize("draw", [draw_decay, draw_fig08], ids=lambda f: f.__name__)
+def test_of_a_decay(example: Any, draw: Any) -> Figure:
+    (entry,) = (each for each in example.content["records"] if each["record"] == "water-low-7")
+    return draw(read_decay(example.folder, entry))
+
+
+WATER, AIR = 15, 12
+
+
+def points(axes: Any) -> np.ndarray:
+    """All points with error bars, shape (n, 2)."""
+    return np.concatenate([np.column_stack(c[0].get_data()) for c in axes.containers])
+
+
+def curves(axes: Any, minimum: int = 30) -> list[np.ndarray]:
+    """The drawn curves of many points, each of shape (n, 2)."""
+    lines = [np.column_stack(line.get_data()) for line in axes.lines]
+    return [line for line in lines if len(line) >= minimum]
+
+
+def test_figure_4_line_is_k_f_squared(example: Any) -> None:
+    upper, lower = draw_fig04(example.content).axes[:2]
+    drawn = points(upper)
+    assert len(drawn) == AIR
+    (x0, x1), (y0, y1) = upper.lines[0].get_data()
+    assert (x0, y0) == (0.0, 0.0)
+    assert y1 / x1 == pytest.approx(example.content["hysteretic_coefficient"]["value"])
+    assert np.max(np.abs(points(lower)[:, 1])) < 1.0
+    assert "Hz²" in lower.get_xlabel()
+
+
+def test_figure_6_history_term_lowers_q_tenfold_and_more(example: Any) -> None:
+    axes = draw_fig06(example.content).axes[0]
+    for steady, full in np.array(curves(axes)).reshape(2, 2, -1, 2):
+        # 1 + a/delta is between 9 and 36 here; a decimal logarithm is drawn.
+        assert np.all((steady - full)[:, 1] > 0.95)
+        assert np.all((steady - full)[:, 1] < 1.6)
+    assert len(points(axes)) == WATER
+
+
+def test_figure_9_shows_the_drag_factor_below_the_theory(example: Any) -> None:
+    upper, lower = draw_fig09(example.content).axes
+    assert len(points(upper)) == len(points(lower)) == WATER
+    ratio = points(lower)
+    high = ratio[ratio[:, 0] > 0.8, 1]
+    # In the high branch water does nearly all the damping: 1/1.117 is the ratio.
+    assert high == pytest.approx(1 / 1.117, rel=0.02)
+
+
+@pytest.mark.parametrize("draw", [draw_fig05, draw_fig06, draw_fig09, draw_fig10])
+def test_without_theory_curves_there_is_nothing_to_draw(draw: Any, example: Any) -> None:
+    with pytest.raises(NothingToDrawError):
+        draw({**example.content, "curves": {}})
+
+
+def test_refused_records_are_not_drawn(example: Any) -> None:
+    records = [dict(entry) for entry in example.content["records"]]
+    records[0] = {"record": "water-high-1", "refused": "no decay"}
+    axes = draw_fig09({**example.content, "records": records}).axes[0]
+    assert len(points(axes)) == WATER - 1

@@ -1,16 +1,84 @@
-"""How one swing is written into tables and files, and what has to be read from them."""
+"""One swing, and how it is written into files of every dialect."""
 
 import re
+import struct
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pendpipe.formats import ReadOptions, read
 from pendpipe.recording import Recording
 
-from .decays import Floats, swing
+Floats = NDArray[np.float64]
+SHARED = Path(__file__).resolve().parents[3] / "shared" / "recordings"
+
+
+def swing(samples: int = 800, rate: float = 50.0, amplitude: float = 0.5) -> tuple[Floats, Floats]:
+    """Times and angles of a pendulum of 0.8 Hz with a logarithmic decrement of 0.0625.
+
+    Its period is longer by a sixteenth of the amplitude squared, as sin x has it.
+    """
+    time = np.arange(samples) / rate
+    late = amplitude**2 / 16 * (1 - np.exp(-0.1 * time)) / 0.1
+    return time, amplitude * np.exp(-0.05 * time) * np.cos(2 * np.pi * 0.8 * (time - late))
+
+
+@dataclass
+class WindaqFile:
+    """The fields of a WinDaq file to be put together, byte by byte."""
+
+    counts: NDArray[np.int64]
+    hires: bool = False
+    interval_s: float = 0.004
+    slope: float = 10 / 16384
+    intercept: float = 0.0
+    unit: bytes = b"Volt"
+    header_size: int = 1156
+    opened: int = 1_700_000_000
+    events: list[int] = field(default_factory=lambda: [0, 0])
+    annotations: list[bytes] = field(default_factory=list)
+    comments: bytes = b""
+    divisors: list[int] = field(default_factory=list)
+    state: int = 0
+    next_write: int = 0
+    data_bytes: int | None = None
+
+    def pack(self) -> bytes:
+        """Return the file's bytes."""
+        scans, channels = self.counts.shape
+        header = bytearray(self.header_size)
+        words = self.counts if self.hires else self.counts * 4
+        due = np.ones((scans, channels), dtype=bool)
+        if self.divisors:
+            due = np.arange(scans)[:, None] % np.array(self.divisors) == 0
+        data = words[due].astype("<i2").tobytes()
+        events = struct.pack(f"<{len(self.events)}i", *self.events)
+        texts = b"".join(text + b"\0" for text in (self.annotations or [b""] * channels))
+        struct.pack_into("<HH", header, 0, channels, 0)
+        header[4], header[5] = 110, 36
+        struct.pack_into("<h", header, 6, self.header_size)
+        size = 2 * scans * channels if self.data_bytes is None else self.data_bytes
+        struct.pack_into("<IIH", header, 8, size, len(events), len(texts))
+        struct.pack_into("<d", header, 28, self.interval_s)
+        struct.pack_into("<ii", header, 36, self.opened, self.opened + 60)
+        struct.pack_into("<i", header, 44, 1)
+        struct.pack_into("<HH", header, 56, self.next_write & 0xFFFF, self.next_write >> 16)
+        header[65] = self.state << 6
+        flags = 2 * self.hires | (bool(self.divisors) << 14) | 0x100
+        struct.pack_into("<H", header, 100, flags)
+        for channel in range(channels):
+            at = 110 + 36 * channel
+            struct.pack_into("<dd", header, at + 8, self.slope, self.intercept)
+            header[at + 24 : at + 24 + len(self.unit)] = self.unit
+            header[at + 31] = self.divisors[channel] if self.divisors else 1
+            header[at + 32] = channel + 1
+        struct.pack_into("<H", header, self.header_size - 2, 0x8001)
+        return bytes(header) + data + events + texts + self.comments
+
 
 AS_FOUND = ReadOptions()
 TIME, ANGLE = swing(1000, 50.0, 0.5)

@@ -11,8 +11,7 @@ from pendpipe.errors import InputError
 from pendpipe.formats import ReadOptions, inspect, read
 from pendpipe.formats.text import column_of_clock_times
 
-from .cases import ANGLE, DEGREES, RATE, TIME, each, read_as, same, text, with_lines
-from .decays import Floats, swing
+from .cases import ANGLE, DEGREES, RATE, TIME, Floats, each, read_as, same, swing, text, with_lines
 
 HEAD = "t (s),theta (rad)\n"
 PLAIN = text(TIME, ANGLE, head=HEAD)

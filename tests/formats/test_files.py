@@ -24,8 +24,7 @@ from scipy.io import savemat
 from pendpipe.errors import InputError
 from pendpipe.formats import containers, inspect, read, table, trees
 
-from .cases import ANGLE, DEGREES, TIME, Case, check, each, read_as, same, text
-from .decays import Floats
+from .cases import ANGLE, DEGREES, TIME, Case, Floats, check, each, read_as, same, text
 
 PLAIN = text(TIME, ANGLE, head="t (s),theta (rad)\n")
 PAIRS = list(zip(TIME.round(3).tolist(), ANGLE.round(6).tolist(), strict=True))

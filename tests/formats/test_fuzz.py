@@ -13,7 +13,7 @@ from pendpipe.errors import InputError
 from pendpipe.formats import inspect, read
 from pendpipe.recording import check
 
-from .decays import WindaqFile, swing
+from .cases import WindaqFile, swing
 
 TIME, ANGLE = swing(60, 10.0)
 _COUNTS = np.rint(ANGLE * 8000).astype(np.int64)[:, None]

@@ -1,5 +1,6 @@
-"""A dialect of another package is found; one that fails is named in a line and passed over."""
+"""Dialects: each knows its own files, by samples; those of another package are found."""
 
+import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,8 +10,8 @@ import numpy as np
 import pytest
 
 from pendpipe.errors import InputError
-from pendpipe.formats import dialects, read
-from pendpipe.formats.plugin import Dialect, text_dialect
+from pendpipe.formats import dialects, inspect, read
+from pendpipe.formats.plugin import HEAD, Dialect, text_dialect
 
 TIME_S = np.arange(200) / 20.0
 ANGLE_RAD = 0.2 * np.exp(-0.1 * TIME_S) * np.cos(5.0 * TIME_S)
@@ -84,3 +85,28 @@ def test_a_plugin_that_fails_is_named_and_passed_over(
     path.write_bytes(b"\0\1\2" * 900)
     with pytest.raises(InputError, match=f"no reader knows this file.*'{said}' is passed over"):
         read(path)
+
+
+HERE = Path(__file__).parent
+EXPECTED = [path for path in sorted(HERE.glob("*/*.json")) if path.with_suffix("").exists()]
+
+
+@pytest.mark.parametrize("expected", EXPECTED, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_a_sample_file_reads_as_expected(expected: Path) -> None:
+    path, says = expected.with_suffix(""), json.loads(expected.read_text())
+    recording, found = read(path), inspect(path)
+    assert (found.chosen, found.unit) == (says["chosen"], says["unit"])
+    assert (found.samples, found.uniform) == (says["samples"], True)
+    assert found.sample_rate_hz == pytest.approx(says["sample_rate_hz"], rel=1e-3)
+    size = abs(recording.values).max()
+    assert recording.values[0] == pytest.approx(says["first"], abs=2e-3 * size)
+    assert recording.values[-1] == pytest.approx(says["last"], abs=2e-3 * size)
+    assert recording.unit_is_stated is says.get("unit_is_stated", True)
+
+
+@pytest.mark.parametrize("sample", EXPECTED, ids=lambda path: path.stem)
+def test_no_file_is_claimed_by_two_dialects(sample: Path) -> None:
+    """A plain table by none."""
+    head = sample.with_suffix("").read_bytes()[:HEAD]
+    mine = [dialect.name for dialect in dialects.dialects()[0] if dialect.is_mine(head)]
+    assert len(mine) == (sample.parent.name != "plain_table")

@@ -10,7 +10,7 @@ from pendpipe.analysis.free_decay import find_free_decay
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.formats import ReadOptions, inspect, read
 
-from .decays import SHARED
+from .cases import SHARED
 
 pytestmark = pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/recordings here")
 

@@ -7,8 +7,7 @@ import pytest
 
 from pendpipe.formats import ReadOptions
 
-from .cases import ANGLE, DEGREES, RATE, TIME, Case, check, clock, each, text, with_lines
-from .decays import swing
+from .cases import ANGLE, DEGREES, RATE, TIME, Case, check, clock, each, swing, text, with_lines
 
 SLOW_S, SLOW = swing(1500, 30.0, 0.5)
 LARGE = swing(1000, 50.0, 1.1)[1]

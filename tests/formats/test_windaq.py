@@ -8,7 +8,7 @@ import pytest
 from pendpipe.errors import InputError
 from pendpipe.formats import ReadOptions, inspect, read
 
-from .decays import WindaqFile, swing
+from .cases import WindaqFile, swing
 
 COUNTS = np.rint(swing(2000, 250.0)[1] * 8000).astype(np.int64)[:, None]
 TWO = np.hstack([COUNTS, np.roll(COUNTS, 100)])

@@ -1,14 +1,59 @@
-"""A result that is not what its stage wrote is named, set aside, and never read."""
+"""A result is whole and undamaged, or absent; a refusal says why, and a damage is mended."""
 
+import errno
 import os
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pendpipe import __version__, manifest
-from pendpipe.errors import DamagedError
-from pendpipe.files import read_json
+from pendpipe.errors import DamagedError, InputError, UnwritableError
+from pendpipe.files import read_json, replaced, write_json
+from pendpipe.stages.refusal import reason_of, run_stage
+
+
+def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "result.csv"
+    path.write_text("# made_by: pendpipe 0\n")
+    with pytest.raises(RuntimeError), replaced(path) as stream:
+        stream.write("half")
+        raise RuntimeError
+    assert path.read_text() == "# made_by: pendpipe 0\n"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_json_has_null_where_there_is_no_finite_value(tmp_path: Path) -> None:
+    content = {"a": np.float64("nan"), "b": [1.0, float("inf")], "c": np.arange(2)}
+    write_json(tmp_path / "x.json", content)
+    assert read_json(tmp_path / "x.json") == {"a": None, "b": [1.0, None], "c": [0, 1]}
+
+
+@pytest.mark.parametrize("content", ["", '{"a": 1', "[" * 100_000, "\x00"])
+def test_a_torn_json_is_named_in_one_line(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "fit.json"
+    path.write_text(content)
+    with pytest.raises(DamagedError, match=r"fit\.json: ") as caught:
+        read_json(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_pipe_is_written_to_and_not_replaced(tmp_path: Path) -> None:
+    if not hasattr(os, "mkfifo"):
+        pytest.skip("this system has no named pipes")
+    pipe = tmp_path / "pipe.csv"
+    os.mkfifo(pipe)
+    got: list[str] = []
+    reader = threading.Thread(target=lambda: got.append(pipe.read_text(encoding="utf-8")))
+    reader.start()
+    with replaced(pipe) as stream:
+        stream.write("time_s,volts\n")
+    reader.join(10)
+    assert got == ["time_s,volts\n"]
+    assert pipe.is_fifo()
+    assert list(tmp_path.iterdir()) == [pipe]
 
 
 @pytest.fixture
@@ -205,3 +250,96 @@ def test_a_stage_that_fails_leaves_no_claim_about_its_results(home: Path) -> Non
     with pytest.raises(ZeroDivisionError), manifest.job(home, "fit"):
         raise ZeroDivisionError
     assert read_json(home / "manifest/fit.json")["outputs"] == {}
+
+
+def fails() -> None:
+    raise InputError("a.csv", "there is no decay", "record one")
+
+
+def breaks() -> None:
+    raise ZeroDivisionError
+
+
+def test_a_refused_record_leaves_one_line_and_whole_stubs(tmp_path: Path) -> None:
+    refused, out = tmp_path / "refused.json", tmp_path / "fit.json"
+    run_stage("fit", "x", fails, outputs=[out], refused=refused)
+    assert read_json(refused) == {
+        "schema_version": 1,
+        "record": "x",
+        "stage": "fit",
+        "reason": "a.csv: there is no decay; record one",
+    }
+    assert read_json(out)["refused"] == "a.csv: there is no decay; record one"
+
+
+@pytest.mark.parametrize(
+    "folder",
+    [
+        "/home/me/data",
+        "/home/my data",
+        "/home/a,b/c  d (1)",
+        "C:/Users/R. D. P",
+        "/home/été/\u202eabc;",
+    ],
+)
+def test_a_refusal_names_no_folder_however_it_is_called(tmp_path: Path, folder: str) -> None:
+    source = Path(folder, "run 7.csv")
+
+    def fails_there() -> None:
+        raise InputError(f"{source}, line 3", "no number", f"fix {source}")
+
+    refused = tmp_path / "x/refused.json"
+    outputs = [tmp_path / "x/recording.csv"]
+    run_stage("acquire", "x", fails_there, outputs=outputs, refused=refused, sources=[source])
+    assert read_json(refused)["reason"] == "run 7.csv, line 3: no number; fix run 7.csv"
+
+
+def test_the_stages_after_a_refusal_pass_it_on_until_the_record_is_mended(tmp_path: Path) -> None:
+    refused, out = tmp_path / "refused.json", tmp_path / "fit.json"
+    recording = tmp_path / "recording.csv"
+    run_stage("acquire", "x", fails, outputs=[recording], refused=refused)
+    run_stage("fit", "x", breaks, outputs=[out], refused=refused)
+    assert "no decay" in read_json(out)["refused"]
+    run_stage("acquire", "x", lambda: write(recording, ""), outputs=[recording], refused=refused)
+    assert reason_of(refused) is None
+
+
+@pytest.mark.parametrize(("fault", "kind"), [("fails", InputError), ("breaks", ZeroDivisionError)])
+def test_what_is_no_refusal_ends_the_program(
+    fault: str, kind: type[Exception], tmp_path: Path
+) -> None:
+    """A fault of the program's own, and one without a place for refusals."""
+    refused = tmp_path / "refused.json" if fault == "breaks" else None
+    with pytest.raises(kind):
+        run_stage("fit", "x", globals()[fault], outputs=[tmp_path / "fit.json"], refused=refused)
+    assert not (tmp_path / "refused.json").exists()
+
+
+def test_a_damaged_result_refuses_no_record(tmp_path: Path) -> None:
+    recording, fit = tmp_path / "recording.csv", tmp_path / "fit.json"
+    refused = tmp_path / "refused.json"
+    run_stage(
+        "acquire", "x", lambda: write(recording, "whole"), outputs=[recording], refused=refused
+    )
+    write(recording, "torn")
+    with pytest.raises(DamagedError):
+        run_stage("fit", "x", fails, outputs=[fit], refused=refused, inputs=[recording])
+    assert not refused.exists()
+    assert not fit.exists()
+
+
+def write(path: Path, text: str) -> None:
+    path.write_text(text)
+
+
+def test_a_full_disk_refuses_no_record(tmp_path: Path) -> None:
+    refused, out = tmp_path / "x/refused.json", tmp_path / "x/recording.csv"
+
+    def has_no_room() -> None:
+        with replaced(out):
+            raise OSError(errno.EFBIG, "File too large")
+
+    with pytest.raises(UnwritableError, match="too large"):
+        run_stage("acquire", "x", has_no_room, outputs=[out], refused=refused)
+    assert not refused.exists()
+    assert not out.exists()
