@@ -142,7 +142,6 @@ def test_a_lost_scan_is_a_row_and_not_a_join() -> None:
     """Volts 0, (lost), 1 LSB: the time of the last is two intervals after the first."""
     recording = decode_recording(written(b"\x00\x81", b"\x81", b"\x08\x81"))
     assert recording.time_s.tolist() == [0.0, 0.01, 0.02]
-    assert recording.quality is not None
     assert recording.quality.tolist() == [SUSPECT, MISSING, 0]
     assert recording.values[[0, 2]].tolist() == [0.0, 20 / 4096]
     assert any("1 scans lost at 1 places" in note for note in recording.notes)
@@ -156,7 +155,6 @@ def test_a_damaged_first_frame_moves_nothing() -> None:
     damaged[whole.index(b"\x02\x81")] ^= 8
     recording = decode_recording(bytes(damaged))
     assert recording.time_s.tolist() == sound.time_s.tolist()
-    assert recording.quality is not None
     assert recording.quality.tolist() == [MISSING] + [0] * 7
     assert recording.values[1:].tolist() == sound.values[1:].tolist()
     assert any("1 scans are lost" in note for note in recording.notes)

@@ -69,7 +69,6 @@ def test_the_stated_precision_is_the_cramer_rao_bound() -> None:
     assert result.parameters["c"].sd == pytest.approx(bound[2], rel=0.04)
     assert free[0] == pytest.approx(bound[0], rel=0.01)
     limit = result.quality_factor_limit
-    assert limit is not None
     assert limit.sd / limit.value == pytest.approx(bound[1] / 0.01192, rel=0.02)
 
 

@@ -13,7 +13,6 @@ BALL = Sphere(0.3, 0.02, 0.7, submerged=True)
 
 def test_the_history_term_divides_q_by_one_and_a_over_delta() -> None:
     curve = theory_curve([ROD, BALL], *WATER)
-    assert curve is not None
     delta = np.sqrt(2.0 * 1.0e-3 / (998.0 * 2.0 * np.pi * curve["frequency_hz"]))
     assert curve["a_over_delta"] == pytest.approx(0.02 / delta)
     ratio = curve["quality_factor_viscous_steady"] / curve["quality_factor_viscous_theory"]

@@ -30,6 +30,8 @@ from pendpipe.campaign.fit import (
 
 from .campaigns import data, default
 
+DESIGN = default()
+
 
 def excess_over_eq16(record: str) -> float:
     """B's viscous part over Eq. 16's, less 1, of a record of the default design."""
@@ -69,23 +71,21 @@ def test_the_fluid_remembers_the_velocity_that_the_loss_torque_took(
     record: str, percent: float
 ) -> None:
     """b_h = kappa''/(2 omega (I - I_visc/4)): more than Eq. 10 says, by the same share as b_v."""
-    design = default()
-    number = next(n for n, run in enumerate(design.runs) if run.record == record)
-    at = np.zeros(len(design.nuisances))
-    frequency, rate = predict(design, (), at)[number]
-    without = predict(replace(design, coefficient_s2=1e12), (), at)[number, 1]
-    solid = np.pi / (design.coefficient_s2 * frequency)  # k f^2 whatever the inertia
+    number = next(n for n, run in enumerate(DESIGN.runs) if run.record == record)
+    at = np.zeros(len(DESIGN.nuisances))
+    frequency, rate = predict(DESIGN, (), at)[number]
+    without = predict(replace(DESIGN, coefficient_s2=1e12), (), at)[number, 1]
+    solid = np.pi / (DESIGN.coefficient_s2 * frequency)  # k f^2 whatever the inertia
     assert 100.0 * ((rate - without) / solid - 1.0) == pytest.approx(percent, abs=0.02)
 
 
 @pytest.mark.parametrize(("name", "sds"), [("gravity", 2.0), ("clock", 1.0)])
 def test_gravity_and_clock_are_no_causes(name: str, sds: float) -> None:
     """0.2 % of g, or 100 ppm of the clock, is within what the configuration states."""
-    design = default()
-    moved = np.zeros(len(design.nuisances))
-    moved[design.index[name]] = sds
-    measured = data(design, moved=moved)
-    answer = search(design, measured)
+    moved = np.zeros(len(DESIGN.nuisances))
+    moved[DESIGN.index[name]] = sds
+    measured = data(DESIGN, moved=moved)
+    answer = search(DESIGN, measured)
     assert not answer.missing
     k = coefficient(answer.baseline)
     assert abs(k.value - 3940.0) < k.sd
@@ -106,8 +106,7 @@ def test_a_support_takes_energy_by_the_pull_on_it() -> None:
 
 
 def test_what_the_model_predicts_is_fitted_exactly() -> None:
-    design = default()
-    fit = joint_fit(design, data(design))
+    fit = joint_fit(DESIGN, data(DESIGN))
     assert fit.chi2 < 1e-12
     assert coefficient(fit).value == pytest.approx(3940.0, rel=1e-9)
     torques = loss_torques(fit)
@@ -117,8 +116,7 @@ def test_what_the_model_predicts_is_fitted_exactly() -> None:
 
 def test_priors_decide_where_the_records_say_nothing() -> None:
     """Viscosity and drag factor change b alike, so that half a kelvin limits the factor."""
-    design = default()
-    fit = joint_fit(design, data(design), named("uniform-drag-excess"))
+    fit = joint_fit(DESIGN, data(DESIGN), named("uniform-drag-excess"))
     per_kelvin = float(np.log(physics.water_viscosity(19.5) / physics.water_viscosity(20.5)))
     from_temperature = 0.5 * 0.5 * per_kelvin  # b goes as the root of the viscosity
     sphere = np.hypot(2 * 2.5e-5 / 0.019, 2 * 5e-4 / 0.452)
@@ -126,9 +124,8 @@ def test_priors_decide_where_the_records_say_nothing() -> None:
 
 
 def test_moments_of_inertia_share_their_errors() -> None:
-    design = default()
-    distances, frequency = inertia_errors(design)
-    names = [run.record for run in design.runs]
+    distances, frequency = inertia_errors(DESIGN)
+    names = [run.record for run in DESIGN.runs]
     low, first = names.index("water-low-7"), names.index("water-low-1")
     both = distances.T @ distances
     # One zero of the scale: neighbouring records' inertias are wrong together.
@@ -140,10 +137,9 @@ def test_moments_of_inertia_share_their_errors() -> None:
 
 
 def test_nothing_missing_is_found_where_nothing_is() -> None:
-    design = default()
-    moved = np.random.default_rng(5).standard_normal(len(design.nuisances))
+    moved = np.random.default_rng(5).standard_normal(len(DESIGN.nuisances))
     moved[0] = 0.0
-    answer = search(design, data(design, seed=5, moved=moved))
+    answer = search(DESIGN, data(DESIGN, seed=5, moved=moved))
     assert not answer.missing
     assert answer.found == ()
 
@@ -161,9 +157,8 @@ def test_nothing_missing_is_found_where_nothing_is() -> None:
     ],
 )
 def test_a_hidden_cause_is_in_the_class(hidden: str, size: float) -> None:
-    design = default()
-    cause = tuple(Candidate(one.effect, one.effect.shapes_in(design)[0]) for one in named(hidden))
-    answer = search(design, data(design, cause, (size,), seed=7))
+    cause = tuple(Candidate(one.effect, one.effect.shapes_in(DESIGN)[0]) for one in named(hidden))
+    answer = search(DESIGN, data(DESIGN, cause, (size,), seed=7))
     assert answer.missing
     members = [answer.found[0].leader, *(rival for rival, _ in answer.found[0].rivals)]
     inside = {rival.last.identifier: rival for rival in members}
@@ -173,37 +168,35 @@ def test_a_hidden_cause_is_in_the_class(hidden: str, size: float) -> None:
     assert len(answer.found) == 1
     # Each other cause is excluded, and by more than the records tell the members apart.
     assert not set(inside) & set(answer.excluded)
-    tried = {one.effect.identifier for one in candidates(design)}
+    tried = {one.effect.identifier for one in candidates(DESIGN)}
     assert set(inside) | set(answer.excluded) == tried
     assert min(answer.excluded.values()) > 0.0
 
 
 def test_what_only_the_benchmark_separates_is_lost_without_it() -> None:
-    design = default()
-    whole = joint_values(design, data(design))
+    whole = joint_values(DESIGN, data(DESIGN))
     k = whole["with_benchmark"]["hysteretic_coefficient"]["sd"]
     assert whole["without_benchmark"]["hysteretic_coefficient"]["sd"] > 2.5 * k
 
 
 def test_a_record_is_predicted_from_the_others_as_a_refit_would() -> None:
-    design = default()
-    measured = data(design, seed=3)
-    densities, _ = held_out(joint_fit(design, measured))
+    measured = data(DESIGN, seed=3)
+    densities, _ = held_out(joint_fit(DESIGN, measured))
     number = 6
-    keep = np.arange(len(design.runs)) != number
-    fewer = joint_fit(*only(design, measured, keep))
+    keep = np.arange(len(DESIGN.runs)) != number
+    fewer = joint_fit(*only(DESIGN, measured, keep))
     names = [each.name for each in fewer.design.nuisances]
-    index = [names.index(n.name) if n.name in names else -1 for n in design.nuisances]
+    index = [names.index(n.name) if n.name in names else -1 for n in DESIGN.nuisances]
     at = np.where(np.array(index) >= 0, fewer.unknowns[index], 0.0)
     spread = np.eye(len(at))
     known = np.flatnonzero(np.array(index) >= 0)
     spread[np.ix_(known, known)] = fewer.covariance[
         np.ix_(np.array(index)[known], np.array(index)[known])
     ]
-    full = joint_fit(design, measured)
+    full = joint_fit(DESIGN, measured)
     rows = slice(2 * number, 2 * number + 2)
     slope = full.jacobian[rows]
-    off = measured.whitening[number] @ (predict(design, (), at)[number] - measured.values[number])
+    off = measured.whitening[number] @ (predict(DESIGN, (), at)[number] - measured.values[number])
     covariance = slope @ spread @ slope.T + np.eye(2)
     expected = -0.5 * (
         off @ np.linalg.solve(covariance, off)
@@ -227,12 +220,11 @@ def test_a_record_with_too_large_a_loss_is_pulled_up(sigmas: float) -> None:
 
 
 def test_a_class_of_two_is_told_apart_by_another_fluid_and_not_by_repeats() -> None:
-    design = default()
     added = named("uniform-drag-excess")
-    measured = data(design, added, (0.12,))
-    fit = joint_fit(design, measured, added)
+    measured = data(DESIGN, added, (0.12,))
+    fit = joint_fit(DESIGN, measured, added)
     rivals = [
-        joint_fit(design, measured, named(name))
+        joint_fit(DESIGN, measured, named(name))
         for name in ("viscosity-temperature", "history-term")
     ]
     runs = next_measurements(fit, rivals)
@@ -246,9 +238,8 @@ def test_a_class_of_two_is_told_apart_by_another_fluid_and_not_by_repeats() -> N
 
 
 def test_scores_of_noise_are_normal_and_the_largest_counts_all_trials() -> None:
-    design = default()
-    fit = joint_fit(design, data(design, seed=11))
-    tried = candidates(design)
+    fit = joint_fit(DESIGN, data(DESIGN, seed=11))
+    tried = candidates(DESIGN)
     scores, correlations = local_scores(fit, tried)
     assert np.all(np.abs(scores) < 5.0)
     seen = np.diag(correlations) > 0.5
@@ -259,28 +250,25 @@ def test_scores_of_noise_are_normal_and_the_largest_counts_all_trials() -> None:
 
 
 def test_effects_vanish_at_size_zero() -> None:
-    design = default()
-    plain = predict(design, (), np.zeros(len(design.nuisances)))
-    for one in candidates(design):
-        with_it = predict(design, (one,), np.zeros(len(design.nuisances) + 1))
+    plain = predict(DESIGN, (), np.zeros(len(DESIGN.nuisances)))
+    for one in candidates(DESIGN):
+        with_it = predict(DESIGN, (one,), np.zeros(len(DESIGN.nuisances) + 1))
         assert with_it == pytest.approx(plain, rel=1e-14), one
 
 
 def test_every_effect_changes_some_record() -> None:
-    design = default()
-    fit = joint_fit(design, data(design))
-    assert set(CATALOGUE) == {one.effect.identifier for one in candidates(design)}
-    for one in candidates(design):
+    fit = joint_fit(DESIGN, data(DESIGN))
+    assert set(CATALOGUE) == {one.effect.identifier for one in candidates(DESIGN)}
+    for one in candidates(DESIGN):
         assert np.linalg.norm(fit.derivative(one)) > 1.0, one
 
 
 def test_a_branch_is_a_shape() -> None:
-    design = default()
     high = Candidate(CATALOGUE["moment-of-inertia"], ("branch", "high"))
-    plain = predict(design, (), np.zeros(len(design.nuisances)))
-    moved = predict(design, (high,), np.append(np.zeros(len(design.nuisances)), 1.0))
+    plain = predict(DESIGN, (), np.zeros(len(DESIGN.nuisances)))
+    moved = predict(DESIGN, (high,), np.append(np.zeros(len(DESIGN.nuisances)), 1.0))
     changed = np.any(moved != plain, axis=-1)
-    assert changed.tolist() == [run.branch == "high" for run in design.runs]
+    assert changed.tolist() == [run.branch == "high" for run in DESIGN.runs]
 
 
 @pytest.mark.parametrize("surface", ["slip", "film"])
@@ -288,8 +276,7 @@ def test_a_branch_is_a_shape() -> None:
 def test_walls_between_the_computed_ones_are_those_of_the_tank(
     surface: Surface, higher: float
 ) -> None:
-    tank = default().apparatus.tank
-    assert tank is not None
+    tank = DESIGN.apparatus.tank
     for close, depth in ((0.05, 0.04), (0.2, 0.1), (0.35, 0.03)):
         deep = 2.0 * close ** (-1.0 / 3.0)
         exact = physics.sphere_in_tank(
@@ -308,8 +295,7 @@ def test_walls_between_the_computed_ones_are_those_of_the_tank(
 
 
 def test_a_sphere_that_hangs_low_has_walls_too() -> None:
-    tank = default().apparatus.tank
-    assert tank is not None
+    tank = DESIGN.apparatus.tank
     low = tank.model_copy(update={"height_m": 0.3 * tank.depth_m})
     half = confined(tank, "slip", np.array(0.15), np.array(0.05))[0]
     assert confined(low, "slip", np.array(0.15), np.array(0.05))[0] > half
@@ -318,21 +304,20 @@ def test_a_sphere_that_hangs_low_has_walls_too() -> None:
 
 
 def test_the_height_in_the_tank_is_uncertain_and_matters_near_walls_only() -> None:
-    design = default()
     walls = Candidate(CATALOGUE["wall-confinement"], "film")
-    row = [each.name for each in design.nuisances].index("height in the tank")
-    at = np.zeros(len(design.nuisances) + 1)
+    row = [each.name for each in DESIGN.nuisances].index("height in the tank")
+    at = np.zeros(len(DESIGN.nuisances) + 1)
     moved = at.copy()
     moved[row] = 1.0
-    assert np.array_equal(predict(design, (walls,), at), predict(design, (walls,), moved))
+    assert np.array_equal(predict(DESIGN, (walls,), at), predict(DESIGN, (walls,), moved))
     at[-1] = moved[-1] = 2.0
-    changed = predict(design, (walls,), at) != predict(design, (walls,), moved)
-    assert changed[design.wet > 0.0].all()
-    assert not changed[design.wet == 0.0].any()
+    changed = predict(DESIGN, (walls,), at) != predict(DESIGN, (walls,), moved)
+    assert changed[DESIGN.wet > 0.0].all()
+    assert not changed[DESIGN.wet == 0.0].any()
 
 
 def test_a_sphere_far_from_all_walls_is_free() -> None:
-    tank = default().apparatus.tank
+    tank = DESIGN.apparatus.tank
     assert tank is not None
     drag, mass = confined(tank, "slip", np.zeros(3), np.array([0.02, 0.05, 0.1]))
     assert drag.tolist() == [1.0, 1.0, 1.0]

@@ -8,12 +8,14 @@ from pendpipe.campaign.fit import Measured, named
 
 from .campaigns import data, default
 
+DESIGN = default()
+
 
 def odd_record(record: str, percent: float, seed: int) -> Measured:
     """Sound data but for one b."""
     found = data(default(), seed=seed)
     values = found.values.copy()
-    number = [run.record for run in default().runs].index(record)
+    number = [run.record for run in DESIGN.runs].index(record)
     values[number, 1] *= 1.0 + 0.01 * percent
     return found._replace(values=values)
 
@@ -38,11 +40,10 @@ def test_a_record_that_disagrees_is_named_and_no_cause(record: str, percent: flo
 
 
 def test_a_cause_is_found_beside_a_record_that_disagrees() -> None:
-    design = default()
     hidden = named("uniform-drag-excess")
-    moved = np.zeros(len(design.nuisances))
-    moved[design.index["distance of lower at 0.2129 m"]] = 20.0  # a weight 2 mm off
-    answer = search(design, data(design, hidden, (0.117,), seed=5, moved=moved))
+    moved = np.zeros(len(DESIGN.nuisances))
+    moved[DESIGN.index["distance of lower at 0.2129 m"]] = 20.0  # a weight 2 mm off
+    answer = search(DESIGN, data(DESIGN, hidden, (0.117,), seed=5, moved=moved))
     assert [far.record for far in answer.left_out] == ["water-high-4"]
     (found,) = answer.found
     inside = {found.leader.last.identifier, *(r.last.identifier for r, _ in found.rivals)}
@@ -51,11 +52,10 @@ def test_a_cause_is_found_beside_a_record_that_disagrees() -> None:
 
 def test_nothing_is_named_where_the_scan_is_silent() -> None:
     """Off by 2 sigma from one record to the next, b makes chi^2 alarm, and no pattern."""
-    design = default()
-    found = data(design)
+    found = data(DESIGN)
     values = found.values.copy()
     values[np.argsort(values[:, 0]), 1] *= 1.0 + 0.002 * (-1.0) ** np.arange(len(values))
-    answer = search(design, found._replace(values=values))
+    answer = search(DESIGN, found._replace(values=values))
     assert answer.missing
     assert (answer.found, answer.left_out) == ((), ())
     content = campaign_diagnosis(answer, {})
@@ -65,8 +65,7 @@ def test_nothing_is_named_where_the_scan_is_silent() -> None:
 
 def test_nothing_competes_with_the_causes() -> None:
     """Near the level of the alarm the evidence for a cause is no 99 %."""
-    design = default()
-    answer = search(design, data(design, named("uniform-drag-excess"), (0.025,), seed=5))
+    answer = search(DESIGN, data(DESIGN, named("uniform-drag-excess"), (0.025,), seed=5))
     content = campaign_diagnosis(answer, {})
     assert 0.001 < answer.p_value < 0.01
     (effect,) = content["effects"]
@@ -83,18 +82,16 @@ def test_nothing_competes_with_the_causes() -> None:
 
 
 def test_two_causes_are_one_sentence() -> None:
-    design = default()
     both = named("uniform-drag-excess", "grease-drag")
-    content = campaign_diagnosis(search(design, data(design, both, (0.117, 2e-5), seed=5)), {})
+    content = campaign_diagnosis(search(DESIGN, data(DESIGN, both, (0.117, 2e-5), seed=5)), {})
     assert len(content["effects"]) == 2
     assert content["statement"].count("Most probable") == 1
     assert "beside each other" in content["statement"]
 
 
 def test_a_record_that_would_not_swing_in_glycerol_is_said() -> None:
-    design = default()
     hidden = named("uniform-drag-excess")
-    content = campaign_diagnosis(search(design, data(design, hidden, (0.117,), seed=5)), {})
+    content = campaign_diagnosis(search(DESIGN, data(DESIGN, hidden, (0.117,), seed=5)), {})
     runs = {run["measurement"]: run for run in content["effects"][0]["next_measurements"]}
     assert runs["half glycerol, half water"]["would_not_swing"] == ["water-low-1"]
     assert runs["the same records once more"]["would_not_swing"] == []

@@ -19,6 +19,8 @@ from pendpipe.stages.separate import is_line, separated
 
 from .campaigns import data, default
 
+DESIGN = default()
+
 
 def values_of(design: Design, found: Measured) -> Values:
     values = campaign_values(design, found)
@@ -27,7 +29,7 @@ def values_of(design: Design, found: Measured) -> Values:
 
 
 def number_of(record: str) -> int:
-    return [run.record for run in default().runs].index(record)
+    return [run.record for run in DESIGN.runs].index(record)
 
 
 @pytest.mark.parametrize("inertia_exponent", [0.0, 1.0])
@@ -48,8 +50,7 @@ def test_an_exact_campaign_gives_its_k_and_its_drag(inertia_exponent: float, fac
 
 
 def test_an_exact_campaign_gives_its_history_coefficient() -> None:
-    design = default()
-    found = values_of(design, data(design, named("history-term"), (0.3,))).history_coefficient
+    found = values_of(DESIGN, data(DESIGN, named("history-term"), (0.3,))).history_coefficient
     assert found.estimate.value == pytest.approx(1.3, abs=1e-3)
 
 
@@ -116,8 +117,7 @@ def _rate(values: Values, number: int) -> float:
 
 
 def test_errors_are_traced_to_their_sources() -> None:
-    design = default()
-    factor = values_of(design, data(design, seed=1)).theory_factor
+    factor = values_of(DESIGN, data(DESIGN, seed=1)).theory_factor
     budget = factor.budget
     whole = np.linalg.norm(list(budget.values()))
     assert whole == pytest.approx(factor.estimate.sd / factor.estimate.value, rel=1e-6)
@@ -127,8 +127,8 @@ def test_errors_are_traced_to_their_sources() -> None:
     drag = 0.52 * np.log(viscosity[1] / viscosity[0]) / 2.0
     drag += 0.48 * np.log(density[1] / density[0]) / 2.0
     assert budget["thermometer"] == pytest.approx(drag, rel=0.05)
-    without = replace(design, apparatus=_apparatus(design, assembly_relative_sd=0.0))
-    fewer = values_of(without, data(design, seed=1)).theory_factor
+    without = replace(DESIGN, apparatus=_apparatus(DESIGN, assembly_relative_sd=0.0))
+    fewer = values_of(without, data(DESIGN, seed=1)).theory_factor
     assert LOSS in budget
     assert LOSS not in fewer.budget
     assert fewer.estimate.sd < factor.estimate.sd
@@ -140,8 +140,7 @@ def _apparatus(design: Design, **law: float) -> object:
 
 
 def test_exponents_of_the_two_branches_are_near_the_papers() -> None:
-    design = default()
-    found = values_of(design, data(design, named("uniform-drag-excess"), (0.117,))).exponents
+    found = values_of(DESIGN, data(DESIGN, named("uniform-drag-excess"), (0.117,))).exponents
     assert set(found) == {"high", "low"}
     assert found["high"].exponent.value == pytest.approx(-5.7, abs=0.15)
     assert found["low"].exponent.value == pytest.approx(0.5, abs=0.05)
@@ -151,9 +150,8 @@ def test_exponents_of_the_two_branches_are_near_the_papers() -> None:
 
 def test_slope_and_curvature_of_a_branch_are_those_of_its_readings() -> None:
     """The unweighted slope of ln Q on ln f, and twice the parabola's coefficient."""
-    design = default()
-    found = values_of(design, data(design, seed=4))
-    rows = [n for n in found.wet if design.runs[n].branch == "low"]
+    found = values_of(DESIGN, data(DESIGN, seed=4))
+    rows = [n for n in found.wet if DESIGN.runs[n].branch == "low"]
     log = np.log(found.quantities["frequency"][rows])
     quality = log - np.log(found.quantities["viscous_rate"][rows])
     low = found.exponents["low"]
@@ -167,8 +165,7 @@ def chosen(design: Design, found: Measured, *names: str) -> tuple[Design, Measur
 
 
 def test_one_frequency_has_a_factor_and_no_exponent() -> None:
-    design = default()
-    found = values_of(*chosen(design, data(design), "water-high-4", "air-07"))
+    found = values_of(*chosen(DESIGN, data(DESIGN), "water-high-4", "air-07"))
     assert found.exponents == {}
     assert found.theory_factor.estimate.value == pytest.approx(1.0, rel=1e-6)
     assert np.isnan(found.theory_factor.p_value)
@@ -176,24 +173,21 @@ def test_one_frequency_has_a_factor_and_no_exponent() -> None:
 
 
 def test_without_a_benchmark_nothing_is_separated() -> None:
-    design = default()
-    wet = only(design, data(design), design.wet > 0.0)
+    wet = only(DESIGN, data(DESIGN), DESIGN.wet > 0.0)
     assert campaign_values(*wet) is None
 
 
 def test_a_loss_torque_that_depends_on_the_rate_is_no_line() -> None:
-    design = default()
-    found = values_of(design, data(design, (Candidate(RATE_EXPONENT),), (0.1,)))
+    found = values_of(DESIGN, data(DESIGN, (Candidate(RATE_EXPONENT),), (0.1,)))
     assert found.benchmark.free_exponent.value == pytest.approx(1.9, abs=1e-6)
     assert found.benchmark.p_value < WORST_LINE
 
 
 def test_a_record_measures_its_own_drag() -> None:
     """One odd record moves itself, and hardly the others."""
-    design = default()
     odd = Candidate(DRAG_OF_ONE_RECORD, "water-low-5")
     plain, found = (
-        values_of(design, data(design, *moved)) for moved in (((), ()), ((odd,), (0.3,)))
+        values_of(DESIGN, data(DESIGN, *moved)) for moved in (((), ()), ((odd,), (0.3,)))
     )
     names = found.records
     factor = found.quantities["factor"][found.wet]
@@ -203,8 +197,7 @@ def test_a_record_measures_its_own_drag() -> None:
 
 
 def test_only_the_whole_theory_meets_the_whole_truth() -> None:
-    design = default()
-    checks = values_of(design, data(design, seed=3)).checks()
+    checks = values_of(DESIGN, data(DESIGN, seed=3)).checks()
     chi2 = {(check["history"], check["hysteresis"]): check["chi2"] for check in checks}
     assert chi2.pop((True, True)) < 45.0  # fifteen degrees of freedom
     assert all(value > 1000.0 for value in chi2.values())
@@ -241,11 +234,10 @@ def test_a_record_near_balance_is_fitted_from_far() -> None:
 
 def test_no_number_is_made_of_a_line_that_the_benchmark_contradicts() -> None:
     """A loss torque that depends on the rate: no k, no Q_v, and the test of the line stays."""
-    design = default()
-    found = values_of(design, data(design, (Candidate(RATE_EXPONENT),), (0.1,)))
+    found = values_of(DESIGN, data(DESIGN, (Candidate(RATE_EXPONENT),), (0.1,)))
     assert not is_line(found)
     assert separated(found, "water-low-7") == {}
-    sound = values_of(design, data(design, seed=1))
+    sound = values_of(DESIGN, data(DESIGN, seed=1))
     assert is_line(sound)
     assert set(separated(sound, "water-low-7")) == {
         "quality_factor_hysteretic",

@@ -97,7 +97,6 @@ def fit() -> FitResult:
 
 
 def test_arrays_degrees_and_a_dataframe_give_the_same_fit(fit: FitResult) -> None:
-    assert fit.decay is not None
     values = fit.decay.values
     table = DataFrame({"time_s": fit.decay.time_s, "angle_rad": values})
     for source in (pp.Recording(time_s=fit.decay.time_s, angle_deg=np.degrees(values)), table):

@@ -16,7 +16,6 @@ from .records import NOISE_RAD, VALUES, diagnosed, null_fit
 @pytest.mark.parametrize("name", tuple(VALUES))
 def test_the_right_effect_predicts_better(name: str) -> None:
     found = diagnosed(name).held_out
-    assert found is not None
     assert found.gain > 0.0
     assert found.gain > found.gain_sd > 0.0
     assert found.gain == found.after - found.before

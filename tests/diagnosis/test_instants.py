@@ -40,7 +40,6 @@ def told(
 def holds(estimates: dict[str, Estimate], truth: FloatArray) -> list[bool]:
     inside = []
     for estimate, true in zip(estimates.values(), truth, strict=True):
-        assert estimate.interval95 is not None
         inside.append(bool(estimate.interval95[0] <= true <= estimate.interval95[1]))
     return inside
 

@@ -62,8 +62,6 @@ def test_a_square_in_the_sensor_lies_in_the_second_harmonic_and_a_cube_in_the_th
 
 def test_a_curved_sensor_shows_at_large_amplitudes_that_is_early() -> None:
     found = location_of("sensor-cubic")
-    assert found.amplitude_rad is not None
-    assert found.time_s is not None
     amplitude = diagnosed("sensor-cubic").search.fit.at.sampled.amplitude
     assert found.amplitude_rad[1] > 0.97 * amplitude.max()
     assert found.amplitude_rad[0] > 1.2 * amplitude.min()
@@ -77,7 +75,6 @@ def test_intervals_lie_within_the_record(name: str) -> None:
         (found.time_s, TIME_S[0], TIME_S[-1]),
         (found.amplitude_rad, 0.0, 0.16),
     ):
-        assert interval is not None
         assert lowest <= interval[0] < interval[1] <= highest
     assert np.all(np.isfinite(found.frequency_hz))
 
@@ -144,7 +141,6 @@ def test_a_step_of_the_offset_prefers_no_part_of_the_cycle() -> None:
 
 def test_what_fades_after_the_release_lies_at_the_beginning_and_not_at_its_time_constant() -> None:
     found, _ = located("release-transient", (0.02, 4.8))
-    assert found.time_s is not None
     assert found.time_s[0] == TIME_S[0]
     assert 4.8 < found.time_s[1] < 0.5 * TIME_S[-1]
 

@@ -28,7 +28,6 @@ def test_circular_error_at_1_4_rad_is_found_from_a_frequency_that_is_12_percent_
     slow = OMEGA_TRUE * (1.0 - 1.4**2 / 16.0)
     start = np.array([0.0, LINEAR, 0.0, 0.5, slow, 1.4, 0.0, 0.0, 1.0])
     fit = fit_in_growing_window(model, data, white_noise(data, NOISE_RAD), start)
-    assert fit is not None
     assert fit.chi2 / len(TIME_S) == pytest.approx(1.0, abs=0.1)
     sd = math.sqrt(fit.covariance()[OMEGA, OMEGA])
     assert abs(fit.value[OMEGA] - OMEGA_TRUE) < 5.0 * sd

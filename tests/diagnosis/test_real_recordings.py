@@ -105,7 +105,6 @@ def test_a_mass_on_a_spring_beats_with_a_second_mode() -> None:
     fit = fitted(SPRING, presliding_friction=(0.0, 0.02), tone_pickup=(0.0, 0.0, 1.005))
     tone = by_identifier("tone-pickup")
     beat = beat_of(fit, tone)
-    assert beat is not None
     # The readings' spectrum has lines at 1.3451 and 1.0060 Hz.
     assert beat == pytest.approx(1.0 / (1.3451 - 1.0060), rel=0.02)
     # The smaller one's amplitude there is 0.4 mm.
@@ -115,7 +114,6 @@ def test_a_mass_on_a_spring_beats_with_a_second_mode() -> None:
 def test_a_bearing_stiffens_where_it_no_longer_slides() -> None:
     found = beginning_of(ROD)
     small = small_swings(fitted(ROD, "sine"), found.data, first_noise(found))
-    assert small is not None
     assert small.significant
     assert small.amplitude < 0.04
     assert 0.005 < small.excess < 0.1

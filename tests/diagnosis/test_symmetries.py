@@ -146,7 +146,6 @@ def diagnoses_agree(name: str, one: View, other: View) -> None:
             when = change.slower * np.array(found.location.time_s) + change.later_s
             assert again.location.time_s == pytest.approx(when, rel=1e-4)
     if first.held_out is not None:
-        assert second.held_out is not None
         assert second.held_out.better == first.held_out.better
         gain = first.held_out.after - first.held_out.before
         assert second.held_out.after - second.held_out.before == pytest.approx(gain, rel=1e-3)

@@ -127,7 +127,6 @@ def test_no_label_of_the_map_is_cut_off(content: Shown, quieter: float) -> None:
     whole = FigureCanvasAgg(figure).figure.bbox
     for axes in figure.axes:
         inside = axes.get_tightbbox()
-        assert inside is not None
         assert whole.x0 <= inside.x0 < inside.x1 <= whole.x1
         assert whole.y0 <= inside.y0 < inside.y1 <= whole.y1
 

@@ -143,6 +143,7 @@ def test_axes_have_a_prefix_instead_of_a_power_of_ten() -> None:
     assert prefixed(1.0, "rad") == (1.0, "rad")
 
 
+# They change where a figure does (`--mpl-generate-path=tests/figures/baseline`): look first.
 looked_at = pytest.mark.mpl_image_compare(
     style="default", tolerance=1, savefig_kwargs={"dpi": 50}, baseline_dir="baseline"
 )

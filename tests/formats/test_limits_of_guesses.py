@@ -228,7 +228,6 @@ def test_rounded_stamps_of_even_rows_are_counted(decimals: int, rate: float, sta
     count = np.arange(600.0)
     true = start + interval * count
     found = times._rounded(np.round(true, decimals))
-    assert found is not None
     assert np.all(np.diff(found) == pytest.approx(interval, rel=0.01))
     assert found == pytest.approx(true, abs=10.0**-decimals)
 
@@ -264,7 +263,6 @@ def test_an_encoder_s_counts_go_on_over_its_zero(bits: int, zero: float) -> None
 def test_the_pivot_is_the_centre_of_the_circle(x: float, y: float, arm: float, wide: float) -> None:
     angle = wide * np.exp(-0.02 * TIME) * np.cos(2 * np.pi * TIME)
     found = circle.pivot_of(x + arm * np.sin(angle), y - arm * np.cos(angle))
-    assert found is not None
     assert found == pytest.approx([x, y], abs=1e-6)
     # About (0, 0) nothing has to be found.
     assert circle.pivot_of(arm * np.sin(angle), -arm * np.cos(angle)) is None

@@ -78,7 +78,6 @@ def test_the_page_refers_to_nothing_outside_itself(page: str) -> None:
 
 def test_the_policy_forbids_all_but_the_page_s_own_script(page: str) -> None:
     policy = re.search(r'Content-Security-Policy" content="([^"]+)"', page)
-    assert policy is not None
     assert "default-src 'none'" in policy.group(1)
     scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
     assert len(scripts) == 1
@@ -98,7 +97,6 @@ def test_every_record_has_a_row_and_a_section(page: str, example: Any) -> None:
 def test_the_page_keeps_its_budget(page: str, example: Any) -> None:
     assert len(page.encode()) < BUDGET_BYTES
     script = re.search(r"<script>(.*?)</script>", page, re.DOTALL)
-    assert script is not None
     assert len(script.group(1)) < 11_000
 
 
@@ -106,7 +104,6 @@ def test_headline_has_campaign_paper_and_hidden_truth(page: str) -> None:
     assert "(3938.0 ± 6.0) s²" in page
     assert "3940 s²" in page
     row = re.search(r"<tr><th[^>]*>Drag measured over Eq. 16.*?</tr>", page, re.DOTALL)
-    assert row is not None
     cells = re.findall(r"<td[^>]*>(.*?)</td>", row.group())
     # (1.1165 - 1.117)/0.0062 rounds to -0.1.
     assert cells == ["1.1165 ± 0.0062", "1.13 (176/156)", "−1.0 %", "1.117", "−0.1"]
@@ -120,7 +117,6 @@ def test_the_terminal_shows_the_headline_s_numbers(example: Any) -> None:
     drag = next(line for line in lines if line.startswith("Drag measured over Eq. 16"))
     assert re.search(r" 1\.1165 ± 0\.0062 +paper 1\.13 \(176/156\); truth 1\.117$", drag)
     typical = typical_record(example.content)
-    assert typical is not None
     shown = next(line for line in lines if "1 + a/δ" in line)
     assert float(shown.split()[-1]) == pytest.approx(1.0 + typical["a_over_delta"], abs=0.05)
 
@@ -209,7 +205,6 @@ def test_svgs_speak(page: str) -> None:
 
 def test_all_numbers_can_be_saved_without_a_script(page: str) -> None:
     found = re.search(r'download="campaign.json" href="data:application/json;base64,([^"]+)"', page)
-    assert found is not None
     assert json.loads(base64.b64decode(found.group(1))) == {"schema_version": 1}
 
 
