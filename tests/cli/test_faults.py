@@ -13,6 +13,7 @@ import pytest
 
 import pendpipe as pp
 from pendpipe import cli
+from pendpipe.commands.main import command_of
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.options import OPTIONS
 from pendpipe.recording import Recording, write_plain
@@ -23,7 +24,7 @@ def test_every_command_says_what_it_does(name: str, capsys: pytest.CaptureFixtur
     with pytest.raises(SystemExit) as ended:
         cli.main([name, "--help"])
     assert ended.value.code == 0
-    assert cli.command_of(name).description.splitlines()[0] in capsys.readouterr().out
+    assert command_of(name).description.splitlines()[0] in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("verb", [pp.read, pp.acquire, pp.fit, pp.diagnose, pp.simulate])
