@@ -38,6 +38,143 @@ def ends(cycles: HalfCycles) -> list[tuple[int, int]]:
     return sorted((run.first, run.last) for run in best_runs(cycles, EVERYTHING))
 
 
+def kicked(factor: float, at: int = 15) -> np.ndarray:
+    """A decay whose half cycles are larger by a factor from one of them on."""
+    return decay() * np.where(np.arange(30) < at, 1.0, factor)
+
+
+def halves(pause: float, after: float = 1.0) -> np.ndarray:
+    """Half periods, the fifteenth of them longer by a factor, and those after it by another."""
+    return HALF * np.concatenate((np.ones(14), [pause], np.full(14, after)))
+
+
+def first(factor: float) -> np.ndarray:
+    """A decay whose first half cycle is so much of the second."""
+    return np.concatenate(([factor * 0.98], decay()[1:]))
+
+
+STEP = 0.2 * decay()[14]
+ONE, TWO = [(0, 29)], [(0, 14), (15, 29)]
+WITHOUT_FIRST = [(1, 29)]
+UP_AND_DOWN = np.where(np.arange(30) // 2 % 2 == 0, 1.0, -1.0)
+PULL = np.concatenate(([0.2, 0.4, 0.6, 0.8], decay()))
+RUNS = {
+    # A kick by more than a third begins anew, unless a step of the converter makes the difference.
+    "small kick": (kicked(1.25), HALF, 0.0, ONE),
+    "kick": (kicked(1.45), HALF, 0.0, TWO),
+    "kick of a step": (kicked(1.4), HALF, STEP, ONE),
+    "kick of more than a step": (kicked(1.6), HALF, STEP, TWO),
+    # A stop to less than three tenths ends a run.
+    "loss of two thirds": (kicked(0.33), HALF, 0.0, ONE),
+    "stop": (kicked(0.27), HALF, 0.0, TWO),
+    # A half period may differ from those beside it by three tenths.
+    # Two parts would be joined again, were they of one amplitude.
+    "longer": (kicked(0.45), halves(1.32), 0.0, ONE),
+    "too long": (kicked(0.45), halves(1.40), 0.0, TWO),
+    "shorter": (kicked(0.45), halves(0.76), 0.0, ONE),
+    "too short": (kicked(0.45), halves(0.71), 0.0, TWO),
+    # A decay goes on behind a disturbance of four half periods, from half its amplitude on.
+    "disturbance": (kicked(0.55), halves(4.2), 0.0, ONE),
+    "disturbance, then larger": (kicked(1.1), halves(4.2), 0.0, ONE),
+    "disturbance, then far smaller": (kicked(0.45), halves(4.2), 0.0, TWO),
+    "long disturbance": (kicked(0.55), halves(4.8), 0.0, TWO),
+    "long disturbance, then larger": (kicked(1.1), halves(4.8), 0.0, TWO),
+    # What swings much slower behind a pause is another motion.
+    "pause, then slower": (decay(), halves(3.0, 1.25), 0.0, ONE),
+    "pause, then much slower": (decay(), halves(3.0, 1.35), 0.0, TWO),
+    # What hardly stands out of the step continues nothing.
+    "pause, then above the step": (decay(), halves(3.0), decay()[15] / 3.3, ONE),
+    "pause, then in the step": (decay(), halves(3.0), decay()[15] / 2.7, TWO),
+    # A first swing smaller than the next is a pull, unless half a step makes the difference.
+    "nearly as large": (first(0.95), HALF, 0.0, ONE),
+    "pull": (first(0.90), HALF, 0.0, WITHOUT_FIRST),
+    "pull of less than half a step": (first(0.90), HALF, 0.098, ONE),
+    "pull of more than half a step": (first(0.86), HALF, 0.098, WITHOUT_FIRST),
+    # All of a pull is cut, at the head of each run, wherever that begins.
+    "long pull": (PULL, HALF, 0.0, [(4, 33)]),
+    # Half periods, or amplitudes, that waver by an eighth are no pendulum's.
+    "wavering periods": (decay(), HALF * (1.0 + 0.05 * UP_AND_DOWN[:29]), 0.0, ONE),
+    "periods too uneven": (decay(), HALF * (1.0 + 0.07 * UP_AND_DOWN[:29]), 0.0, []),
+    "wavering amplitudes": (decay() * np.exp(0.05 * UP_AND_DOWN), HALF, 0.0, ONE),
+    "amplitudes too uneven": (decay() * np.exp(0.07 * UP_AND_DOWN), HALF, 0.0, []),
+    "uneven by the step": (decay() * np.exp(0.07 * UP_AND_DOWN), HALF, 0.5 * decay()[15], ONE),
+    # Sides that differ, or a drifting zero, make them alternate, and that is one.
+    "periods by sides": (decay(), HALF * (1.0 + 0.07 * side(29)), 0.0, ONE),
+    "amplitudes by sides": (decay() * np.exp(0.1 * side(30)), HALF, 0.0, ONE),
+    # The last half cycles of Coulomb friction belong to the decay; a single one continues nothing.
+    "Coulomb friction": (
+        np.append(np.arange(30, 1, -1) / 30.0 - 0.025, 0.2 * (2 / 30.0 - 0.025)), HALF, 0.0, ONE
+    ),
+    "wild half cycle": (np.append(decay(18), [3.0, decay()[19]]), HALF, 0.0, [(0, 17)]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", RUNS)
+def test_half_cycles_follow_one_another_within_limits(case: str) -> None:
+    swing, half, step, expected = RUNS[case]
+    assert ends(half_cycles(swing, half, step)) == expected
+
+
+def test_a_pull_is_cut_at_the_head_of_a_later_run_too() -> None:
+    later = np.concatenate((0.1 * decay(10), PULL[2:]))
+    assert ends(half_cycles(later))[-1] == (12, 41)
+
+
+FALLING = np.arange(41.0)
+
+
+def front(of_free: float) -> np.ndarray:
+    """Twenty half cycles that lose a part of what those behind them lose."""
+    bent = 1.0 - of_free * 0.2 - 0.01 * (FALLING - 20)
+    return np.where(FALLING <= 20, 1.0 - of_free * 0.01 * FALLING, bent)
+
+
+def held_up(count: int, after: int = 40) -> np.ndarray:
+    return np.concatenate((np.ones(count), decay(after)))
+
+
+@pytest.mark.parametrize(
+    ("swing", "step", "begins"),
+    [
+        # A median of seven begins to fall when its middle does.
+        (held_up(20, 60), 0.0, 20),
+        (held_up(3, 60), 0.0, None),
+        # It loses less than a tenth of what a free one would.
+        (front(0.08), 0.0, 20),
+        (front(0.13), 0.0, None),
+        # Its end is lost in the step.
+        (held_up(20), 0.002, 20),
+        (held_up(20), 0.2, None),
+    ],
+)
+def test_a_front_held_up_is_cut_where_the_fall_begins(
+    swing: np.ndarray, step: float, begins: int | None
+) -> None:
+    (run,) = best_runs(half_cycles(swing, step=step), EVERYTHING)
+    assert run.driven == (begins is not None)
+    assert run.first == pytest.approx(begins or 0, abs=3 if begins else 0)
+
+
+LAST = decay()[-1]
+
+
+@pytest.mark.parametrize(
+    ("step", "ending", "fades"),
+    [
+        (0.0, 1.25 * LAST, True),
+        (0.0, 1.35 * LAST, False),
+        # A pull at the end stands out of the step.
+        (0.3 * LAST, 1.57 * LAST, True),
+        (0.3 * LAST, 1.63 * LAST, False),
+    ],
+)
+def test_a_decay_fades_unless_the_record_ends_in_a_pull(
+    step: float, ending: float, fades: bool
+) -> None:
+    (run,) = best_runs(half_cycles(decay(), step=step, ending=ending), EVERYTHING)
+    assert run.fades == fades
+
+
 def test_of_two_runs_that_of_the_longer_path_comes_first() -> None:
     swing = np.concatenate((decay(12, 0.1), 2.0 * decay(12, 0.1)))
     assert [run.first for run in best_runs(half_cycles(swing), EVERYTHING)] == [12, 0]
@@ -51,104 +188,6 @@ def test_a_decay_is_one_run(share: float, count: int) -> None:
     assert run.half_period_s == pytest.approx(HALF)
     # Two half cycles tell no decay, and the more there are the nearer is the worth to the path.
     assert run.worth == pytest.approx(run.path * (count - 2) / count)
-
-
-@pytest.mark.parametrize(("kick", "parts"), [(1.25, 1), (1.45, 2)])
-def test_a_kick_by_more_than_a_third_begins_anew(kick: float, parts: int) -> None:
-    swing = decay()
-    swing[15:] *= kick
-    found = ends(half_cycles(swing))
-    assert found == ([(0, 29)] if parts == 1 else [(0, 14), (15, 29)])
-
-
-@pytest.mark.parametrize(("kick", "parts"), [(1.4, 1), (1.6, 2)])
-def test_a_kick_by_a_step_of_the_converter_is_none(kick: float, parts: int) -> None:
-    swing = decay()
-    swing[15:] *= kick
-    assert len(ends(half_cycles(swing, step=0.2 * swing[14]))) == parts
-
-
-@pytest.mark.parametrize(("left", "parts"), [(0.33, 1), (0.27, 2)])
-def test_a_stop_to_less_than_three_tenths_ends_a_run(left: float, parts: int) -> None:
-    swing = decay()
-    swing[15:] *= left
-    assert len(ends(half_cycles(swing))) == parts
-
-
-def test_the_last_half_cycles_of_coulomb_friction_belong_to_the_decay() -> None:
-    swing = np.arange(30, 0, -1) / 30.0 - 0.025
-    swing[-1] = 0.2 * swing[-2]
-    assert ends(half_cycles(swing)) == [(0, 29)]
-
-
-@pytest.mark.parametrize(("factor", "parts"), [(1.32, 1), (1.40, 2), (0.76, 1), (0.71, 2)])
-def test_a_half_period_may_differ_from_those_beside_it_by_three_tenths(
-    factor: float, parts: int
-) -> None:
-    half, swing = np.full(29, HALF), decay()
-    half[14] *= factor
-    # Two parts would be joined again, were they of one amplitude.
-    swing[15:] *= 0.45
-    assert len(ends(half_cycles(swing, half))) == parts
-
-
-@pytest.mark.parametrize(("front", "first"), [(0.95, 0), (0.90, 1)])
-def test_a_first_swing_smaller_than_the_next_is_a_pull(front: float, first: int) -> None:
-    swing = decay()
-    swing[0] = front * swing[1]
-    assert ends(half_cycles(swing))[0][0] == first
-    # Where half a step of the converter makes the difference, it is none.
-    assert ends(half_cycles(swing, step=0.08 * swing[1]))[0][0] == 0
-
-
-@pytest.mark.parametrize(("pause", "runs"), [(4.2, 1), (4.8, 2)])
-@pytest.mark.parametrize(("ratio", "goes_on"), [(0.55, True), (0.45, False), (1.1, True)])
-def test_a_decay_goes_on_behind_a_disturbance_of_four_half_periods(
-    pause: float, runs: int, ratio: float, goes_on: bool
-) -> None:
-    swing, half = decay(), np.full(29, HALF)
-    half[14] *= pause
-    swing[15:] *= ratio
-    assert len(ends(half_cycles(swing, half))) == (1 if runs == 1 and goes_on else 2)
-
-
-@pytest.mark.parametrize(("waver", "regular"), [(0.05, True), (0.07, False)])
-def test_half_periods_that_waver_by_an_eighth_are_no_pendulum_s(
-    waver: float, regular: bool
-) -> None:
-    # Two apart differ by twice the waver.
-    half = HALF * (1.0 + waver * np.where(np.arange(29) // 2 % 2 == 0, 1.0, -1.0))
-    assert bool(ends(half_cycles(decay(), half))) == regular
-    # Sides that differ make them alternate, and that is one.
-    assert ends(half_cycles(decay(), HALF * (1.0 + waver * side(29)))) == [(0, 29)]
-
-
-@pytest.mark.parametrize(("kink", "regular"), [(0.05, True), (0.07, False)])
-def test_amplitudes_that_waver_by_an_eighth_are_no_pendulum_s(kink: float, regular: bool) -> None:
-    # Two up and two down by `kink` bend the logarithm by twice as much.
-    swing = decay() * np.exp(kink * np.where(np.arange(30) // 2 % 2 == 0, 1.0, -1.0))
-    assert bool(ends(half_cycles(swing))) == regular
-    assert ends(half_cycles(swing, step=0.5 * swing[15]))
-
-
-def test_swings_that_alternate_are_those_of_a_drifting_zero() -> None:
-    assert ends(half_cycles(decay() * np.exp(0.1 * side(30)))) == [(0, 29)]
-
-
-@pytest.mark.parametrize(("ending", "fades"), [(1.25, True), (1.35, False)])
-def test_a_decay_fades_unless_the_record_ends_in_a_pull(ending: float, fades: bool) -> None:
-    swing = decay()
-    (run,) = best_runs(half_cycles(swing, ending=ending * swing[-1]), EVERYTHING)
-    assert run.fades == fades
-
-
-@pytest.mark.parametrize(("held", "driven"), [(20, True), (3, False)])
-def test_a_front_held_up_is_cut_where_the_fall_begins(held: int, driven: bool) -> None:
-    swing = np.concatenate((np.ones(held), decay(60, 0.02)))
-    (run,) = best_runs(half_cycles(swing), EVERYTHING)
-    assert run.driven == driven
-    # A median of seven begins to fall when its middle does.
-    assert run.first == (pytest.approx(held, abs=2) if driven else 0)
 
 
 @given(scale=st.floats(1e-3, 1e3), pace=st.floats(1e-2, 1e2), kick=st.floats(0.2, 2.0))
@@ -181,21 +220,6 @@ def test_a_rest_between_two_motions_counts_from_eight_half_periods(
     assert all(one.stop_s == other.start_s for one, other in pairwise(cuts))
 
 
-def test_all_of_a_pull_is_cut_but_two_half_cycles_are_left() -> None:
-    swing = np.concatenate(([0.2, 0.4, 0.6, 0.8], decay()))
-    assert ends(half_cycles(swing))[-1] == (4, 33)
-    # A pull is cut at the head of each run, wherever that begins.
-    later = np.concatenate((0.1 * decay(10), swing[2:]))
-    assert ends(half_cycles(later))[-1] == (12, 41)
-
-
-@pytest.mark.parametrize(("front", "first"), [(0.90, 0), (0.86, 1)])
-def test_half_a_step_is_no_pull(front: float, first: int) -> None:
-    swing = decay()
-    swing[0] = front * swing[1]
-    assert ends(half_cycles(swing, step=0.1 * swing[1]))[0][0] == first
-
-
 def test_wild_half_cycles_are_bridged_and_counted() -> None:
     swing = decay(40)
     swing[[10, 11, 12]] = [0.05, 1.5, 0.05]
@@ -204,57 +228,9 @@ def test_wild_half_cycles_are_bridged_and_counted() -> None:
     assert (run.first, run.last, run.bridged) == (0, 39, 5)
 
 
-def test_a_single_half_cycle_continues_nothing() -> None:
-    swing = decay(20)
-    swing[18] = 3.0
-    assert ends(half_cycles(swing)) == [(0, 17)]
-
-
-@pytest.mark.parametrize(("slower", "runs"), [(1.25, 1), (1.35, 2)])
-def test_what_swings_much_slower_behind_a_pause_is_another_motion(slower: float, runs: int) -> None:
-    half = np.full(29, HALF)
-    half[14] = 3.0 * HALF
-    half[15:] *= slower
-    assert len(ends(half_cycles(decay(), half))) == runs
-
-
-@pytest.mark.parametrize(("size", "runs"), [(3.3, 1), (2.7, 2)])
-def test_what_hardly_stands_out_of_the_step_continues_nothing(size: float, runs: int) -> None:
-    half = np.full(29, HALF)
-    half[14] = 3.0 * HALF
-    swing = decay()
-    assert len(ends(half_cycles(swing, half, step=swing[15] / size))) == runs
-
-
 @pytest.mark.parametrize(("pause", "fades"), [(1.6, True), (1.4, False)])
 def test_a_run_before_a_rest_fades_and_before_a_knock_does_not(pause: float, fades: bool) -> None:
     swing, half = np.concatenate((decay(20), 3.0 * decay(20))), np.full(39, HALF)
     half[19] *= pause
     found = {run.first: run.fades for run in best_runs(half_cycles(swing, half), EVERYTHING)}
     assert found[0] == fades
-
-
-@pytest.mark.parametrize(("steps", "fades"), [(0.9, True), (1.1, False)])
-def test_a_pull_at_the_end_stands_out_of_the_step(steps: float, fades: bool) -> None:
-    swing = decay()
-    step = 0.3 * swing[-1]
-    ending = 1.3 * swing[-1] + steps * step
-    (run,) = best_runs(half_cycles(swing, step=step, ending=ending), EVERYTHING)
-    assert run.fades == fades
-
-
-@pytest.mark.parametrize(("of_free", "driven"), [(0.08, True), (0.13, False)])
-def test_a_front_that_loses_a_tenth_of_what_a_free_one_would_is_driven(
-    of_free: float, driven: bool
-) -> None:
-    k = np.arange(41.0)
-    swing = np.where(k <= 20, 1.0 - of_free * 0.01 * k, 1.0 - of_free * 0.2 - 0.01 * (k - 20))
-    (run,) = best_runs(half_cycles(swing), EVERYTHING)
-    assert run.driven == driven
-
-
-@pytest.mark.parametrize(("steps", "driven"), [(0.002, True), (0.2, False)])
-def test_a_front_whose_end_is_lost_in_the_step_is_not_driven(steps: float, driven: bool) -> None:
-    swing = np.concatenate((np.ones(20), decay(40)))
-    (run,) = best_runs(half_cycles(swing, step=steps), EVERYTHING)
-    assert run.driven == driven
