@@ -72,6 +72,7 @@ def test_sound_results_have_no_finding(results: Path, capsys: pytest.CaptureFixt
         (other_recording, ("stale", "fit.json")),
         (put("air-01/notes.csv"), ("orphaned", "notes.csv")),
         (put("notes.json"), ("orphaned", "notes.json")),
+        (put("air-01/.notes.20240101"), ("orphaned", ".notes.20240101")),
         (put("air-01/.fit.json.ab120f3c"), ("temporary", ".fit.json.ab120f3c")),
         (put("air-01/fit.json.damaged-1a2b3c4d"), ("set-aside", "fit.json.damaged-1a2b3c4d")),
         (put("live/raw/2026.raw"), ("raw", "2026.raw")),
@@ -158,12 +159,6 @@ def test_the_diagnosis_of_a_pendulum_is_a_result_as_all_others(results: Path) ->
         assert "makes it again" in str(found.damages[0])
 
 
-def test_a_hidden_file_of_the_user_is_not_taken_for_an_unfinished_result(results: Path) -> None:
-    put("air-01/.notes.20240101")(results)
-    (found,) = examine(results)
-    assert found.kind == "orphaned"
-
-
 def test_nothing_sound_is_called_deletable(results: Path) -> None:
     """Only what a killed process had not finished may be deleted."""
     for change in (
@@ -181,9 +176,8 @@ def test_a_folder_without_results_is_the_users_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "holiday").mkdir()
-    (tmp_path / "holiday/picture.svg").touch()
-    assert main(["doctor", "holiday"]) == 2
+    put("holiday/picture.svg")(tmp_path)
+    assert [main(["doctor", folder]) for folder in ("holiday", "none")] == [2, 2]
     assert "no stage has left results here" in capsys.readouterr().err
 
 
@@ -222,11 +216,3 @@ def test_a_lock_is_named_before_there_are_results(
     (found,) = examine(Path("results"))
     assert found.kind == "locked"
     assert "--unlock" in found.safe
-
-
-def test_a_folder_that_is_not_there_is_the_users_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # Where no run has left a lock.
-    monkeypatch.chdir(tmp_path)
-    assert main(["doctor", str(tmp_path / "none")]) == 2

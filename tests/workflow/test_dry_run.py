@@ -5,8 +5,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from pendpipe.configuration.load import read_records
 from pendpipe.stages.chunks import batch_for, split
 
@@ -98,19 +96,9 @@ def test_recordings_of_others_need_no_file_for_a_dry_run(tmp_path: Path) -> None
     assert jobs(done.stdout + done.stderr)["acquire"] == chunks(table)
 
 
-@pytest.mark.parametrize(
-    ("override", "said"),
-    [
-        ("sed=2", "did you mean 'seed'?"),
-        ("simulated={drag_facto: 1}", "did you mean 'drag_factor'?"),
-        ("records=none.tsv", "there is no such table"),
-    ],
-)
-def test_a_faulty_configuration_stops_before_any_job(
-    tmp_path: Path, override: str, said: str
-) -> None:
-    done = dry_run(tmp_path / "results", override=override)
+def test_a_faulty_configuration_stops_before_any_job(tmp_path: Path) -> None:
+    done = dry_run(tmp_path / "results", override="simulated={drag_facto: 1}")
     assert done.returncode != 0
     lines = (done.stdout + done.stderr).splitlines()
-    assert any(said in line for line in lines), lines
+    assert any("did you mean 'drag_factor'?" in line for line in lines), lines
     assert not any("Traceback" in line for line in lines)
