@@ -8,6 +8,7 @@ import time
 from datetime import datetime
 from pathlib import Path
 
+import numpy as np
 import pytest
 from benchmarks.acquisition_live import (
     ROOT,
@@ -17,6 +18,8 @@ from benchmarks.acquisition_live import (
     served_process,
 )
 
+from pendpipe.acquisition.devices import DEVICES
+from pendpipe.acquisition.raw import RawWriter
 from pendpipe.cli import main
 from pendpipe.recording import read_plain
 
@@ -89,56 +92,56 @@ def test_a_dead_line_fails_its_job_alone_and_the_next_run_tries_again(tmp_path: 
     assert len(read_plain(campaign.recording)) == 60
 
 
-def lost_in_the_midst(campaign: LiveCampaign, device: subprocess.Popen[str]) -> str:
-    """Run the campaign, end the device after a second of the recording; return the job's log."""
-    running = subprocess.Popen(
-        campaign.command(), cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
-    while running.poll() is None and campaign.recorded_s() < 1.2:
-        time.sleep(0.02)
-    device.kill()
-    assert running.wait() == 1
-    return (campaign.results / "live/logs/acquire.log").read_text()
-
-
-def test_a_line_that_is_lost_fails_its_job_and_its_raw_file_is_kept(tmp_path: Path) -> None:
-    """Unless it is accepted as what there is, the next run records anew."""
+def test_a_line_that_is_lost_fails_its_job_and_the_next_run_records_anew(tmp_path: Path) -> None:
     with served_process(tmp_path, LINK) as (device, port):
-        campaign = LiveCampaign(tmp_path, port, LONG_S, "calibrate")
-        log = lost_in_the_midst(campaign, device)
+        campaign = LiveCampaign(tmp_path, port, LONG_S)
+        running = subprocess.Popen(
+            campaign.command(), cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        while running.poll() is None and campaign.recorded_s() < 0.5:
+            time.sleep(0.02)
+        device.kill()
+        assert running.wait() == 1
+    log = (campaign.results / "live/logs/acquire.log").read_text()
     assert f"s of {LONG_S:g} s are kept in" in log.splitlines()[-1]
     assert "Traceback" not in log
     assert (campaign.results / "file/recording.csv").exists()
     assert not campaign.recording.exists()
     first = campaign.raw_files
     assert len(first) == 1
-    call = ["acquire", "--campaign", str(tmp_path / "config.yaml"), "--record", "live"]
-    assert main([*call, "--accept-short"]) == 0
-    recording = campaign.recording.read_bytes()
-    done = campaign.run("--forceall")
-    assert done.returncode == 0, done.stderr
-    assert campaign.recording.read_bytes() == recording
-    assert campaign.raw_files.keys() == first.keys()
-    kept_s = read_plain(campaign.recording).time_s[-1]
-    assert 1.0 < kept_s < LONG_S
-    # The report prints the calibration's warnings.
-    calibration = json.loads((campaign.results / "live/calibration.json").read_text())
-    warning = calibration["warnings"][-1]
-    assert warning.startswith("the recording is incomplete: ended early: the line was lost")
-    assert f"{kept_s:.6g} s of {LONG_S:g} s kept" in warning
-
-
-def test_after_a_lost_line_the_next_run_records_anew(tmp_path: Path) -> None:
-    with served_process(tmp_path, LINK) as (device, port):
-        campaign = LiveCampaign(tmp_path, port, LONG_S)
-        lost_in_the_midst(campaign, device)
-    first = campaign.raw_files
     with served_device(tmp_path, LINK) as port:
         campaign.connect(port, 1.0)
         done = campaign.run()
     assert done.returncode == 0, done.stderr
     assert first.items() < campaign.raw_files.items()
     assert len(read_plain(campaign.recording)) == 60
+
+
+def test_what_is_kept_of_a_lost_line_is_a_recording_once_it_is_accepted(tmp_path: Path) -> None:
+    campaign = LiveCampaign(tmp_path, "gone", LONG_S, "calibrate")
+    codes = np.rint(9000.0 * np.cos(0.3 * np.arange(120))).astype(np.int64)
+    header = {"model": "DI-2108", "port": "gone", "channels": [1], "rate_hz": 60.0}
+    header |= {"duration_s": LONG_S, "recorded_at": "2026-01-01T00:00:00+00:00"}
+    raw = campaign.results / "live/raw/1.raw"
+    raw.parent.mkdir(parents=True)
+    with raw.open("wb") as stream:
+        writer = RawWriter(stream, header)
+        for number, code in enumerate(codes, start=1):
+            writer.data(number / 60.0, DEVICES["di2108"]().encode(np.array([[code]])))
+        writer.event(2.0, event="stopped", reason="the line was lost")
+    call = ["acquire", "--campaign", str(tmp_path / "config.yaml"), "--record", "live"]
+    assert main([*call, "--accept-short"]) == 0
+    recording = campaign.recording.read_bytes()
+    done = campaign.run("--forceall")
+    assert done.returncode == 0, done.stderr
+    assert campaign.recording.read_bytes() == recording
+    assert list(campaign.raw_files) == ["1.raw"]
+    kept_s = read_plain(campaign.recording).time_s[-1]
+    # The report prints the calibration's warnings.
+    calibration = json.loads((campaign.results / "live/calibration.json").read_text())
+    warning = calibration["warnings"][-1]
+    assert warning.startswith("the recording is incomplete: ended early: the line was lost")
+    assert f"{kept_s:.6g} s of {LONG_S:g} s kept" in warning
 
 
 def test_only_an_explicit_request_records_anew(
