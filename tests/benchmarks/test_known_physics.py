@@ -2,9 +2,8 @@
 
 from typing import Any
 
-from benchmarks.apparatus.scores import catalogue
-
 from benchmarks import known_physics as known
+from pendpipe.effects.catalogue import CATALOGUE
 
 
 def answers(effects: list[dict[str, Any]], **parameters: dict[str, Any]) -> known.Answers:
@@ -43,7 +42,7 @@ def test_every_item_of_the_table_can_be_judged() -> None:
     words = {"quality", "period", "from", "until", "says", "gap", *known.TESTS}
     new = {"count-slips", "clock-slips", "rolling-shutter", "camera-geometry", "tracking-noise"}
     new |= {"amplitude-linear-stiffness", "keulegan-carpenter-drag"}
-    new |= catalogue()
+    new |= {effect.identifier for effect in CATALOGUE}
     new |= {"unnamed-restoring", "unnamed-measurement", "unnamed-drive", "unnamed-damping"}
     for row in known.table():
         listed = known.items(row["known"]) + known.items(row["by_hand"])

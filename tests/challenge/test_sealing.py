@@ -10,11 +10,21 @@ import numpy as np
 import pytest
 
 from pendpipe.errors import InputError
-from pendpipe_challenge import catalogue, command, items, sets
-from pendpipe_challenge.items import make_null
+from pendpipe_challenge import causes, command, items, sets
+from pendpipe_challenge.items import Item, make_item
 from pendpipe_challenge.sets import Places, answer_path, make_set, open_set, solve_set
 
 ENTER = sets.enter
+NULL = {"family": "null", "effects": [], "delta_chi2": []}
+
+
+def make_null(recipe: object, random: np.random.Generator) -> Item:
+    """A viscous decay, whatever the recipe."""
+    time_s = np.arange(600) / 20.0
+    volts = np.exp(-0.02 * time_s) * np.cos(5.0 * time_s) + 1e-3 * random.normal(size=600)
+    truth = {"family": "null", "baseline": "eq8", "effects": [], "oracle": None}
+    return Item({"time_s": time_s, "volts": volts}, {"volts_per_radian": "3.85"}, truth)
+
 
 STUB = """
 import json, os, pathlib, sys
@@ -61,8 +71,8 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> Places:
     root = tmp_path_factory.mktemp("challenge")
     places = Places(root / "open" / "set", root / "hidden" / "truth")
     patch = pytest.MonkeyPatch()
-    patch.setattr(sets, "make_item", lambda recipe, random: make_null(random))
-    patch.setattr(sets, "plan", lambda count, random: [{"family": "null"}] * count)
+    patch.setattr(sets, "make_item", make_null)
+    patch.setattr(sets, "plan", lambda count, random: [NULL] * count)
     patch.setattr(sets, "process_pool", Alone)
     make_set(places, 3, seed=7)
     patch.undo()
@@ -118,14 +128,6 @@ def test_the_released_diagnosis_opens_nothing_of_the_set(solved: Places, tmp_pat
     assert any(path.endswith("recording.csv") for path in opened)
     for place in (solved.sealed, solved.folder, again):
         assert not [path for path in opened if path.startswith(str(place))]
-
-
-def test_the_recording_tells_what_a_laboratory_knows_and_no_more(solved: Places) -> None:
-    lines = solved.recording("item-0001").read_text().splitlines()
-    keys = {line.removeprefix("# ").split(":")[0] for line in lines if line.startswith("#")}
-    assert keys == {"volts_per_radian", "bits", "range_volts"}
-    assert lines[3] == "time_s,volts"
-    assert len(lines) <= 4 + 4000
 
 
 def test_the_manifest_was_sealed_before_any_answer(solved: Places) -> None:
@@ -188,9 +190,9 @@ def interrupted(*_: object) -> None:
 def test_an_interrupted_set_goes_on_and_the_ledger_misses_nothing(tmp_path: Path) -> None:
     places = Places(tmp_path / "set", tmp_path / "truth")
     ledger = tmp_path / "ledger.jsonl"
-    recipes = [{"family": "null"}] * 3
+    recipes = [NULL] * 3
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sets, "make_item", lambda recipe, random: make_null(random))
+        patch.setattr(sets, "make_item", make_null)
         patch.setattr(sets, "plan", lambda count, random: recipes[:count])
         patch.setattr(sets, "process_pool", Alone)
         # As if it had stopped between two items: made, and not entered.
@@ -206,10 +208,15 @@ def test_an_interrupted_set_goes_on_and_the_ledger_misses_nothing(tmp_path: Path
     assert sets.entered(ledger, "another") == set()
 
 
-def test_the_same_seed_makes_the_same_recording() -> None:
-    first, second = (make_null(np.random.default_rng([7, 1])) for _ in range(2))
-    assert np.array_equal(first.codes, second.codes)
+def test_the_same_seed_makes_the_same_file_of_what_a_laboratory_knows_and_no_more() -> None:
+    first, second = (make_item(NULL, np.random.default_rng([7, 1])) for _ in range(2))
+    assert first.text == second.text
     assert first.truth == second.truth
+    lines = first.text.splitlines()
+    keys = {line.removeprefix("# ").split(":")[0] for line in lines if line.startswith("#")}
+    assert keys == {"volts_per_radian", "bits", "range_volts"}
+    assert lines[3] == "time_s,volts"
+    assert len(lines) <= 4 + 4000
 
 
 def test_truth_within_reach_of_the_solver_is_refused(tmp_path: Path) -> None:
@@ -234,7 +241,7 @@ def test_the_plan_has_a_third_nulls_and_many_instrument_decoys() -> None:
     assert count["null"] >= 200
     assert all(count[family] >= 25 for family in items.SHARES)
     singles = [r for r in recipes if r["family"] == "single"]
-    decoys = [r for r in singles if r["effects"][0] in catalogue.MEASUREMENT]
+    decoys = [r for r in singles if r["effects"][0] in causes.MEASUREMENT]
     assert len(decoys) >= 0.35 * len(singles)
     assert {size for r in singles for size in r["delta_chi2"]} == set(items.SIZES)
     assert any(r["cancelling"] for r in recipes if r["family"] == "combination")

@@ -3,8 +3,6 @@
 Of the library it imports what says nothing about pendulums: the proof may not be the program
 agreeing with itself.
 
-The generator: `torques`, `motion`, `chain`, `scenario`; what it hides: `hidden` and
-`hidden_...`, `catalogue`. The oracle: `bench`, `signatures`, `oracle`, `sizing`. A set: `items`,
-`recordings`, `sets`. Its scores: `answers`, `intervals`, `measures`, `peers`, `score`, `figures`,
-`page`.
+How a pendulum moves: `torques`, `motion`. What stands on the bench, and what a change of it is
+worth: `world`. What can be hidden: `causes`. The `oracle`. A set: `items`, `sets`. Its `score`.
 """

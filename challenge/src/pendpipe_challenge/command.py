@@ -88,14 +88,12 @@ def _open(arguments: argparse.Namespace) -> int:
 def _score(arguments: argparse.Namespace) -> int:
     from pendpipe.errors import InputError
     from pendpipe.files import read_json, replaced, write_json
-    from pendpipe_challenge.recordings import intervals_s
     from pendpipe_challenge.score import page, score
 
     path = arguments.set / "opened.json"
     if not path.exists():
         raise InputError(path, "this set is not opened", "run pendpipe challenge open first")
-    opened = read_json(path)
-    scores = score(opened, intervals_s(arguments.set, opened["items"]))
+    scores = score(read_json(path))
     write_json(arguments.out / "scores.json", scores)
     text = page(scores)
     with replaced(arguments.page or arguments.out / "proof.md") as stream:

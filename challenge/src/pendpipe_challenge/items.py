@@ -1,392 +1,446 @@
 """Make the items of a set: each a recording, what is true of it, and the oracle's figures.
 
-random = np.random.default_rng(1)
-item = make_single(random, "cubic-stiffness", 100.0)
-write_recording("recording.csv", item.scenario, item.codes)
-item.truth["effects"][0]["delta_chi2"], item.truth["oracle"]["class"]
+    recipe = {"family": "single", "effects": ["cubic-stiffness"], "delta_chi2": [100.0]}
+    item = make_item(recipe, rng)
+    Path("recording.csv").write_text(item.text)
+    item.truth["effects"][0]["delta_chi2"], item.truth["oracle"]["class"]
+
+Four kinds of apparatus: a laboratory's converter, whose pendulum swings by x; and encoders, cameras
+and converters of pendulums that swing by sin x, up to 2.6 rad, or of torsion wheels.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray, IntArray
-from pendpipe_challenge.bench import Bench, Point
-from pendpipe_challenge.catalogue import EFFECTS, MEASUREMENT, ONLY_VISCOUS, hide, kind_of
-from pendpipe_challenge.hidden import OUTSIDE, Hidden
-from pendpipe_challenge.oracle import Oracle, Verdict, refitted, shift_score
-from pendpipe_challenge.scenario import Scenario, draw_scenario
-from pendpipe_challenge.sizing import Sized, size
+from pendpipe.arrays import FloatArray as Array
+from pendpipe_challenge.causes import (
+    CATALOGUE,
+    MEASUREMENT,
+    ONLY_VISCOUS,
+    OUTSIDE,
+    Law,
+    kind_of,
+    log_uniform,
+)
+from pendpipe_challenge.oracle import Oracle
+from pendpipe_challenge.world import EVENT_EDGE, EVENT_JITTER_S, Bench, Cause, Rng, Scene, Seen
+
+Recipe = dict[str, Any]
+"""``family``, ``apparatus``, ``effects`` and the ``delta_chi2`` wanted of each."""
+Noise = Callable[[Rng, Seen, Array, Array, float], Array]
+"""Adds noise of its own to a reading: from what is seen, the reading, the amplitude and an rms."""
+VOLTS_PER_RADIAN: Final = 3.85
+RANGES_VOLTS: Final = (1.25, 2.5, 5.0, 10.0)
+
+
+class Kind(NamedTuple):
+    """What an apparatus has.
+
+    Parameters
+    ----------
+    weights
+        Shares of drag, of viscous and of dry friction, as a Dirichlet distribution takes them.
+    frequencies_hz, swings, cycles, rates_hz
+        From and to.
+    readings
+        At most.
+    """
+
+    weights: tuple[float, float, float]
+    frequencies_hz: tuple[float, float]
+    swings: tuple[float, float]
+    cycles: tuple[float, float]
+    rates_hz: tuple[float, float]
+    readings: int = 18_000
+
+
+KINDS: Final = {
+    "laboratory": Kind((1.0, 3.0, 0.3), (0.4, 2.0), (0.02, 0.5), (15, 250), (12, 100), 4000),
+    "encoder": Kind((1.0, 1.0, 2.0), (0.4, 1.3), (0.35, 2.6), (15, 90), (60, 300)),
+    "camera": Kind((2.0, 1.0, 0.2), (0.4, 1.3), (0.15, 1.3), (30, 120), (20, 60)),
+    "converter": Kind((1.0, 2.0, 0.5), (0.4, 1.3), (0.05, 0.7), (30, 120), (15, 80)),
+    "wheel": Kind((1.0, 2.0, 0.5), (0.2, 0.8), (0.3, 2.6), (30, 120), (15, 80)),
+}
+SENSORS: Final = {
+    "encoder": (
+        *("count-slips", "clock-slips", "camera-geometry", "dropped-samples", "clock-drift"),
+        *("jitter", "glitches", "sensor-backlash"),
+    ),
+    "camera": (
+        *("rolling-shutter", "camera-geometry", "dropped-samples", "glitches", "offset-drift"),
+        *("jitter", "sensor-cubic", "clock-drift"),
+    ),
+    "converter": (
+        *("sensor-quadratic", "sensor-cubic", "sensor-backlash", "offset-drift", "gain-drift"),
+        *("ac-coupling", "tone-pickup", "clipping", "missing-codes", "clock-drift"),
+        *("dropped-samples", "glitches"),
+    ),
+    "wheel": (
+        *("sensor-quadratic", "sensor-backlash", "offset-drift", "gain-drift", "ac-coupling"),
+        *("tone-pickup", "clipping", "missing-codes", "clock-drift", "dropped-samples"),
+        "glitches",
+    ),
+}
+"""What may be wrong with each kind of sensor."""
+OF_A_PENDULUM: Final = frozenset(
+    {"circular-error", "vibrated-pivot", "winding-string", "elastic-string", "rolling-edge"}
+)
+"""Laws that a torsion wheel can't have."""
+
+
+def draw_scene(rng: Rng, apparatus: str) -> Scene:
+    """A pendulum (or a torsion wheel) with its sensor."""
+    kind = KINDS[apparatus]
+    frequency, amplitude = log_uniform(rng, *kind.frequencies_hz), log_uniform(rng, *kind.swings)
+    cycles = log_uniform(rng, *kind.cycles)
+    # Some rods swing until they rest.
+    to_rest = apparatus in ("encoder", "laboratory") and rng.uniform() < 0.2
+    falls_by = 7.0 if to_rest else rng.uniform(0.5, 3.0)
+    step, red, bits = 0.0, 0.0, 0
+    noise = amplitude / log_uniform(rng, 300, 5000)
+    rate = max(log_uniform(rng, *kind.rates_hz), 12 * frequency)
+    event = apparatus == "encoder" and rng.uniform() < 0.35
+    if apparatus == "encoder":
+        several = [1200, 2000, 2400, 4096, 8192, 16384, 40000]
+        step = 2 * np.pi / float(rng.choice(several[: 4 if event else 7]))
+        noise = 0.0 if event else step * log_uniform(rng, 0.02, 0.3)
+    elif apparatus in ("converter", "wheel"):
+        step = 2 * 1.3 * amplitude / 2.0 ** int(rng.integers(9, 17))
+    elif apparatus == "laboratory":
+        bits = 16 if rng.uniform() < 0.65 else 12
+        ranges = [r for r in RANGES_VOLTS if r > 1.15 * VOLTS_PER_RADIAN * amplitude + 0.1]
+        # A 12-bit step is coarse: a laboratory takes the narrowest range.
+        full = ranges[0] if bits == 12 else float(rng.choice(ranges))
+        step = 2 * full / 2.0**bits / VOLTS_PER_RADIAN
+        noise = step * log_uniform(rng, 0.3, 3.0)
+        red = rng.uniform(0.3, 1.5) if rng.uniform() < 0.5 else 0.0
+        # A laboratory sets a round rate.
+        in_cycle = min(max(12.0, kind.readings / cycles * rng.uniform(0.7, 1.0)), 120.0)
+        rate = float(f"{in_cycle * frequency:.2g}")
+    duration = min(cycles / frequency, kind.readings / rate)
+    rates = _rates(rng, amplitude, duration, kind.weights, falls_by)
+    return Scene(
+        apparatus=apparatus,
+        frequency_hz=frequency,
+        rates=rates,
+        amplitude=amplitude,
+        lead_s=float(rng.uniform(0.0, 1.0) / frequency),
+        offset=float(rng.normal() * 0.02 * amplitude),
+        noise_rms=noise,
+        step=step,
+        time_s=np.arange(int(duration * rate)) / rate,
+        red=red,
+        event_driven=event,
+        place=float(rng.uniform()),
+        bits=bits,
+    )
+
+
+def _rates(
+    rng: Rng, amplitude: float, duration_s: float, weights: tuple[float, ...], falls_by: float
+) -> tuple[float, float, float, float]:
+    """a, b_v, b_h, c that let the amplitude fall by exp(-falls_by) within the recording."""
+    drag, linear, solid = rng.dirichlet(weights)
+    y = np.exp(-np.linspace(0, falls_by, 600))
+    scale = -np.trapezoid(1 / (drag * y**2 + linear * y + 0.3 * solid), y) / duration_s
+    dry = rng.uniform() if rng.integers(2) else 0.0
+    a, c = scale * drag / amplitude, scale * 0.3 * solid * amplitude
+    return float(a), float(scale * linear * (1 - dry)), float(scale * linear * dry), float(c)
+
+
+def fits(law: Law, scene: Scene) -> bool:
+    """Whether a scene can have an effect."""
+    uniform, wheel = not scene.event_driven, scene.apparatus == "wheel"
+    stepped, laboratory = scene.step > 0, scene.apparatus == "laboratory"
+    return {
+        "coulomb-friction": scene.baseline == "viscous",
+        "quadratic-drag": scene.baseline == "viscous",
+        "circular-error": laboratory,
+        "clock-slips": uniform and len(scene.time_s) > 3000,
+        "count-slips": scene.apparatus == "encoder",
+        "camera-geometry": scene.apparatus in ("encoder", "camera"),
+        "rolling-shutter": scene.apparatus == "camera",
+        "missing-codes": stepped and (laboratory or scene.step > scene.noise_rms),
+        "coarse-quantisation": laboratory,
+        "differential-nonlinearity": uniform and scene.step > scene.noise_rms,
+        "dropped-samples": uniform,
+        "jitter": uniform,
+        "glitches": uniform,
+        "interleave": uniform,
+        "packet-times": uniform,
+        "slow-pen": uniform,
+        "drag-form": scene.rates[0] > 0,
+    }.get(law.effect, not (wheel and law.effect in OF_A_PENDULUM))
 
 
 @dataclass(frozen=True)
 class Item:
-    """One recording (codes of `scenario`'s converter) and what is true of it.
+    """A recording and what is true of it.
 
     Parameters
     ----------
-    scenario
-        Everything that made it; its chain, interval and count make the file.
-    codes
-        The converter's codes, shape (samples,).
+    columns
+        By heading, as the file has them.
+    header
+        What the laboratory states about its converter.
     truth
-        ``family``, ``baseline``, ``effects`` (see `effect_truth`), ``nuisances``,
-        ``oracle`` (None where it was not asked).
+        ``family``, ``apparatus``, ``baseline``, ``effects``, ``present`` and ``allowed`` (names
+        that are true whatever was hidden), ``nuisances``, ``oracle`` (None where it was not asked).
     """
 
-    scenario: Scenario
-    codes: IntArray
+    columns: dict[str, Array]
+    header: dict[str, str]
     truth: dict[str, Any]
 
     @property
-    def volts(self) -> FloatArray:
-        """The readings as the file has them."""
-        return np.asarray(self.codes * self.scenario.chain.step_volts)
-
-    @property
-    def angle_rad(self) -> FloatArray:
-        """The readings by the nominal V/rad."""
-        return self.volts / self.scenario.chain.nominal_volts_per_radian
+    def text(self) -> str:
+        """The file, with nothing about what acted."""
+        lines = [f"# {key}: {value}" for key, value in self.header.items()]
+        lines.append(",".join(self.columns))
+        rows = zip(*(column.tolist() for column in self.columns.values()), strict=True)
+        return "\n".join([*lines, *(f"{t:.9g},{y:.9g}" for t, y in rows)]) + "\n"
 
 
-def about(bench: Bench, point: Point) -> Oracle:
-    """The oracle about the baseline's best point, kept with the bench."""
-    scenario = bench.scenario
-    level = point.level_rad * scenario.chain.nominal_volts_per_radian
-    there = replace(scenario, motion=point.motion, chain=scenario.chain.changed(offset_volts=level))
-    return Oracle(Bench(there, bench.kept))
+TRIES: Final = 30
+CLOSE: Final = 0.15
+"""Relative distance from the wanted Delta chi^2 that is near enough."""
 
 
-def judge(bench: Bench, point: Point, scenario: Scenario, codes: IntArray) -> Verdict:
-    """The oracle's verdict on the recorded codes."""
-    angle = scenario.chain.step_rad * codes.astype(np.float64)
-    oracle = about(bench, point)
-    residual = oracle.bench.residual(angle)
-    more = {"dropped-samples": shift_score(bench, angle, residual)}
-    if more["dropped-samples"] == 0.0:
-        more |= refitted(oracle, angle, residual)
-    return oracle.judge(residual, codes, more)
-
-
-def effect_truth(sized: Sized) -> dict[str, Any]:
-    """What is true of one effect."""
-    hidden = sized.hidden
-    return {
-        "effect": hidden.effect,
-        "also": list(hidden.also),
-        "law": hidden.law,
-        "kind": kind_of(hidden.effect),
-        "own_form": hidden.own_form,
-        "delta_chi2": sized.delta_chi2,
-        "parameters": hidden.truth(sized.strength),
-    }
-
-
-def truth_of(
-    family: str, without: Scenario, effects: list[dict[str, Any]], bench: Bench
-) -> dict[str, Any]:
-    """The truth in plain numbers."""
-    motion, noise, chain = without.motion, without.noise, without.chain
-    omega = without.omega
-    kept_s = float(without.time_s[bench.kept][-1])
-    return {
-        "family": family,
-        "baseline": without.baseline,
-        "effects": effects,
-        "nuisances": {
-            "frequency_hz": omega / (2 * np.pi),
-            "amplitude_rad": float(np.hypot(motion.angle_rad, motion.rate_rad_s / omega)),
-            "a": 2.0 / np.pi * omega * motion.value("quadratic"),
-            "b": 0.5 * motion.value("gamma") + 2.0 / np.pi * motion.value("hysteretic"),
-            "c": 2.0 / np.pi * motion.value("coulomb") / omega,
-            "offset_rad": chain.offset_volts / chain.nominal_volts_per_radian,
-            "gain": chain.volts_per_radian / chain.nominal_volts_per_radian,
-            "white_sd_rad": noise.white_sd,
-            "step_rad": chain.step_rad,
-            "alpha": noise.alpha,
-            "freedom": noise.freedom,
-            "samples": without.samples,
-            "judged_until_s": kept_s,
-            "stops": kept_s < without.span_s - 2.0 * without.interval_s,
-        },
-        "oracle": None,
-    }
-
-
-def oracle_truth(verdict: Verdict, effect: str) -> dict[str, Any]:
-    """The oracle's figures; the ten best scores are kept."""
-    best = sorted(verdict.scores, key=lambda name: -verdict.scores[name])[:10]
-    return {
-        "threshold": verdict.threshold,
-        "detected": verdict.detected,
-        "largest_score": verdict.scores[best[0]],
-        "score_of_effect": verdict.scores.get(effect),
-        "named": verdict.ranking[0],
-        "top3": list(verdict.ranking[:3]),
-        "class": list(verdict.members),
-        "scores": {name: verdict.scores[name] for name in best},
-    }
-
-
-TRIES = 40
-
-
-def make_null(
-    random: np.random.Generator,
-    *,
-    oracle: bool = False,
-    scenario: Scenario | None = None,
-    **scenario_options: Any,
-) -> Item:
-    """A recording of Eq. 8 and nothing more, of any amplitude, Q, noise colour and stop.
-
-    Parameters
-    ----------
-    random
-        Everything is drawn from it.
-    oracle
-        Whether the oracle judges it too (a second or two).
-    scenario, scenario_options
-        A given pendulum, or options of `scenario.draw_scenario` (``stop=True``, ``bits=12``,
-        ``amplitude_rad=0.05``, ``colour=False``).
-    """
-    scenario = scenario or draw_scenario(random, **scenario_options)
-    codes = scenario.record(random)
-    bench = Bench(scenario)
-    truth = truth_of("null", scenario, [], bench)
-    if oracle:
-        truth["oracle"] = oracle_truth(judge(bench, bench.truth, scenario, codes), "")
-    return Item(scenario, codes, truth)
-
-
-def make_single(
-    random: np.random.Generator,
-    effect: str,
-    delta_chi2: float,
-    *,
-    own_form: bool | None = None,
-    oracle: bool = True,
-    **scenario_options: Any,
-) -> Item:
-    """A recording with one effect of the catalogue at a wanted oracle's Delta chi^2.
-
-    ``coulomb-friction`` and ``quadratic-drag`` are made for the ``viscous`` baseline (see
-    ``truth["baseline"]``). ``dropped-samples``, ``coarse-quantisation`` and
-    ``coloured-noise`` have no strength: their Delta chi^2 is what it is.
+def make_item(recipe: Recipe, rng: Rng, noise: Noise | None = None) -> Item:
+    """Make an item; what no drawn scene can show is made smaller.
 
     Raises
     ------
     ValueError
-        When no drawn pendulum could show the effect at that size.
+        When no scene can show it at all.
     """
-    sized = draw_sized(random, effect, delta_chi2, own_form=own_form, **scenario_options)
-    codes = sized.scenario.record(random)
-    truth = truth_of("single", sized.without, [effect_truth(sized)], sized.bench)
-    if oracle:
-        verdict = judge(sized.bench, sized.point, sized.scenario, codes)
-        truth["oracle"] = oracle_truth(verdict, effect)
-    return Item(sized.scenario, codes, truth)
+    for turn in range(6 * TRIES):
+        item = _try(recipe, rng, 0.25 ** (turn // TRIES), noise)
+        if item is not None:
+            return item
+    raise ValueError(f"no pendulum can show {recipe}")
 
 
-def draw_sized(
-    random: np.random.Generator,
-    effect: str,
-    delta_chi2: float,
-    *,
-    own_form: bool | None = None,
-    **scenario_options: Any,
-) -> Sized:
-    """Draw pendulums until one can show the effect at the wanted size."""
-    options = (
-        scenario_options
-        if effect not in ONLY_VISCOUS
-        else {**scenario_options, "stop": scenario_options.get("stop", False)}
-    )
-    for turn in range(TRIES):
-        drawn = draw_scenario(random, **(options if turn < TRIES // 3 else easier(options)))
-        sized = size(hide(random, effect, drawn, own_form=own_form), delta_chi2)
-        if sized is not None:
-            return sized
-    raise ValueError(f"{effect} can't be made at Delta chi^2 {delta_chi2}")
-
-
-def easier(options: dict[str, Any]) -> dict[str, Any]:
-    """Fine steps and a wide swing: what hard effects need to be seen at all."""
-    return {"bits": 16, "stop": False, **options}
-
-
-OWN_LEVEL = 13.0
-"""Where the oracle counts one of two known effects as found: 1 % for an effect without scan."""
-
-
-def make_pair(
-    random: np.random.Generator,
-    first: str,
-    second: str,
-    delta_chi2: tuple[float, float],
-    *,
-    cancelling: bool = False,
-    marginal: bool = False,
-    own_form: bool | None = None,
-    oracle: bool = True,
-    **scenario_options: Any,
-) -> Item:
-    """Hide two effects at once.
-
-    ``marginal_delta_chi2`` of each is what is left of it when the other one is known.
-
-    Parameters
-    ----------
-    delta_chi2
-        Of each alone.
-    cancelling
-        Give the second effect the sign that hides the first, where it has a sign.
-    marginal
-        Size each by its marginal Delta chi^2 instead (approximately).
-    own_form
-        Ask for laws that are (or are not) the catalogue's own.
-    """
-    for _ in range(TRIES):
-        found = _draw(random, first, second, delta_chi2, own_form, easier(scenario_options))
-        if found is None:
-            continue
-        prepared, a, b, inner = found
-        cosine = inner / np.sqrt(a.delta_chi2 * b.delta_chi2)
-        if marginal:
-            share = 1.0 - min(cosine**2, 0.999)
-            more = size(a.hidden, delta_chi2[0] / share)
-            other = size(b.hidden, delta_chi2[1] / share)
-            if more is None or other is None:
-                continue
-            a, b = more, other
-        strength = -b.strength if cancelling and inner > 0 else b.strength
-        scenario = b.hidden.build(a.hidden.build(prepared, a.strength), strength)
-        bench = a.bench if a.bench.count <= b.bench.count else b.bench
-        point, _, total = bench.refit(scenario.reading_rad(np.random.default_rng(0)))
-        if not np.isfinite(total):
-            continue
-        codes = scenario.record(random)
-        effects = [effect_truth(a), effect_truth(b)]
-        effects[1]["parameters"] = b.hidden.truth(strength)
-        for entry in effects:
-            entry["marginal_delta_chi2"] = entry["delta_chi2"] * (1.0 - cosine**2)
-        truth = truth_of("combination", bench.scenario, effects, bench)
-        truth |= {"cosine": cosine, "total_delta_chi2": total, "cancelling": cancelling}
-        if oracle:
-            truth["oracle"] = oracle_truth(judge(bench, point, scenario, codes), first)
-            both = _found(bench, point, scenario.chain.step_rad * codes.astype(np.float64), a, b)
-            truth["oracle"]["found_each"] = both
-        return Item(scenario, codes, truth)
-    raise ValueError(f"{first} with {second} can't be made at {delta_chi2}")
-
-
-def _draw(
-    random: np.random.Generator,
-    first: str,
-    second: str,
-    wanted: tuple[float, float],
-    own_form: bool | None,
-    options: dict[str, Any],
-) -> tuple[Scenario, Sized, Sized, float] | None:
-    """Size each alone on the same pendulum.
-
-    Returns
-    -------
-    prepared, first, second, product
-        What both need, each at its strength, and the inner product of what they leave.
-    """
-    drawn: Scenario = draw_scenario(random, **options)
-    one = hide(random, first, drawn, own_form=own_form)
-    two = hide(random, second, one.prepared, own_form=own_form)
-    # What the second needs (a release from rest, say) holds for the first as well.
-    one = replace(one, prepared=two.prepared)
-    if one.moves and two.moves:
-        return None
-    # An effect whose strength is the amplitude itself decides where the other one is sized.
-    a = None if two.moves else size(one, wanted[0])
-    b = size(replace(two, prepared=a.without) if a and one.moves else two, wanted[1])
-    if two.moves and b is not None:
-        a = size(replace(one, prepared=b.without), wanted[0])
-    if a is None or b is None:
-        return None
-    count = min(len(a.residual), len(b.residual))
-    return two.prepared, a, b, float(a.residual[:count] @ b.residual[:count])
-
-
-def _found(bench: Bench, point: Point, angle: FloatArray, a: Sized, b: Sized) -> list[bool]:
-    """Whether each is significant when the other one is fitted too."""
-    noisy = bench.whiten((angle - bench.reading(point))[bench.kept])
-    answers = []
-    for own, other in ((a.residual, b.residual), (b.residual, a.residual)):
-        own, other = own[: bench.count], other[: bench.count]
-        size_other = float(other @ other)
-        left = own - other * (float(own @ other) / size_other if size_other > 0.0 else 0.0)
-        length = float(np.linalg.norm(left))
-        score = float(left @ noisy / length) ** 2 if length > 0.0 else 0.0
-        answers.append(score > OWN_LEVEL)
-    return answers
-
-
-def make_outside(
-    random: np.random.Generator,
-    name: str,
-    delta_chi2: float,
-    *,
-    oracle: bool = True,
-    **scenario_options: Any,
-) -> Item:
-    """Hide what the catalogue does not have, sized by what its best entry leaves of it.
-
-    Parameters
-    ----------
-    name
-        A key of `hidden.OUTSIDE` (``magnet-near-centre``, ``rough-spot``, ...).
-    delta_chi2
-        Delta chi^2 that no single entry of the catalogue can take up
-        (``left_by_catalogue``); ``delta_chi2`` of the truth is the whole effect's.
-    """
-    for _ in range(TRIES):
-        hidden = hide(random, name, draw_scenario(random, **easier(scenario_options)))
-        found = _size_by_rest(hidden, delta_chi2)
-        if found is None:
-            continue
-        sized, rest, mimic = found
-        codes = sized.scenario.record(random)
-        entry = effect_truth(sized) | {"left_by_catalogue": rest, "best_mimic": mimic}
-        truth = truth_of("outside", sized.without, [entry], sized.bench)
-        if oracle:
-            verdict = judge(sized.bench, sized.point, sized.scenario, codes)
-            truth["oracle"] = oracle_truth(verdict, hidden.effect)
-        return Item(sized.scenario, codes, truth)
-    raise ValueError(f"{name} can't be made at {delta_chi2}")
-
-
-def outside_names() -> tuple[str, ...]:
-    """What `make_outside` can hide."""
-    return tuple(OUTSIDE)
-
-
-def _size_by_rest(hidden: Hidden, wanted: float) -> tuple[Sized, float, str] | None:
-    """Size by what the best catalogue entry leaves of a noise-free reading."""
-    whole = 2.0 * wanted
-    for _ in range(5):
-        sized = size(hidden, whole)
-        if sized is None:
+def _try(recipe: Recipe, rng: Rng, ease: float, noise: Noise | None) -> Item | None:
+    """An item, unless the scene that is drawn can't show what is wanted of it."""
+    family = recipe["family"]
+    apparatus = recipe.get("apparatus", "laboratory")
+    scene = draw_scene(rng, apparatus)
+    causes = []
+    if apparatus not in ("laboratory", "wheel"):
+        (sine,) = CATALOGUE["circular-error"]
+        causes.append(Cause(sine.effect, sine.draw(rng, scene), 1.0))
+    background = len(causes)
+    effects = recipe["effects"] if "effects" in recipe else _effects(rng, family, scene)
+    if ONLY_VISCOUS.intersection(effects):
+        scene = replace(scene, baseline="viscous", rates=(0.0, scene.loss_rate, 0.0, 0.0))
+    laws = []
+    for effect, wanted in zip(effects, recipe["delta_chi2"], strict=False):
+        forms = [law for law in (CATALOGUE | OUTSIDE)[effect] if fits(law, scene)]
+        forms = [law for law in forms if law.own is recipe.get("own_form", law.own)] or forms
+        if not forms:
             return None
-        scores = about(sized.bench, sized.point).clean_scores(sized.residual)
-        mimic = max(scores, key=lambda name: scores[name])
-        rest = sized.delta_chi2 - scores[mimic]
-        if abs(rest / wanted - 1.0) < 0.15:
-            return sized, rest, mimic
-        whole *= float(np.clip(wanted / max(rest, 1e-3), 0.02, 30.0))
-        if whole > 1e6:
+        laws.append(forms[int(rng.integers(len(forms)))])
+        cause = sized(rng, scene, causes, laws[-1], wanted * ease, recipe.get("least", 4.0))
+        if cause is None:
             return None
+        causes.append(cause)
+    bench = Bench(scene, causes) if causes or apparatus == "laboratory" else None
+    if bench and recipe.get("cancelling"):
+        one, two = bench.columns.T
+        if laws[1].signed and float(one @ two) > 0:
+            causes[1] = causes[1]._replace(size=-causes[1].size)
+            bench = Bench(scene, causes)
+    oracle = Oracle(bench, listed(scene), rng) if bench and apparatus == "laboratory" else None
+    beyond: dict[str, Any] = {}
+    if oracle and family == "outside":
+        # Sized by what no listed effect takes up.
+        left, _ = oracle.left_by_catalogue()
+        grown = (recipe["delta_chi2"][0] * ease / max(left, 1e-3)) ** 0.5
+        most = laws[0].most / abs(causes[0].size)
+        causes[0] = causes[0]._replace(size=causes[0].size * min(grown, most))
+        bench = Bench(scene, causes)
+        oracle = Oracle(bench, listed(scene), rng)
+        left, mimic = oracle.left_by_catalogue()
+        beyond = {"left_by_catalogue": left, "best_mimic": mimic}
+    columns = recorded(rng, scene, causes, noise)
+    if columns is None:
+        return None
+    truth = truth_of(family, scene, laws, bench, background)
+    truth["wanted_delta_chi2"] = recipe.get("delta_chi2")
+    if noise is not None:
+        truth["allowed"] = sorted({*truth["allowed"], "coloured-noise"})
+    if beyond:
+        truth["effects"][0] |= beyond
+    if oracle and bench and not any(law.chance for law in laws):
+        truth["oracle"] = oracle.judge(columns["angle_rad"] - bench.there, rng)
+    header: dict[str, str] = {}
+    if apparatus == "laboratory":
+        columns = {
+            "time_s": columns["time_s"],
+            "volts": VOLTS_PER_RADIAN * columns["angle_rad"],
+        }
+        full = scene.step * VOLTS_PER_RADIAN * 2.0 ** (scene.bits - 1)
+        stated = {"volts_per_radian": VOLTS_PER_RADIAN, "bits": scene.bits, "range_volts": full}
+        header = {key: f"{value:.9g}" for key, value in stated.items()}
+    return Item(columns, header, truth)
+
+
+def listed(scene: Scene) -> list[str]:
+    """Effects of the catalogue that a scene can have."""
+    return [effect for effect, laws in CATALOGUE.items() if fits(laws[0], scene)]
+
+
+def _effects(rng: Rng, family: str, scene: Scene) -> list[str]:
+    """What is hidden in an apparatus: physics, its sensor's fault, both, or what nobody lists."""
+    if family == "null":
+        return []
+    if family == "outside":
+        return [str(rng.choice([e for e, (law,) in OUTSIDE.items() if fits(law, scene)]))]
+    there = listed(scene)
+    physics = [effect for effect in PHYSICS if effect in there]
+    faults = [effect for effect in SENSORS[scene.apparatus] if effect in there]
+    groups = [physics, faults][:: int(rng.choice([-1, 1]))]
+    return [str(rng.choice(each)) for each in groups[: 1 if family == "single" else 2]]
+
+
+def sized(
+    rng: Rng, scene: Scene, causes: list[Cause], law: Law, wanted: float, least: float
+) -> Cause | None:
+    """A cause of the wanted evidence; None where the scene can't show it."""
+    sign = float(rng.choice([-1, 1])) if law.signed else 1.0
+    cause = Cause(law.effect, law.draw(rng, scene), sign * law.size)
+    for _ in range(8):
+        bench = Bench(scene, [*causes, cause])
+        worth = worth_of(law, bench, -1)
+        if not np.isfinite(worth) or worth <= 0:
+            return None
+        if law.sizeless or abs(worth / wanted - 1) < CLOSE:
+            return cause if worth >= least else None
+        size = abs(cause.size) * (wanted / worth) ** (0.25 if law.chance else 0.5)
+        cause = cause._replace(size=float(sign * min(size, law.most)))
     return None
 
 
+def worth_of(law: Law, bench: Bench, number: int) -> float:
+    """Delta chi^2 of a cause with the others fitted too.
+
+    Of what only scatters it is what a variance in proportion would gain: half the sum of the
+    squared ratios of the variances, where Gaussian readings have three times their square.
+    """
+    if law.effect == "jitter":
+        return float(np.sum(bench.columns[:, number] ** 4) / 6)
+    return float(bench.evidence[number])
+
+
+def truth_of(
+    family: str, scene: Scene, laws: list[Law], bench: Bench | None, background: int
+) -> dict[str, Any]:
+    """The truth in plain numbers."""
+    effects = []
+    for number, law in enumerate(laws, background):
+        assert bench is not None
+        entry = {
+            "effect": law.names[0],
+            "also": list(law.names[1:]),
+            "law": f"{law.effect}: {law.form}",
+            "kind": kind_of(law.names[0]),
+            "own_form": law.own,
+            "delta_chi2": worth_of(law, bench, number),
+            "alone_delta_chi2": float(bench.alone[number]),
+            "size": bench.causes[number].size,
+        }
+        if law.effect == "tone-pickup":
+            entry["tone_hz"] = scene.tone_hz
+        elif law.local and law.effect != "periodic-drive":
+            entry |= {"instant_s": scene.instant_s, "tick_s": scene.tick_s}
+        effects.append(entry)
+    allowed = {"coarse-quantisation"} if scene.step > 0.5 * scene.noise_rms else set()
+    if scene.event_driven:
+        # The count changes at its edges whichever way it is passed: a play of one count.
+        allowed |= {"coarse-quantisation", "sensor-backlash", "jitter"}
+    if scene.red:
+        allowed |= {"coloured-noise"}
+    a, viscous, hysteretic, c = scene.rates
+    return {
+        "family": family,
+        "apparatus": scene.apparatus + ", events" * scene.event_driven,
+        "baseline": scene.baseline,
+        "effects": effects,
+        "present": [cause.name for cause in (bench.causes if bench else [])[:background]],
+        "allowed": sorted(allowed),
+        "nuisances": {
+            "frequency_hz": scene.frequency_hz,
+            "amplitude_rad": scene.amplitude,
+            "rates": [a, viscous + hysteretic, c],
+            "noise_rms_rad": scene.noise_rms,
+            "step_rad": scene.step,
+            "red": scene.red,
+            "readings": len(scene.time_s),
+        },
+        "total_delta_chi2": float(np.sum(bench.columns[:, background:].sum(axis=1) ** 2))
+        if bench
+        else 0.0,
+        "oracle": None,
+    }
+
+
+def recorded(
+    rng: Rng, scene: Scene, causes: list[Cause], noise: Noise | None
+) -> dict[str, Array] | None:
+    """Columns of the file; None where there are too few events, or too many."""
+    if scene.event_driven:
+        columns = events(rng, scene, causes)
+        return columns if 500 <= len(columns["time_s"]) <= 60_000 else None
+    y, seen = scene.reading(causes)
+    if noise:
+        y = noise(rng, seen, y, np.hypot(seen.x, seen.v / scene.omega), scene.noise_rms)
+    else:
+        y = y + scene.noise(rng)
+    for limit in scene.world(causes).limits:
+        y = limit(y)
+    if scene.step:
+        y = scene.step * np.floor(y / scene.step + 0.5)
+    return {"time_s": seen.time_s, "angle_rad": y}
+
+
+def events(rng: Rng, scene: Scene, causes: list[Cause]) -> dict[str, Array]:
+    """A row for each change of the count: its instant, and the angle of the new count."""
+    rate = 4 * 400 * scene.frequency_hz
+    dense = np.arange(0, scene.duration_s, 1 / rate)
+    y, _ = scene.reading(causes, time_s=dense)
+    height = y / scene.step + rng.uniform()
+    count = np.floor(height).astype(int)
+    instants, values = [], []
+    for place in np.flatnonzero(np.diff(count)):
+        low, high = height[place], height[place + 1]
+        way = 1 if high > low else -1
+        for edge in range(count[place] + (way > 0), count[place + 1] + (way > 0), way):
+            part = (edge + EVENT_EDGE * rng.normal() - low) / (high - low)
+            instants.append(dense[place] + min(max(part, 0.0), 1.0) / rate)
+            values.append((edge if way > 0 else edge - 1) * scene.step)
+    late = np.array(instants) + rng.exponential(EVENT_JITTER_S, len(instants))
+    order = np.argsort(late, kind="stable")
+    stamps = np.round(late[order], 6)
+    kept = np.r_[True, np.diff(stamps) > 0]
+    return {"time_s": stamps[kept], "angle_rad": np.array(values)[order][kept]}
+
+
+# ------------------------------------------------------------ what a set holds
+
+ABSENT: Final = frozenset({"camera-geometry", "count-slips", "rolling-shutter"})
+"""What a laboratory's converter can't have."""
+EFFECTS: Final = tuple(effect for effect in CATALOGUE if effect not in ABSENT)
+PHYSICS: Final = tuple(
+    effect
+    for effect in CATALOGUE
+    if effect not in MEASUREMENT | ONLY_VISCOUS | {"circular-error", "amplitude-step"}
+)
 SIZES: Final = (4.0, 9.0, 16.0, 25.0, 50.0, 100.0, 400.0, 2500.0)
 SHARES: Final = {
     "null": 0.34,
@@ -397,7 +451,6 @@ SHARES: Final = {
     "withheld": 0.08,
 }
 """Of a set; what rounding leaves goes to the nulls."""
-WITHOUT_STRENGTH: Final = frozenset({"dropped-samples", "coarse-quantisation", "coloured-noise"})
 PAIRS: Final = (
     ("cubic-stiffness", "tone-pickup", False),
     ("circular-error", "glitches", False),
@@ -415,111 +468,56 @@ PAIRS: Final = (
 """First, second, whether the second is to hide the first."""
 PAIR_SIZES: Final = ((50.0, 50.0), (400.0, 25.0), (400.0, 400.0))
 TIES: Final = (
-    "equilibrium-creep",
-    "offset-drift",
-    "periodic-drive",
-    "tone-pickup",
-    "clock-drift",
-    "frequency-drift",
-    "damping-drift",
-    "power-law-damping",
+    *("equilibrium-creep", "offset-drift", "periodic-drive", "tone-pickup", "clock-drift"),
+    *("frequency-drift", "damping-drift", "power-law-damping"),
 )
 """Effects that one record can hardly tell from a rival."""
+ROUNDS: Final[tuple[tuple[str, tuple[str, ...], tuple[float, ...]], ...]] = (
+    ("tie", TIES, (50.0, 100.0, 400.0)),
+    ("outside", tuple(OUTSIDE), (25.0, 100.0, 100.0, 400.0)),
+    ("withheld", ("circular-error", "coulomb-friction", "quadratic-drag"), (1e4,)),
+)
+"""Families whose effects and sizes go round."""
 
 
-def plan(count: int, random: np.random.Generator) -> list[dict[str, Any]]:
-    """What each item of a set hides, in an order that gives nothing away.
-
-    Parameters
-    ----------
-    count
-        Items of the set.
-    random
-        Shuffles, and deals the instrument's share of the singles.
-    """
+def plan(count: int, rng: Rng) -> list[Recipe]:
+    """What each item of a set hides, in an order that gives nothing away."""
     number = {name: int(share * count) for name, share in SHARES.items()}
     number["null"] += count - sum(number.values())
-    recipes: list[dict[str, Any]] = [{"family": "null"} for _ in range(number["null"])]
-    recipes += _singles(number["single"], random)
+    recipes: list[Recipe] = [{"family": "null", "effects": [], "delta_chi2": []}] * number["null"]
+    recipes += _singles(number["single"], rng)
     for i in range(number["combination"]):
         first, second, cancelling = PAIRS[i % len(PAIRS)]
-        recipes.append(
+        sizes = list(PAIR_SIZES[(i // len(PAIRS) + i) % len(PAIR_SIZES)])
+        recipe = {"family": "combination", "effects": [first, second], "delta_chi2": sizes}
+        recipes.append(recipe | {"cancelling": cancelling})
+    for family, names, wanted in ROUNDS:
+        begin = int(rng.integers(len(names)))
+        recipes += [
             {
-                "family": "combination",
-                "effects": [first, second],
-                "cancelling": cancelling,
-                "delta_chi2": list(PAIR_SIZES[(i // len(PAIRS) + i) % len(PAIR_SIZES)]),
+                "family": family,
+                "effects": [names[(i + begin) % len(names)]],
+                "delta_chi2": [wanted[i % len(wanted)]],
             }
-        )
-    for i in range(number["tie"]):
-        size = (50.0, 100.0, 400.0)[i % 3]
-        recipes.append({"family": "tie", "effects": [TIES[i % len(TIES)]], "delta_chi2": [size]})
-    names = outside_names()
-    for i in range(number["outside"]):
-        size = (25.0, 100.0, 100.0, 400.0)[(i // len(names)) % 4]
-        recipes.append(
-            {"family": "outside", "effects": [names[i % len(names)]], "delta_chi2": [size]}
-        )
-    for i in range(number["withheld"]):
-        effect = ("circular-error", "coulomb-friction", "quadratic-drag")[i % 3]
-        recipes.append({"family": "withheld", "effects": [effect], "delta_chi2": [1e4]})
-    random.shuffle(recipes)
+            for i in range(number[family])
+        ]
+    rng.shuffle(recipes)
     return recipes
 
 
-def _singles(count: int, random: np.random.Generator) -> list[dict[str, Any]]:
+def _singles(count: int, rng: Rng) -> list[Recipe]:
     """Two in five singles are faults of the instrument; sizes go round."""
-    usual = [e for e in EFFECTS if e not in ("coloured-noise",)]
-    faults = [e for e in usual if e in MEASUREMENT]
-    physics = [e for e in usual if e not in MEASUREMENT]
-    random.shuffle(faults)
-    random.shuffle(physics)
+    faults = [e for e in EFFECTS if e in MEASUREMENT]
+    physics = [e for e in EFFECTS if e not in MEASUREMENT]
+    rng.shuffle(faults)
+    rng.shuffle(physics)
     found = []
     for i in range(count):
         fault = i % 5 < 2
         pool = faults if fault else physics
         at = 2 * (i // 5) + i % 5 if fault else 3 * (i // 5) + i % 5 - 2
-        effect = pool[at % len(pool)]
         # Each effect meets the sizes in turn, beginning anywhere.
         size = SIZES[(at // len(pool) * 3 + at) % len(SIZES)]
-        own = None if at % 2 else False
-        found.append(
-            {"family": "single", "effects": [effect], "delta_chi2": [size], "own_form": own}
-        )
+        recipe = {"family": "single", "effects": [pool[at % len(pool)]], "delta_chi2": [size]}
+        found.append(recipe if at % 2 else recipe | {"own_form": False})
     return found
-
-
-def make_item(recipe: dict[str, Any], random: np.random.Generator) -> Item:
-    """Make a synthetic item; a size that nothing drawn can show is made smaller, or larger.
-
-    A fault of whole codes may be nothing, or more than was asked.
-    """
-    family = recipe["family"]
-    if family == "null":
-        return make_null(random, oracle=True)
-    effects, sizes = recipe["effects"], recipe["delta_chi2"]
-    for factor in (1.0, 0.25, 0.06, 0.02, 4.0, 16.0, 64.0):
-        try:
-            item = _made(family, effects, [factor * size for size in sizes], recipe, random)
-        except ValueError:
-            continue
-        item.truth["family"] = family
-        item.truth["wanted_delta_chi2"] = sizes
-        return item
-    raise ValueError(f"no pendulum can show {effects} ({family})")
-
-
-def _made(
-    family: str,
-    effects: list[str],
-    sizes: list[float],
-    recipe: dict[str, Any],
-    random: np.random.Generator,
-) -> Item:
-    if family == "combination":
-        return make_pair(
-            random, effects[0], effects[1], (sizes[0], sizes[1]), cancelling=recipe["cancelling"]
-        )
-    if family == "outside":
-        return make_outside(random, effects[0], sizes[0])
-    return make_single(random, effects[0], sizes[0], own_form=recipe.get("own_form"))

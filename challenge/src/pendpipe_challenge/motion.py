@@ -103,7 +103,6 @@ def step(
     h: float,
     sign: float,
     region: int,
-    extra: float,
     turn: float,
     turned_at: float,
     states: int,
@@ -118,7 +117,7 @@ def step(
                 factor = h * A[i, j]
                 for n in range(states):
                     work[n] += factor * k[j, n]
-        rates(p, work, k[i], t + C[i] * h, middle, sign, region, extra, turn, turned_at)
+        rates(p, work, k[i], t + C[i] * h, middle, sign, region, turn, turned_at)
     for n in range(states):
         new[n] = s[n]
     for i in range(STAGES):
@@ -139,7 +138,6 @@ def crossing(
     h: float,
     sign: float,
     region: int,
-    extra: float,
     turn: float,
     turned_at: float,
     states: int,
@@ -151,7 +149,7 @@ def crossing(
     at_low, at_high = s[which] - level, new[which] - level
     tau = 0.0 if at_low == at_high else h * at_low / (at_low - at_high)
     for _ in range(60):
-        step(p, s, new, k, work, t, tau, sign, region, extra, turn, turned_at, states)
+        step(p, s, new, k, work, t, tau, sign, region, turn, turned_at, states)
         value = new[which] - level
         if abs(value) <= 1e-16 or high - low <= 1e-15 * (1.0 + abs(t)):
             break
@@ -161,7 +159,7 @@ def crossing(
             high = tau
         # Newton from the step's own rate at its end, kept inside the bracket.
         middle = t + 0.5 * tau
-        rates(p, new, work, t + tau, middle, sign, region, extra, turn, turned_at)
+        rates(p, new, work, t + tau, middle, sign, region, turn, turned_at)
         slope = work[which]
         guess = tau - value / slope if slope != 0.0 else 0.5 * (low + high)
         if not low < guess < high:
@@ -170,7 +168,7 @@ def crossing(
             tau = guess
             break
         tau = guess
-    step(p, s, new, k, work, t, tau, sign, region, extra, turn, turned_at, states)
+    step(p, s, new, k, work, t, tau, sign, region, turn, turned_at, states)
     return tau
 
 
@@ -187,13 +185,9 @@ def longest_step(p: Any, s: FloatArray) -> float:
         rate = max(rate, p.second_omega / 0.32)
     if p.drive != 0.0:
         rate = max(rate, p.drive_omega / 0.5)
-    if p.magnet != 0.0:
-        rate = max(rate, speed / (0.25 * p.magnet_width))
     if p.rough != 0.0:
         away = max(abs(s[0] - p.rough_place) - 4.0 * p.rough_width, 0.35 * p.rough_width)
         rate = max(rate, speed / away)
-    if p.cogging != 0.0:
-        rate = max(rate, speed * p.cogging_teeth / 0.5)
     if p.stribeck != 0.0 or p.bristle_stribeck != 0.0:
         reach = 4.0 if p.stribeck_power > 1.0 else 15.0
         away = max(abs(s[1]) - reach * p.stribeck_speed, 0.4 * p.stribeck_speed)
@@ -201,8 +195,10 @@ def longest_step(p: Any, s: FloatArray) -> float:
     if p.power != 0.0 and s[1] != 0.0:
         stiff = p.power_exponent * p.power * abs(s[1]) ** (p.power_exponent - 1.0)
         rate = max(rate, min(stiff, 200.0 * p.omega))
-    if p.power != 0.0 or p.memory != 0.0 or p.reynolds != 0.0:
+    if p.power != 0.0 or p.reynolds != 0.0:
         rate = max(rate, p.omega / 0.12)
+    if p.book != 0.0:
+        rate = max(rate, p.omega / 0.03)
     return float(1.0 / rate)
 
 
@@ -213,13 +209,12 @@ def sticks(
     work: FloatArray,
     t: float,
     region: int,
-    extra: float,
     turn: float,
     turned_at: float,
 ) -> float:
     """The direction in which a pendulum at rest sets off, or 0 if friction holds it."""
-    free = rates(p, s, work, t, t, 1.0, region, extra, turn, turned_at)
-    if abs(free) <= friction(p, s[0], 0.0, t, extra, turn, turned_at):
+    free = rates(p, s, work, t, t, 1.0, region, turn, turned_at)
+    if abs(free) <= friction(p, s[0], 0.0, t, turn, turned_at):
         return 0.0
     return 1.0 if free > 0.0 else -1.0
 
@@ -231,10 +226,9 @@ def follow(
     times: FloatArray,
     breaks: FloatArray,
     kicks: FloatArray,
-    rubs: FloatArray,
     states: int,
 ) -> FloatArray:
-    """Integrate from `times[0]` and return x, v and u of the second coordinate at `times`.
+    """Integrate from `times[0]` and return x, v, u and the last turning point at `times`.
 
     Parameters
     ----------
@@ -248,13 +242,11 @@ def follow(
         Moments at which something switches, rising, s.
     kicks
         Change of v at the beginning of each interval between times; empty for none.
-    rubs
-        Friction in each interval beside the parameters', rad/s^2; empty for none.
     states
         How many of the hidden states are in use, x and v included.
     """
     p = parameters[0]
-    out = np.zeros((len(times), 3))
+    out = np.zeros((len(times), 4))
     s, new = start.copy(), np.zeros(STATES)
     k, work = np.zeros((STAGES, STATES)), np.zeros(STATES)
     t, turn, turned_at = times[0], start[0], times[0] - 1e9
@@ -268,16 +260,14 @@ def follow(
     at = 0
     while at < len(breaks) and breaks[at] <= t:
         at += 1
-    out[0, 0], out[0, 1], out[0, 2] = s[0], s[1], s[SECOND]
-    extra = rubs[0] if len(rubs) else 0.0
+    out[0, 0], out[0, 1], out[0, 2], out[0, 3] = s[0], s[1], s[SECOND], turn
     sign = math.copysign(1.0, s[1])
     if s[1] == 0.0:
-        sign = sticks(p, s, work, t, region, extra, turn, turned_at)
+        sign = sticks(p, s, work, t, region, turn, turned_at)
     for i in range(1, len(times)):
         end = times[i]
         # Time since `base`: what a step rounds off does not grow with t.
         base, done = t, 0.0
-        extra = rubs[i - 1] if len(rubs) else 0.0
         if len(kicks) and kicks[i - 1] != 0.0:
             s[1] += kicks[i - 1]
             sign = math.copysign(1.0, s[1])
@@ -287,7 +277,7 @@ def follow(
                 out[i:, :] = np.nan
                 return out
             if sign == 0.0:
-                sign = sticks(p, s, work, t, region, extra, turn, turned_at)
+                sign = sticks(p, s, work, t, region, turn, turned_at)
             limit = end if at >= len(breaks) else min(end, breaks[at])
             left = (limit - base) - done
             if left > 0.0:
@@ -295,7 +285,7 @@ def follow(
                     t, base, done = limit, limit, 0.0
                 else:
                     h = left / max(math.ceil(left / longest_step(p, s) - 1e-9), 1)
-                    step(p, s, new, k, work, t, h, sign, region, extra, turn, turned_at, states)
+                    step(p, s, new, k, work, t, h, sign, region, turn, turned_at, states)
                     kind, edge = 0, 0.0
                     if p.play != 0.0:
                         side = 0
@@ -317,7 +307,6 @@ def follow(
                             h,
                             sign,
                             region,
-                            extra,
                             turn,
                             turned_at,
                             states,
@@ -337,7 +326,6 @@ def follow(
                             h,
                             sign,
                             region,
-                            extra,
                             turn,
                             turned_at,
                             states,
@@ -354,12 +342,13 @@ def follow(
                         t = base + done
                     if kind == 2:
                         turn, turned_at = s[0], t
-                        sign = sticks(p, s, work, t, region, extra, turn, turned_at)
+                        sign = sticks(p, s, work, t, region, turn, turned_at)
                         if abs(s[0]) < still and p.any_time == 0.0 and p.any_push == 0.0:
                             # Damped away to nothing, in ever shorter half cycles perhaps.
                             out[i:, 0] = s[0]
                             out[i:, 1] = 0.0
                             out[i:, 2] = s[SECOND]
+                            out[i:, 3] = turn
                             return out
             if at < len(breaks) and t >= breaks[at]:
                 if p.impulse != 0.0 and p.impulse_width == 0.0 and breaks[at] == p.impulse_at:
@@ -371,7 +360,7 @@ def follow(
                     sign = math.copysign(1.0, s[1])
                 at += 1
         t = end
-        out[i, 0], out[i, 1], out[i, 2] = s[0], s[1], s[SECOND]
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = s[0], s[1], s[SECOND], turn
     return out
 
 
@@ -387,12 +376,13 @@ _SWITCHES: Final = (
 
 @dataclass(frozen=True)
 class Track:
-    """x, v and the second coordinate at the asked times; rad, rad/s, rad."""
+    """x, v, the second coordinate, the last turning point at the asked times; rad, rad/s."""
 
     time_s: FloatArray
     angle_rad: FloatArray
     rate_rad_s: FloatArray
     second_rad: FloatArray
+    turn_rad: FloatArray
 
 
 @dataclass(frozen=True)
@@ -409,8 +399,8 @@ class Motion:
         The second coordinate's.
     held_rad
         Angle at which relaxing springs had settled before the start.
-    kicks_rad_s, rubs_rad_s2
-        Change of v at the start of each sampling interval; friction during each.
+    kicks_rad_s
+        Change of v at the start of each sampling interval.
     """
 
     parameters: Mapping[str, float]
@@ -420,7 +410,6 @@ class Motion:
     second_rate_rad_s: float = 0.0
     held_rad: float = 0.0
     kicks_rad_s: FloatArray = field(default_factory=lambda: np.empty(0))
-    rubs_rad_s2: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def value(self, name: str) -> float:
         """A parameter, or its default."""
@@ -452,10 +441,9 @@ class Motion:
             np.ascontiguousarray(time_s, np.float64),
             self._breaks(),
             self.kicks_rad_s,
-            self.rubs_rad_s2,
             self._states(),
         )
-        return Track(time_s, found[:, 0].copy(), found[:, 1].copy(), found[:, 2].copy())
+        return Track(time_s, *(found[:, each].copy() for each in range(4)))
 
     def _start(self) -> FloatArray:
         state = np.zeros(STATES)

@@ -34,7 +34,6 @@ from pendpipe.files import finite, read_json, replaced, write_json
 from pendpipe.process import ONE_THREAD
 from pendpipe.version import __version__
 from pendpipe_challenge.items import make_item, plan
-from pendpipe_challenge.recordings import recording_text
 
 LEDGER: Final = "ledger.jsonl"
 """Beside the sets' folders: every item ever made."""
@@ -241,11 +240,10 @@ def _make_one(task: tuple[Places, str, dict[str, Any], list[int]]) -> dict[str, 
     if places.truth(name).exists():  # made before an interruption, and not entered yet
         return {"item": name, "recording": _hash_of(places.recording(name))}
     item = make_item(recipe, np.random.default_rng(seed))
-    text = recording_text(item.scenario, item.codes)
     with replaced(places.recording(name)) as stream:
-        stream.write(text)
+        stream.write(item.text)
     write_json(places.truth(name), {"item": name, **item.truth})
-    return {"item": name, "recording": of_text(text)}
+    return {"item": name, "recording": of_text(item.text)}
 
 
 def _seal(places: Places, names: list[str], secret: dict[str, Any]) -> None:

@@ -32,11 +32,6 @@ PARAMETERS: Final = {
     "lopsided": 0.0,  # x^2 at first, exp in full, 1/rad
     "lopsided_scale": 0.5,  # rad
     "play": 0.0,  # half width of a dead zone, rad
-    "magnet": 0.0,  # m x/(1 + (x/width)^2)^2
-    "magnet_width": 0.02,  # rad
-    "cogging": 0.0,  # rad
-    "cogging_teeth": 40.0,
-    "cogging_phase": 0.0,
     # Losses.
     "drag": 0.0,  # |v| v, 1/rad
     "power": 0.0,  # |v|^n sgn v
@@ -67,8 +62,6 @@ PARAMETERS: Final = {
     "rough": 0.0,  # friction on a spot, rad/s^2
     "rough_place": 0.05,
     "rough_width": 0.01,
-    "memory": 0.0,  # friction that grows with |x - last turning point|^p
-    "memory_power": 0.5,
     "pulsed": 0.0,  # damping that is periodic in time, 1/s
     "pulsed_omega": 1.0,
     "pulsed_phase": 0.0,
@@ -102,7 +95,7 @@ PARAMETERS: Final = {
     "parametric": 0.0,  # of omega^2, relative
     "parametric_omega": 1.0,
     "parametric_phase": 0.0,
-    # A law of `Book`, which no catalogue has: its size and two shapes.
+    # A law of `BOOK`, which no catalogue has: its size and two shapes.
     "book": 0.0,
     "book_size": 0.0,
     "book_shape": 1.0,
@@ -128,8 +121,6 @@ GROUPS: Final = {
         "sided",
         "stiffening",
         "lopsided",
-        "magnet",
-        "cogging",
     ),
     "any_rate": (
         "gamma_drift",
@@ -151,7 +142,6 @@ GROUPS: Final = {
         "release_finger",
         "shedding",
         "rough",
-        "memory",
         "book",
     ),
     "any_time": ("creep", "creep_log", "rest_jump", "omega_drift", "omega_jump", "parametric"),
@@ -285,13 +275,6 @@ def restoring(p: Any, x: float, region: int) -> float:
     if p.lopsided != 0.0:
         s = p.lopsided_scale
         force += p.lopsided * 2.0 * s * (s * math.expm1(x / s) - x)
-    if p.magnet != 0.0:
-        shape = 1.0 + (x / p.magnet_width) ** 2
-        force += p.magnet * x / (shape * shape)
-    if p.cogging != 0.0:
-        force += p.cogging * (
-            math.sin(p.cogging_teeth * x + p.cogging_phase) - math.sin(p.cogging_phase)
-        )
     return float(force)
 
 
@@ -329,11 +312,9 @@ def damping_rate(p: Any, x: float, v: float, t: float, middle: float) -> float:
 
 
 @compiled
-def friction(
-    p: Any, x: float, v: float, t: float, extra: float, turn: float, turned_at: float
-) -> float:
+def friction(p: Any, x: float, v: float, t: float, turn: float, turned_at: float) -> float:
     """What multiplies sgn v; `turn` is the last turning point, reached at `turned_at`."""
-    force = p.coulomb + extra
+    force = p.coulomb
     if p.hysteretic != 0.0 or p.quadratic != 0.0 or p.energy != 0.0:
         # Twice the energy: of a pendulum, where it swings by sin x.
         potential = x * x + p.sine * (4.0 * math.sin(0.5 * x) ** 2 - x * x)
@@ -354,8 +335,6 @@ def friction(
         force += p.shedding * (abs(turn) - p.shedding_amplitude) ** p.shedding_power * burst
     if p.rough != 0.0:
         force += p.rough * math.exp(-(((x - p.rough_place) / p.rough_width) ** 2))
-    if p.memory != 0.0:
-        force += p.memory * abs(x - turn) ** p.memory_power
     if p.book == AGEING_FRICTION:
         force += p.book_size * math.exp(-abs(x - turn) / p.book_shape)
     return float(force)
@@ -460,7 +439,6 @@ def rates(
     middle: float,
     sign: float,
     region: int,
-    extra: float,
     turn: float,
     turned_at: float,
 ) -> float:
@@ -476,8 +454,6 @@ def rates(
         Time, and the middle of the step it belongs to, which decides about switches.
     sign, region
         The sides of v = 0 and of the dead zone that hold throughout the step.
-    extra
-        Friction of this sampling interval beside the parameters', rad/s^2.
     turn, turned_at
         The last turning point, rad and s.
 
@@ -498,7 +474,7 @@ def rates(
     if p.second != 0.0:
         free += p.coupling * p.omega * p.omega * s[SECOND]
     out[0] = v
-    out[1] = free - sign * friction(p, x, v, t, extra, turn, turned_at)
+    out[1] = free - sign * friction(p, x, v, t, turn, turned_at)
     if p.second != 0.0:
         u = s[SECOND]
         out[SECOND] = s[SECOND + 1]
