@@ -101,8 +101,7 @@ def test_curvature_is_noticed() -> None:
     assert abs(bent.linearity.cubic.value + 20.0) < 4.0 * bent.linearity.cubic.sd
     assert abs(bent.linearity.quadratic.value) < 4.0 * bent.linearity.quadratic.sd
     assert bent.chi2_p_value < 1e-6
-    unknown = calibrate(angle, curved)
-    assert unknown.linearity.p_value < 1e-6
+    assert calibrate(angle, curved).linearity.p_value < 1e-6
 
 
 def test_the_arms_error_is_the_constants_alone() -> None:

@@ -118,8 +118,7 @@ def test_the_decrement_that_is_seen_is_as_sure_as_it_says() -> None:
 
 
 def test_an_error_of_the_level_is_no_loss() -> None:
-    law = Eq8(OMEGA, viscous=0.05)
-    motion = turning_points(law, Release(0.0, 0.5), count=10)
+    motion = turning_points(Eq8(OMEGA, viscous=0.05), Release(0.0, 0.5), count=10)
     angle = motion.angle_rad + 0.02
     points = TurningPoints(
         np.arange(10), motion.time_s, 1e-4 * np.ones(10), angle, 1e-4 * np.ones(10), np.zeros(10)
@@ -131,8 +130,7 @@ def test_an_error_of_the_level_is_no_loss() -> None:
 
 def test_the_level_is_not_sought_in_turning_points_of_one_side() -> None:
     """Where the others hardly stand out: there any level would do, and any amplitude."""
-    law = Eq8(OMEGA, viscous=0.02)
-    motion = turning_points(law, Release(0.0, 0.5), count=10)
+    motion = turning_points(Eq8(OMEGA, viscous=0.02), Release(0.0, 0.5), count=10)
     sd = np.full(10, 0.05)
     angle = motion.angle_rad + 0.05 * np.random.default_rng(3).standard_normal(10)
     points = TurningPoints(

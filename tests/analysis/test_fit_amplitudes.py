@@ -54,8 +54,7 @@ def test_amplitudes_of_every_layout_tell_the_half_life(tmp_path: Path, name: str
     fit = pp.fit(tmp_path / "by-hand.csv")
     assert (fit.method, fit.light, fit["amplitude"].unit) == ("amplitudes", "green", unit)
     assert abs(fit["amplitude"].value / first - 1.0) < 0.01
-    half = fit.damping()["half_life_s"]
-    assert abs(half.value / (TAU * math.log(2.0)) - 1.0) < 0.01
+    assert abs(fit.damping()["half_life_s"].value / (TAU * math.log(2.0)) - 1.0) < 0.01
     assert fit["Q"].value != fit["Q"].value
     written = fit.to_dict()
     assert any("frequency, phase and noise_rms_rad" in said for said in written["warnings"])

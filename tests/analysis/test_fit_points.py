@@ -131,8 +131,7 @@ def test_the_unknown_share_widens_the_frequency() -> None:
     for share in (0.0, 1.0):
         b = OMEGA / 20.0
         points = engine_table(Eq8(OMEGA, 0.0, share * b, (1.0 - share) * b), 12, 1e-9)
-        result = fit_points(points)
-        frequency = result.parameters["frequency"]
+        frequency = fit_points(points).parameters["frequency"]
         low, high = frequency.interval95 or (math.nan, math.nan)
         assert low < 0.516 < high
         assert frequency.sd / frequency.value == pytest.approx(0.00117 / math.sqrt(2.0), rel=0.1)
@@ -158,8 +157,7 @@ def test_the_unknown_share_widens_the_time_of_release() -> None:
 def test_the_level_error_does_not_reach_the_rates() -> None:
     """A level 5 sd off shifts the halves apart; a, b, c stay, and the offset is mended."""
     time = np.arange(309) * (math.pi / OMEGA)
-    exact = np.asarray(amplitude(time, 0.068, *REGIMES["all"]))
-    points = table(time, exact, 1e-5)
+    points = table(time, np.asarray(amplitude(time, 0.068, *REGIMES["all"])), 1e-5)
     error = 5e-6
     shifted = TurningPoints(
         **{

@@ -125,8 +125,7 @@ def test_rounding_of_a_converter_is_noise() -> None:
 
 def test_slow_noise_widens_the_errors() -> None:
     """A wobble at the motion's own frequency hides from differences, not from half cycles."""
-    rng = np.random.default_rng(7)
-    steps = rng.standard_normal(150)
+    steps = np.random.default_rng(7).standard_normal(150)
     slow = np.interp(TIME, np.linspace(0.0, 300.0, 150), steps)
     values = noisy(sample(FIG_8, START, TIME)) + 3e-4 * slow * np.cos(OMEGA * TIME)
     result, clean = fit_recording(Recording(TIME, values, "angle_rad")), fitted()
@@ -169,10 +168,8 @@ def test_both_methods_agree() -> None:
 
 
 def test_fit_json_is_read_as_it_was_written() -> None:
-    result = fitted()
-    content = json.loads(json.dumps(finite(result.to_dict())))
-    again = FitResult.from_json(content)
-    assert finite(again.to_dict()) == content
+    content = json.loads(json.dumps(finite(fitted().to_dict())))
+    assert finite(FitResult.from_json(content).to_dict()) == content
     assert set(content) == {
         "schema_version",
         "method",

@@ -376,8 +376,7 @@ def test_a_decay_in_loud_noise_is_seen_by_all_its_readings() -> None:
     """8 % at Q = 1650, the amplitude 7.8 times the noise of a reading."""
     time = np.arange(12000) / RATE
     values = 0.1 * np.exp(-0.08 * time / time[-1]) * np.cos(OMEGA * time)
-    found = find_free_decay(recording([values], noise=0.1 / 7.8))
-    assert found.half_cycles > 180
+    assert find_free_decay(recording([values], noise=0.1 / 7.8)).half_cycles > 180
 
 
 @pytest.mark.parametrize("wander", [0.0, 0.3])
@@ -469,8 +468,7 @@ def test_a_period_that_lengthens_as_a_pendulum_s_tells_the_unit(factor: float) -
     from pendpipe.dynamics import Eq8, Release, sample
 
     time = np.arange(3000) * 0.01
-    law = Eq8(8.0, viscous=0.03, restoring="sine")
-    angle = sample(law, Release(-0.2, 2.0), time)
+    angle = sample(Eq8(8.0, viscous=0.03, restoring="sine"), Release(-0.2, 2.0), time)
     angle += 1e-3 * np.random.default_rng(1).standard_normal(len(time))
     result = fit(Recording(time, factor * angle, "reading"))
     assert (result.restoring, result["amplitude"].unit) == ("sine", "rad")

@@ -142,8 +142,7 @@ def test_half_cycles_lost_in_gaps_are_counted(steps: list[int], period: float) -
     sign = 1 - 2 * (number % 2)
     gap = np.concatenate([[0], (np.array(steps) > 1).astype(int)])
     counted = np.zeros(len(number), dtype=np.int64)
-    good = count_half_cycles(period * number, sign, gap, period, counted)
-    assert good == len(number)
+    assert count_half_cycles(period * number, sign, gap, period, counted) == len(number)
     assert counted.tolist() == number.tolist()
 
 

@@ -61,10 +61,8 @@ def test_the_minimum_is_that_of_the_noise_that_was_found() -> None:
 def test_rounded_stamps_of_even_times_are_even() -> None:
     """Sixty readings a second, stamped with two decimals."""
     true = np.arange(3600) / 60.0
-    law = Eq8(5.0, viscous=0.02, restoring="sine")
-    recording = clean(law, 0.2, true, 2e-4)
-    stamped = pp.Recording(np.round(true, 2), angle_rad=recording.values)
-    result = pp.fit(stamped)
+    recording = clean(Eq8(5.0, viscous=0.02, restoring="sine"), 0.2, true, 2e-4)
+    result = pp.fit(pp.Recording(np.round(true, 2), angle_rad=recording.values))
     assert result.noise_rms_rad == pytest.approx(2e-4, rel=0.05)
     assert result["b"].sd == pytest.approx(pp.fit(recording)["b"].sd, rel=0.05)
 

@@ -18,8 +18,7 @@ def half_cycles(
     swing: np.ndarray, half: np.ndarray | float = HALF, step: float = 0.0, ending: float = 0.0
 ) -> HalfCycles:
     """Half cycles of given swings and half periods, about a centre that stays."""
-    halves = np.broadcast_to(half, len(swing) - 1)
-    middle = np.concatenate(([0.0], np.cumsum(halves)))
+    middle = np.concatenate(([0.0], np.cumsum(np.broadcast_to(half, len(swing) - 1))))
     turn = np.concatenate(([swing[0] / 2], swing[0] / 2 - np.cumsum(swing * side(len(swing)))))
     time = np.append(middle, middle[-1] + HALF) - HALF / 2
     return HalfCycles(time, turn, swing, middle, step, ending)
@@ -195,8 +194,7 @@ def test_units_do_not_matter(scale: float, pace: float, kick: float) -> None:
     swing = decay()
     swing[12:] *= kick
     cycles = half_cycles(swing, step=0.01)
-    scaled = half_cycles(scale * swing, HALF * pace, 0.01 * scale)
-    assert ends(scaled) == ends(cycles)
+    assert ends(half_cycles(scale * swing, HALF * pace, 0.01 * scale)) == ends(cycles)
 
 
 def test_half_cycles_that_are_left_count_as_legs() -> None:

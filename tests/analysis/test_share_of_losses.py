@@ -55,8 +55,7 @@ def test_q_and_the_period_are_data() -> None:
     assert sum(name.startswith("Q(") for name in frame.index) == 3
     with pytest.raises(pp.InputError, match="no amplitude"):
         fit.quality_factor(-0.1)
-    again = FitResult.from_json(json.loads(json.dumps(content)))
-    assert again["Q"] == fit["Q"]
+    assert FitResult.from_json(json.loads(json.dumps(content)))["Q"] == fit["Q"]
 
 
 def test_a_contradicted_law_leaves_the_q_of_the_turning_points() -> None:

@@ -124,8 +124,7 @@ def test_heavy_damping() -> None:
 
 
 def test_uneven_sampling() -> None:
-    rng = np.random.default_rng(4)
-    time = np.sort(rng.uniform(0.0, 100.0, 9000))
+    time = np.sort(np.random.default_rng(4).uniform(0.0, 100.0, 9000))
     points = find_turning_points(record(FIG_8, START, time, 1e-4))
     angle, late, _ = errors(points, FIG_8, START)
     assert len(points) >= 102
@@ -196,8 +195,7 @@ def test_a_still_level_is_one_number() -> None:
 
 def test_level_error_is_shared_with_alternating_effect() -> None:
     """A level too high by e lowers every signed angle by 4/pi e: the covariance says so."""
-    recording = record(FIG_8, START, np.arange(6000) * 0.01, 1e-4)
-    points = find_turning_points(recording)
+    points = find_turning_points(record(FIG_8, START, np.arange(6000) * 0.01, 1e-4))
     covariance = points.covariance()
     shared = covariance[0, 5]
     assert points.level_coupling == pytest.approx(4.0 / math.pi, rel=0.01)
@@ -262,8 +260,7 @@ def test_circular_error(amplitude: float, allowed: float) -> None:
     time = np.arange(8000) * 0.005
     noise = 1e-4 * np.random.default_rng(2).standard_normal(8000)
     points = find_turning_points(Recording(time, run.sol(time)[0] + noise, "angle_rad"))
-    turned = run.t_events[0]
-    nearest = np.abs(turned[:, None] - points.time_s).argmin(axis=0)
+    nearest = np.abs(run.t_events[0][:, None] - points.time_s).argmin(axis=0)
     truth = np.abs(run.y_events[0][nearest, 0])
     assert len(points) >= 30
     error = np.abs(points.amplitude_rad - truth)
@@ -370,8 +367,7 @@ def test_bursts_of_a_few_readings_are_refused_in_a_line() -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_turning_points_of_readings_held_for_some_rows_have_the_errors_stated(seed: int) -> None:
     """Two to seven rows, at random: each reading is as old as its first row tells."""
-    draw = np.random.default_rng(seed)
-    starts = np.append(0, np.cumsum(draw.integers(2, 8, 4000)))
+    starts = np.append(0, np.cumsum(np.random.default_rng(seed).integers(2, 8, 4000)))
     starts = starts[starts < len(ROWS_S)]
     measured = record(SWING, Release(0.0, 0.2, 0.0), ROWS_S[starts], 1e-4, seed)
     values = np.repeat(measured.values, np.diff(np.append(starts, len(ROWS_S))))

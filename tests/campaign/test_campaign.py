@@ -84,8 +84,7 @@ def test_gravity_and_clock_are_no_causes(name: str, sds: float) -> None:
     """0.2 % of g, or 100 ppm of the clock, is within what the configuration states."""
     moved = np.zeros(len(DESIGN.nuisances))
     moved[DESIGN.index[name]] = sds
-    measured = data(DESIGN, moved=moved)
-    answer = search(DESIGN, measured)
+    answer = search(DESIGN, data(DESIGN, moved=moved))
     assert not answer.missing
     k = coefficient(answer.baseline)
     assert abs(k.value - 3940.0) < k.sd
@@ -193,9 +192,7 @@ def test_a_record_is_predicted_from_the_others_as_a_refit_would() -> None:
     spread[np.ix_(known, known)] = fewer.covariance[
         np.ix_(np.array(index)[known], np.array(index)[known])
     ]
-    full = joint_fit(DESIGN, measured)
-    rows = slice(2 * number, 2 * number + 2)
-    slope = full.jacobian[rows]
+    slope = joint_fit(DESIGN, measured).jacobian[slice(2 * number, 2 * number + 2)]
     off = measured.whitening[number] @ (predict(DESIGN, (), at)[number] - measured.values[number])
     covariance = slope @ spread @ slope.T + np.eye(2)
     expected = -0.5 * (

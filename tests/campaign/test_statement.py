@@ -24,8 +24,7 @@ def odd_record(record: str, percent: float, seed: int) -> Measured:
     ("record", "percent"), [("water-low-5", 1.2), ("water-high-8", -1.2), ("air-03", -1.2)]
 )
 def test_a_record_that_disagrees_is_named_and_no_cause(record: str, percent: float) -> None:
-    answer = search(default(), odd_record(record, percent, 3))
-    content = campaign_diagnosis(answer, {})
+    content = campaign_diagnosis(search(default(), odd_record(record, percent, 3)), {})
     assert content["verdict"] == "missing-physics"
     assert [far["record"] for far in content["left_out"]] == [record]
     assert content["left_out"][0]["sigma"] * percent > 0.0

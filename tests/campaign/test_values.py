@@ -173,8 +173,7 @@ def test_one_frequency_has_a_factor_and_no_exponent() -> None:
 
 
 def test_without_a_benchmark_nothing_is_separated() -> None:
-    wet = only(DESIGN, data(DESIGN), DESIGN.wet > 0.0)
-    assert campaign_values(*wet) is None
+    assert campaign_values(*only(DESIGN, data(DESIGN), DESIGN.wet > 0.0)) is None
 
 
 def test_a_loss_torque_that_depends_on_the_rate_is_no_line() -> None:

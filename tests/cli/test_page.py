@@ -19,8 +19,7 @@ def test_one_page_holds_the_fit_and_refers_to_nothing_outside(
     assert "dry friction" in text
     assert "<svg" in text
     assert re.search(r"T0? = \(1\.14547\d+ ± 0\.0+\d+\) s", text)
-    outside = re.findall(r'(?:src|href)="(?!#|data:image/png)[^"]*"', text)
-    assert not outside
+    assert not re.findall(r'(?:src|href)="(?!#|data:image/png)[^"]*"', text)
     assert str(tmp_path) not in text
     assert str(ROD.parent) not in text
 

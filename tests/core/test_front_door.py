@@ -71,8 +71,7 @@ def test_the_commands_of_the_pages_run(page: Path, tmp_path: Path) -> None:
     for block in blocks:
         lines = [line for line in block.splitlines() if line.strip() and not SET_UP.search(line)]
         for line in filter(INSTRUMENT.search, lines):
-            command = cli.parse(shlex.split(line, comments=True)[1:])
-            assert command.declared
+            assert cli.parse(shlex.split(line, comments=True)[1:]).declared
         done = subprocess.run(
             ["bash", "-ec", "\n".join(line for line in lines if not INSTRUMENT.search(line))],
             cwd=tmp_path,

@@ -108,8 +108,7 @@ def test_forty_half_cycles_of_any_pendulum_agree_with_heyoka(drawn: tuple[Eq8, f
 def test_to_the_stop(multiple: float, h: float, q: float, g: float) -> None:
     # The release at a multiple of the amplitude of the stop; h, q, g are the friction's
     # strengths per radian of phase, q at the release.
-    delta = 1e-3
-    first = Eq8(W, 0.0, 2 * W * h / math.pi, g * W, 2 * W * delta / math.pi)
+    first = Eq8(W, 0.0, 2 * W * h / math.pi, g * W, 2 * W * 1e-3 / math.pi)
     y = multiple * first.stop_rad
     model = Eq8(W, 2 * W * q / math.pi / y, first.hysteretic, first.viscous, first.coulomb)
     assume(y > 1.0001 * model.stop_rad)

@@ -76,8 +76,7 @@ def test_eq8_as_the_engine_has_it(
 
 def test_turning_points_of_eq8_over_a_long_record() -> None:
     """The clock's ends of half cycles are the engine's turning points."""
-    pendulum = Pendulum(OMEGA, 7.2e-3, 3.1e-3, 4.7e-3, 1.3e-4)
-    motion = eq8_motion(pendulum, 0.15, 340)
+    motion = eq8_motion(Pendulum(OMEGA, 7.2e-3, 3.1e-3, 4.7e-3, 1.3e-4), 0.15, 340)
     engine = Eq8(OMEGA, 7.2e-3, 3.1e-3, 4.7e-3, 1.3e-4)
     points = turning_points(engine, Release(0.0, 0.15), count=340)
     count = min(len(points.angle_rad), 340)
@@ -114,8 +113,7 @@ def test_readings_are_as_exact_as_the_solution_with_few_nodes() -> None:
     """Against the compiled engine of Eq. 8."""
     pendulum = Pendulum(OMEGA, 0.05, 0.01, 0.01, 1e-4)
     time = np.arange(0.0, 20.0, 0.037)
-    engine = Eq8(OMEGA, 0.05, 0.01, 0.01, 1e-4)
-    expected = sample(engine, Release(0.0, 0.3), time)
+    expected = sample(Eq8(OMEGA, 0.05, 0.01, 0.01, 1e-4), Release(0.0, 0.3), time)
     errors = [
         np.max(np.abs(sample_motion(eq8_motion(pendulum, 0.3, 40, order), time).angle - expected))
         for order in (10, 20)

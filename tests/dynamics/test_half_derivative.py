@@ -34,7 +34,6 @@ def test_a_sine_from_rest(half_cycles: int, first: int) -> None:
 def test_long_after_the_release_friction_and_added_mass_remain() -> None:
     """D^(1/2) e^(i w t) is sqrt(i w) e^(i w t): a half derivative leads by an eighth of a turn."""
     motion = steady(4001)
-    psi = motion.clock.psi[-1]
-    expected = -(OMEGA**1.5) * np.sin(psi + 0.25 * math.pi)
+    expected = -(OMEGA**1.5) * np.sin(motion.clock.psi[-1] + 0.25 * math.pi)
     # The release fades with 1/t^(3/2).
     assert half_derivative(motion)[-1] == pytest.approx(expected, abs=1e-5 * OMEGA**1.5)

@@ -231,8 +231,7 @@ def test_readings_are_linear_in_a_curves_mixtures(kind: type[Curve]) -> None:
     model = Model(RECORD, 0.05)
     at = model.evaluate(BASE)
     curve = kind(at.span)
-    rng = np.random.default_rng(4)
-    values, change = rng.standard_normal((2, curve.count))
+    values, change = np.random.default_rng(4).standard_normal((2, curve.count))
     found = jacobian(model.adding(curve), np.append(BASE, values), at)[:, len(BASE) :]
     moved = responses(curve, [(values, values + change)], at, model.pendulum(BASE))[0]
     assert found @ change == pytest.approx(moved, abs=1e-6 * np.max(np.abs(moved)))

@@ -183,8 +183,7 @@ def test_a_first_reading_in_mid_swing_came_after_the_turning_point_before_it(
     amplitude: float, share: float
 ) -> None:
     """Wide swings take longer than pi/omega, small ones do not: the drift is the same."""
-    circular = by_identifier("circular-error")
-    effects = (circular, by_identifier("frequency-drift"))
+    effects = (by_identifier("circular-error"), by_identifier("frequency-drift"))
     value = np.array([*baseline(start=amplitude), 1.0, 1e-3, 5.0])
     time = times(8.0, 0.03)
     motion = Model(time, 0.03, effects).evaluate(value).tangent.motion

@@ -37,8 +37,7 @@ def test_frequencies_losses_and_amplitudes_are_within_their_errors() -> None:
 
 def test_one_pendulum_is_not_two_modes() -> None:
     # sin x slows it at first; Coulomb friction bends its envelope: no two modes explain that.
-    law = Eq8(5.0, 0.05, 0.0, 0.0, 0.02, "sine")
-    values = sample(law, Release(-0.1, 2.5), TIME)
+    values = sample(Eq8(5.0, 0.05, 0.0, 0.0, 0.02, "sine"), Release(-0.1, 2.5), TIME)
     assert two_modes(TIME, values, 0.65) is None
     noise = np.random.default_rng(1).standard_normal(len(TIME))
     assert two_modes(TIME, noise, 0.6) is None

@@ -81,8 +81,7 @@ def large_decay(method: str) -> tuple[Decay, Any]:
     """The turning points of sin x from 1.5 rad, exact, and the fit with its own numbers."""
     turned = turning_points(LARGE, Release(0.0, 1.5), count=160)
     fit = a_fit(method, "sine", 0.9, a=0.02, b=0.008, c=0.003, amplitude=1.5)
-    y = np.abs(turned.angle_rad)
-    return decay_of(turned.time_s, y, fit, 1e-6), turned
+    return decay_of(turned.time_s, np.abs(turned.angle_rad), fit, 1e-6), turned
 
 
 @pytest.mark.parametrize("method", ["waveform", "turning-points"])

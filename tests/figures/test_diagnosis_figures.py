@@ -164,8 +164,7 @@ def test_what_has_nothing_to_show_is_not_drawn(outcome: Any, tmp_path: Path) -> 
         "frequency",
     ]
     for path in drawn:
-        words = "".join(ET.parse(path).getroot().itertext())
-        assert "Eq. 8" in words
+        assert "Eq. 8" in "".join(ET.parse(path).getroot().itertext())
         assert path.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -78,8 +78,7 @@ def test_drawing_leaves_matplotlib_as_it_was(example: Any) -> None:
 
 def test_a_name_with_a_dollar_is_no_formula(example: Any, tmp_path: Path) -> None:
     entry = next(e for e in example.content["records"] if e["record"] == "air-01")
-    found = read_decay(example.folder, entry)
-    hostile = replace(found, record="$\\frac{ & <b>")
+    hostile = replace(read_decay(example.folder, entry), record="$\\frac{ & <b>")
     svg, _ = save(draw_decay(hostile), tmp_path / "decay")
     assert "$\\frac{ & <b>" in "".join(ET.parse(svg).getroot().itertext())
 
@@ -109,8 +108,7 @@ def test_the_command_draws_and_says_what_it_left_out(
     out, comparison = folder.parent / "elsewhere", str(folder / "comparison.json")
     words = ["figures", "--campaign", str(folder / "c.json"), "--out", str(out), "--comparison"]
     assert main([*words, comparison]) == 0
-    said = capsys.readouterr().err
-    assert "fig03 is not drawn" in said
+    assert "fig03 is not drawn" in capsys.readouterr().err
     # The workflow counts on figures 3 to 10: the reason stands in the place of figure 3.
     assert {path.stem for path in out.glob("*.svg")} == set(PAPER)
     assert "no calibration" in "".join(ET.parse(out / "fig03.svg").getroot().itertext())
@@ -185,8 +183,7 @@ def curves(axes: Any, minimum: int = 30) -> list[np.ndarray]:
 
 def test_figure_4_line_is_k_f_squared(example: Any) -> None:
     upper, lower = draw_fig04(example.content).axes[:2]
-    drawn = points(upper)
-    assert len(drawn) == AIR
+    assert len(points(upper)) == AIR
     (x0, x1), (y0, y1) = upper.lines[0].get_data()
     assert (x0, y0) == (0.0, 0.0)
     assert y1 / x1 == pytest.approx(example.content["hysteretic_coefficient"]["value"])

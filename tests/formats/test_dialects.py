@@ -76,8 +76,7 @@ def motion(random: Random) -> tuple[Floats, Floats, float]:
     rate = random.choice((20.0, 50.0, 100.0))
     amplitude = random.choice((0.12, 0.4, 1.1))
     gravity = random.random() < 0.8
-    cycles = random.choice((15, 40))
-    time = np.arange(int(cycles * period * rate)) / rate
+    time = np.arange(int(random.choice((15, 40)) * period * rate)) / rate
     decay = random.choice((1.5, 3.0)) / time[-1]
     size = amplitude * np.exp(-decay * time)
     slower = size**2 / 16 + 11 * size**4 / 3072 if gravity else 0.0 * size

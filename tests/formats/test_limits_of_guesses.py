@@ -229,8 +229,7 @@ def test_durations_are_times_of_which_none_is_near_zero(least: float, lasts: boo
 def test_rounded_stamps_of_even_rows_are_counted(decimals: int, rate: float, start: float) -> None:
     # More than one row in the last digit, so that stamps repeat.
     interval = 10.0**-decimals / rate
-    count = np.arange(600.0)
-    true = start + interval * count
+    true = start + interval * np.arange(600.0)
     found = times._rounded(np.round(true, decimals))
     assert np.all(np.diff(found) == pytest.approx(interval, rel=0.01))
     assert found == pytest.approx(true, abs=10.0**-decimals)
@@ -303,8 +302,7 @@ def test_blocks_under_one_stamp_are_counted_where_the_clock_has_digits_left(star
 def test_a_lone_stamp_out_of_order_is_interpolated(wrong: int) -> None:
     time = 0.5 * np.arange(100.0)
     time[wrong] -= 3.2
-    found = order(time)
-    assert found.time_s == pytest.approx(0.5 * np.arange(100.0))
+    assert order(time).time_s == pytest.approx(0.5 * np.arange(100.0))
     time[wrong] += 6.4
     assert order(time).time_s == pytest.approx(0.5 * np.arange(100.0))
     assert "1 time stamp(s)" in order(time).notes[0]
@@ -313,5 +311,4 @@ def test_a_lone_stamp_out_of_order_is_interpolated(wrong: int) -> None:
 def test_rows_that_repeat_are_left_out_where_they_are_rare() -> None:
     time = 0.5 * np.arange(100.0)
     time[41] = time[40]
-    found = order(time)
-    assert found.rows.tolist() == [*range(41), *range(42, 100)]
+    assert order(time).rows.tolist() == [*range(41), *range(42, 100)]

@@ -22,58 +22,54 @@ ROWS = [40, 41, 110, 231, 305]
 """Two on end, the others alone; all at amplitudes above a third of the first."""
 
 
-@pytest.mark.parametrize("mark", [0.0, -1.0, -999.0, 9999.0, 1e6, 1e300])
-@pytest.mark.parametrize("middle", [5.3, 42.0])
-def test_a_number_that_comes_back_far_from_the_swing_is_no_reading(
-    mark: float, middle: float
-) -> None:
-    values = decay(20.0, 100.0, middle)
-    values[ROWS] = mark
-    assert lost(values) == ROWS
+def marked(values: FloatArray, rows: list[int], marks: float | list[float]) -> FloatArray:
+    """Readings of which some are replaced."""
+    values[rows] = marks
+    return values
 
 
-def test_zeros_in_a_swing_about_zero_are_seen_by_those_far_from_it() -> None:
-    values = np.round(decay(40.0, 100.0), 3)
-    rows = [18, 50, 78, 98, 131, 218]
-    assert np.sum(np.abs(values[rows]) > 0.8) == 4
-    values[rows] = 0.0
+FAR = [18, 50, 78, 98, 131, 218]
+"""Four of them at amplitudes above 0.8."""
+IN_TURN = [95, 97, 99, 300, 302, 700]
+SWING = 42.3 + 8.0 * decay(22.0, 140.0)
+CASES: dict[str, tuple[FloatArray, list[int]]] = {
+    # A number that comes back far from the swing is no reading.
+    **{
+        f"{mark:g} beside a swing about {middle:g}": (
+            marked(decay(20.0, 100.0, middle), ROWS, mark),
+            ROWS,
+        )
+        for mark in (0.0, -1.0, -999.0, 9999.0, 1e6, 1e300)
+        for middle in (5.3, 42.0)
+    },
+    # Zeros in a swing about zero are seen by those far from it.
+    "zeros far from it": (marked(np.round(decay(40.0, 100.0), 3), FAR, 0.0), FAR),
+    "zeros that it passes": (np.round(decay(40.0, 100.0), 1), []),
+    "no echo, too near and too far": (
+        marked(np.round(SWING, 1), ROWS, [0.0, 357.1, 357.1, 0.0, 357.1]),
+        ROWS,
+    ),
+    "wild readings that differ": (
+        marked(decay(20.0, 100.0), [40, 200, 500], [1e6, -3e5, 40.0]),
+        [40, 200, 500],
+    ),
+    "every second reading for a while": (marked(decay(40.0, 100.0), IN_TURN, -999.0), IN_TURN),
+    # The diagnosis names it: a glitch, or a knock.
+    "one that stands out by less than all span": (
+        marked(decay(40.0, 100.0), [200], decay(40.0, 100.0)[200] + 1.5),
+        [],
+    ),
+    "a release and an end that stand apart": (
+        marked(1e-3 * decay(40.0, 100.0), [0, -1], [1.0, -1.0]),
+        [],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_readings_that_stand_for_lost_ones_are_marked(case: str) -> None:
+    values, rows = CASES[case]
     assert lost(values) == rows
-    passed = np.round(decay(40.0, 100.0), 1)
-    assert np.sum(passed == 0.0) == 60
-    assert lost(passed) == []
-
-
-def test_two_numbers_that_stand_for_no_echo_are_both_seen() -> None:
-    """Too near and too far, side by side: 0 cm and 357.1 cm from a spring at 42 cm."""
-    values = np.round(42.3 + 8.0 * decay(22.0, 140.0), 1)
-    values[ROWS] = [0.0, 357.1, 357.1, 0.0, 357.1]
-    assert lost(values) == ROWS
-
-
-def test_wild_readings_need_not_be_equal_to_be_lost() -> None:
-    values = decay(20.0, 100.0)
-    values[[40, 200, 500]] = [1e6, -3e5, 40.0]
-    assert lost(values) == [40, 200, 500]
-
-
-def test_every_second_reading_may_be_lost_for_a_while() -> None:
-    values = decay(40.0, 100.0)
-    rows = [95, 97, 99, 300, 302, 700]
-    values[rows] = -999.0
-    assert lost(values) == rows
-
-
-def test_a_reading_that_stands_out_once_by_less_than_all_others_span_stays() -> None:
-    """The diagnosis names it: a glitch, or a knock."""
-    values = decay(40.0, 100.0)
-    values[200] += 1.5
-    assert lost(values) == []
-
-
-def test_a_release_and_an_end_that_stand_apart_stay() -> None:
-    values = 1e-3 * decay(40.0, 100.0)
-    values[0], values[-1] = 1.0, -1.0
-    assert lost(values) == []
 
 
 @pytest.mark.parametrize("cycle", [3.3, 8.0, 13.0, 40.0, 200.0])

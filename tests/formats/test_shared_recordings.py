@@ -91,8 +91,7 @@ def test_cuts_lie_within_half_a_cycle_of_what_is_known(
 def test_clamping_and_repositioning_are_cut_and_said(name: str) -> None:
     recording = read(SHARED / FURUTA / f"{name}.txt")
     found = find_free_decay(recording)
-    said = " ".join(cut.reason for cut in found.cuts)
-    assert "moved by hand before release" in said
+    assert "moved by hand before release" in " ".join(cut.reason for cut in found.cuts)
     assert found.stop_s < recording.time_s[-1] - 4.0
     left = sum(cut.stop_s - cut.start_s for cut in found.cuts)
     whole = recording.time_s[-1] - recording.time_s[0]

@@ -171,8 +171,7 @@ def test_a_spreadsheet_export_goes_by_place_and_index(tmp_path: Path) -> None:
     path.write_text(head + "".join(rows))
     recording = read(path, ReadOptions(channel="2"))
     np.testing.assert_allclose(recording.values, volts[:1000, 1], atol=1e-9)
-    time = recording.time_s
-    np.testing.assert_allclose(np.diff(time[:700]), 1 / 360, atol=1e-12)
+    np.testing.assert_allclose(np.diff(recording.time_s[:700]), 1 / 360, atol=1e-12)
     found = inspect(path)
     assert found.format == "windaq-csv"
     assert [gap.after_sample for gap in found.gaps] == [699]

@@ -80,8 +80,7 @@ def test_folders_are_left_out_and_units_are_not(text: str, kept: str) -> None:
 def test_a_rate_at_its_bound_is_shown_as_a_limit() -> None:
     bound = {"value": 0.0, "sd": 0.1, "unit": "rad/s", "at_bound": True, "interval95": [0.0, 0.196]}
     columns, lines = table_of_records([entry(c=bound)], has_theory=True)
-    column = [c.quantity for c in columns].index("c")
-    assert lines[0]["cells"][column].text == "< 0.2"
+    assert lines[0]["cells"][[c.quantity for c in columns].index("c")].text == "< 0.2"
 
 
 def test_angles_and_lengths_in_one_table_carry_their_own_units() -> None:
