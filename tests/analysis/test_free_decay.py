@@ -83,15 +83,6 @@ def test_rest_pull_hold_and_stop_are_cut(amplitude: float, noise: float, step: f
     assert found.half_period_s == pytest.approx(PERIOD / 2, rel=0.02)
 
 
-def test_a_recording_of_nothing_else_is_kept_whole() -> None:
-    time = np.arange(4000) / RATE
-    for phase in (0.0, 0.7, 2.0, 4.0):
-        values = 0.3 * np.exp(-0.03 * time) * np.cos(OMEGA * time + phase)
-        found = find_free_decay(Recording(time, values, "angle_rad"))
-        assert (found.start_s, found.stop_s) == (time[0], time[-1])
-        assert found.cuts == []
-
-
 @pytest.mark.parametrize("what", ["seen by an encoder, a row a count", "with a hole", "at 7 Hz"])
 def test_uneven_and_sparse_samples_change_nothing(what: str) -> None:
     swing = oscillation(0.5, 0.02, 2e-3, 80.0)
@@ -140,15 +131,13 @@ def test_of_two_decays_the_more_telling_is_taken_and_the_other_told() -> None:
     assert any("another decay" in note and "is not used" in note for note in found.notes)
 
 
-def test_a_driven_front_is_cut_and_a_steady_drive_refused() -> None:
+def test_a_driven_front_is_cut() -> None:
     time = np.arange(int(30 * RATE)) / RATE
     driven = 0.4 * np.cos(OMEGA * time)
     free = oscillation(0.4, 0.04, 1e-3, 60.0)
     found = find_free_decay(recording([driven, free], noise=1e-3))
     assert found.start_s == pytest.approx(30.0, abs=2.5 * PERIOD)
     assert "driven: the amplitude is held up" in reasons(found)
-    with pytest.raises(NotAnalysableError, match="the amplitude does not fall"):
-        find_free_decay(recording([driven], noise=1e-3))
 
 
 def test_the_scatter_of_the_last_half_cycles_is_no_drive() -> None:
@@ -161,25 +150,6 @@ def test_the_scatter_of_the_last_half_cycles_is_no_drive() -> None:
         found = find_free_decay(Recording(time, values, "angle_rad"))
         assert found.start_s < 3.3
         assert "driven: the amplitude is held up" not in reasons(found)
-
-
-@pytest.mark.parametrize("beats", [1.5, 3.2, 5.7])
-def test_a_swing_that_wavers_and_does_not_fall_is_no_decay(beats: float) -> None:
-    """A slow waver is higher in one third than in another, however still each half cycle is."""
-    time = np.arange(6000) / RATE
-    waver = 1.0 + 0.02 * np.cos(2.0 * np.pi * beats * time / time[-1] + 0.4)
-    angle = 0.1 * waver * np.cos(OMEGA * time)
-    with pytest.raises(NotAnalysableError, match="the amplitude does not fall"):
-        find_free_decay(Recording(time, angle, "angle_rad"))
-
-
-def test_a_beat_is_physics_and_stays() -> None:
-    # Two modes that exchange energy: the amplitude is flat at first, and rises again.
-    time = np.arange(int(80 * RATE)) / RATE
-    beat = 1 + 0.1 * np.cos(2 * np.pi * time / 20.0)
-    values = 0.3 * beat * np.exp(-0.02 * time) * np.cos(OMEGA * time)
-    found = find_free_decay(Recording(time, values, "angle_rad"))
-    assert (found.start_s, found.stop_s) == (time[0], time[-1])
 
 
 @pytest.mark.parametrize("kick", [1.15, 0.7])
@@ -240,6 +210,31 @@ def test_a_clamp_ends_the_decay_at_once() -> None:
     assert found.stop_s == pytest.approx(20.3, abs=0.6 * PERIOD)
 
 
+LONG = np.arange(6000) / RATE
+
+
+def cosine(size: Floats | float, phase: float = 0.0) -> Floats:
+    return size * np.cos(OMEGA * LONG + phase)
+
+
+def wavering(beats: float) -> Floats:
+    """Higher in one third than in another, however still each half cycle is."""
+    return cosine(0.1 + 0.002 * np.cos(2.0 * np.pi * beats * LONG / LONG[-1] + 0.4))
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        *(cosine(0.3 * np.exp(-0.03 * LONG), phase) for phase in (0.0, 0.7, 2.0, 4.0)),
+        # Two modes that exchange energy: the amplitude is flat at first, and rises again.
+        cosine(0.3 * (1 + 0.1 * np.cos(2 * np.pi * LONG / 20.0)) * np.exp(-0.02 * LONG)),
+    ],
+)
+def test_a_recording_of_nothing_else_is_kept_whole(values: Floats) -> None:
+    found = find_free_decay(recording([values]))
+    assert (found.start_s, found.stop_s, found.cuts) == (LONG[0], LONG[-1], [])
+
+
 @pytest.mark.parametrize(
     ("parts", "noise", "said"),
     [
@@ -248,6 +243,12 @@ def test_a_clamp_ends_the_decay_at_once() -> None:
         ([ramp(0.0, 1.0, 3.0), still(1.0, 5.0), ramp(1.0, -0.4, 4.0)], 1e-3, "does not swing"),
         ([ramp(0, 1, 1.0), ramp(1, 0.9, 3.0), ramp(0.9, 1.4, 0.4), ramp(1.4, 0, 2.0)], 1e-3, "no"),
         ([oscillation(0.5, 0.5, 0.02, 2.0)[:110], still(0.0, 9.0)], 1e-3, "no"),
+        ([0.0 * LONG], 0.02, "its noise and step hide"),
+        ([cosine(0.4)], 1e-3, "the amplitude does not fall"),
+        *(([wavering(beats)], 0.0, "the amplitude does not fall") for beats in (1.5, 3.2, 5.7)),
+        ([cosine(0.01 * np.exp(0.05 * LONG))], 0.0, "no"),
+        # One that can't be seen is slow, and not driven.
+        ([cosine(0.1 * np.exp(-1e-3 * LONG / LONG[-1]))[:3000]], 0.01, "too slow to be resolved"),
     ],
 )
 def test_what_is_no_decay_is_refused_in_one_line(
@@ -303,13 +304,6 @@ def test_of_random_walks_few_pass_for_a_decay() -> None:
         with contextlib.suppress(NotAnalysableError):
             taken += find_free_decay(recording([walk])).half_cycles >= 3
     assert taken <= 40 * 0.2
-
-
-def test_a_growing_oscillation_is_no_decay() -> None:
-    time = np.arange(int(40 * RATE)) / RATE
-    values = 0.01 * np.exp(0.05 * time) * np.cos(OMEGA * time)
-    with pytest.raises(NotAnalysableError):
-        find_free_decay(Recording(time, values, "angle_rad"))
 
 
 def test_metres_are_as_good_as_radians() -> None:
@@ -384,18 +378,7 @@ def test_many_half_cycles_are_a_decay_though_each_hardly_stands_out(wander: floa
     """As those of a cheap accelerometer, 4.5 times the noise of a reading."""
     time = np.arange(2000) / RATE
     values = 0.1 * np.exp(-0.03 * time) * np.cos(OMEGA * time) + wander * time / time[-1]
-    noise = 0.1 / 4.5
-    assert find_free_decay(recording([values], noise=noise)).half_cycles > 25
-    with pytest.raises(NotAnalysableError, match="its noise and step hide"):
-        find_free_decay(recording([0.0 * values], noise=noise))
-
-
-def test_a_decay_that_can_not_be_seen_is_called_too_slow_and_not_driven() -> None:
-    time = np.arange(3000) / RATE
-    values = 0.1 * np.exp(-1e-3 * time / time[-1]) * np.cos(OMEGA * time)
-    with pytest.raises(NotAnalysableError, match="too slow to be resolved") as caught:
-        find_free_decay(recording([values], noise=0.01))
-    assert "oscillation has no free decay" not in str(caught.value)
+    assert find_free_decay(recording([values], noise=0.1 / 4.5)).half_cycles > 25
 
 
 def beat(losses: tuple[float, float], *, rest: bool) -> Recording:
