@@ -1,7 +1,5 @@
 """What a column of numbers shows by itself, by exact swings on both sides of each limit."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import example, given
@@ -12,8 +10,6 @@ from pendpipe.formats import circle, lists, times, units
 from pendpipe.formats import columns as guess
 from pendpipe.formats.table import (
     Column,
-    ReadOptions,
-    Table,
     clipped_samples,
     derivative_slope,
     evenness,
@@ -197,14 +193,6 @@ def test_steps_within_a_tenth_of_the_usual_are_even(jitter: float, even: float) 
     assert evenness(-np.cumsum(np.append(0.0, steps))) == pytest.approx(even)
 
 
-@given(bits=st.sampled_from([16, 32]), start=st.floats(0.01, 0.99), step=st.floats(1e-4, 0.01))
-def test_a_clock_counts_on_behind_its_overflow(bits: int, start: float, step: float) -> None:
-    turn = 2.0**bits
-    true = np.rint(turn * (start + step * np.arange(300)))
-    found = guess._counted_on(true % turn)
-    assert found - found[0] == pytest.approx(true - true[0])
-
-
 def test_a_swing_does_not_count_on_however_few_its_readings() -> None:
     """It falls through half the range within one reading, but it comes down more slowly too."""
     swing = 32_768 + np.rint(32_000 * np.sin(2 * np.pi * np.arange(4000) / 4.4))
@@ -218,21 +206,6 @@ def test_durations_are_times_of_which_none_is_near_zero(least: float, lasts: boo
     assert lists._lasts(column(values, role="time")) == lasts
     assert not lists._lasts(column(values))
     assert not lists._lasts(column(np.arange(1.0, 9.0), role="time"))
-
-
-@given(
-    decimals=st.integers(1, 3),
-    rate=st.floats(1.5, 8.0),
-    start=st.floats(0.0, 100.0),
-)
-@example(decimals=1, rate=1.5, start=0.45)
-def test_rounded_stamps_of_even_rows_are_counted(decimals: int, rate: float, start: float) -> None:
-    # More than one row in the last digit, so that stamps repeat.
-    interval = 10.0**-decimals / rate
-    true = start + interval * np.arange(600.0)
-    found = times._rounded(np.round(true, decimals))
-    assert np.all(np.diff(found) == pytest.approx(interval, rel=0.01))
-    assert found == pytest.approx(true, abs=10.0**-decimals)
 
 
 @given(place=st.integers(0, 5), scale=st.sampled_from([1.0, 180 / np.pi]))
@@ -278,37 +251,9 @@ def test_a_wild_place_moves_no_pivot() -> None:
     assert circle.pivot_of(x, y) == pytest.approx([2.0, 3.0], abs=1e-6)
 
 
-def base(time: np.ndarray, rows: np.ndarray | None = None) -> times.TimeBase:
-    return times.TimeBase(time, np.arange(len(time)) if rows is None else rows)
-
-
-def order(time: np.ndarray, **given: float) -> times.TimeBase:
-    """The times of a table of one clock and one reading, in order."""
-    reading = column(np.sin(np.arange(float(len(time)))), "angle", "rad", "angle")
-    table = Table(Path("made-up"), "text", (reading,))
-    choice = guess.Choice(None, False, (reading,), (reading,))
-    return times._in_order(table, choice, base(time), 1.0, ReadOptions(**given))
-
-
 @pytest.mark.parametrize("start", [0.0, 1e16])
 def test_blocks_under_one_stamp_are_counted_where_the_clock_has_digits_left(start: float) -> None:
     stamps = times.TimeBase(start + np.repeat(2.0 * np.arange(40), 5), np.arange(200))
     times._count_rows(guess.Choice(None, False, (), ()), stamps)
     even = np.ptp(np.diff(stamps.time_s)) < 1e-9
     assert even == (start == 0.0)
-
-
-@pytest.mark.parametrize("wrong", [30, 77])
-def test_a_lone_stamp_out_of_order_is_interpolated(wrong: int) -> None:
-    time = 0.5 * np.arange(100.0)
-    time[wrong] -= 3.2
-    assert order(time).time_s == pytest.approx(0.5 * np.arange(100.0))
-    time[wrong] += 6.4
-    assert order(time).time_s == pytest.approx(0.5 * np.arange(100.0))
-    assert "1 time stamp(s)" in order(time).notes[0]
-
-
-def test_rows_that_repeat_are_left_out_where_they_are_rare() -> None:
-    time = 0.5 * np.arange(100.0)
-    time[41] = time[40]
-    assert order(time).rows.tolist() == [*range(41), *range(42, 100)]

@@ -95,35 +95,36 @@ def changed(before: dict[str, int]) -> list[str]:
     return [name for name in RECORDS if after[name] != before[name]]
 
 
-def test_what_is_done_is_not_done_again(campaign: Campaign) -> None:
+@pytest.fixture
+def before(campaign: Campaign) -> dict[str, int]:
+    """All records are fitted; when each fit was written."""
     run(*ORDER)
-    before = written(fits())
+    return written(fits())
+
+
+def test_what_is_done_is_not_done_again(campaign: Campaign, before: dict[str, int]) -> None:
     assert set(before) == set(RECORDS)
     STAGES["fit"].path(campaign, "all").unlink()  # as Snakemake does before the job
     run("fit")
     assert written(fits()) == before
 
 
-def test_a_changed_input_is_done_anew_and_no_other(campaign: Campaign) -> None:
-    run(*ORDER)
-    before = written(fits())
+def test_a_changed_input_is_done_anew_and_no_other(before: dict[str, int]) -> None:
     write_decay(Path("two.csv"), 17)
     run(*ORDER)
     assert changed(before) == ["two"]
 
 
-def test_a_changed_setting_is_done_anew(campaign: Campaign) -> None:
-    run(*ORDER)
-    before = written(fits())
+def test_a_changed_setting_is_done_anew(before: dict[str, int]) -> None:
     with Path("config.yaml").open("a", encoding="utf-8") as stream:
         stream.write("fit: {method: waveform}\n")
     run("fit")
     assert changed(before) == list(RECORDS)
 
 
-def test_a_forced_stage_is_done_anew(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
-    run(*ORDER)
-    before = written(fits())
+def test_a_forced_stage_is_done_anew(
+    before: dict[str, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv(manifest.RUN, "")
     manifest.hand_on(anew=["fit"], repaired={})
     run("fit")
