@@ -82,7 +82,7 @@ def test_time_stamps_are_corrected_after_sin_x_was_fitted_to_them() -> None:
     found = diagnose_recording(Recording(time_s + late_s, readings + white(2, 1511), "angle_rad"))
     assert len(found.search.data) == 1500
     assert found.effects[0].identifier == "circular-error"
-    assert any("the readings are not" in note for note in found.search.clock_notes)
+    assert any("the readings are not" in note for note in found.search.notes.values())
 
 
 def test_two_coupled_pendulums_are_two_modes_at_their_frequencies() -> None:

@@ -8,8 +8,10 @@ import pytest
 from scipy.fft import idct
 from scipy.stats import binom
 
+from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.forensics.colour import wander_note
+from pendpipe.diagnosis.forensics.colour import note_wander
+from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.noise_estimate import estimate_noise
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.recording import Recording
@@ -95,4 +97,5 @@ def test_noise_about_the_motion_is_no_wander_of_the_zero() -> None:
     near = replace(data, values=data.values + line)
     noise = estimate_noise(near, near.residual(fit.at.reading), FREQUENCY_HZ, 0.0)
     coloured = replace(noise, variance=np.linspace(2.0, 1.0, len(near)))
-    assert wander_note(coloured, near, fit) is None
+    samples = Samples(TIME_S, near.values, "rad", None, NOISE_RAD)
+    assert note_wander(Evidence(near, fit, coloured, samples)) is None

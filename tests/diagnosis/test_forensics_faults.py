@@ -11,7 +11,8 @@ from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import gather
 from pendpipe.diagnosis.faults import _applied, correct
-from pendpipe.diagnosis.forensics.glitches import _smallest_p_value, find_in_misfit
+from pendpipe.diagnosis.forensics.evidence import Evidence
+from pendpipe.diagnosis.forensics.glitches import find_in_misfit, smallest_p_value
 from pendpipe.diagnosis.forensics.lost_samples import LostSamples, find_lost_samples
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.noise import white_noise
@@ -105,7 +106,7 @@ def test_more_glitches_are_more_certain() -> None:
     chances = []
     for number in range(1, 15):
         error[number - 1] = 8.0
-        chances.append(_smallest_p_value(np.sort(error), 0.0))
+        chances.append(smallest_p_value(np.sort(error), 0.0))
     assert all(np.diff(np.log(chances)) < 0.0)
 
 
@@ -329,7 +330,7 @@ def test_glitches_need_no_model(clean: FloatArray) -> None:
         readings = noisy.copy()
         readings[wrong] += 30.0 * NOISE
         data = replace(right.data, values=readings)
-        finding = find_in_misfit(data, far, right.noise, right.samples)
+        finding = find_in_misfit(Evidence(data, far, right.noise, right.samples))
         found_at = [] if finding is None else np.flatnonzero(finding.mask).tolist()
         assert found_at == expected
         assert finding is None or finding.p_value < 1e-3

@@ -8,7 +8,8 @@ import pytest
 
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.forensics.colour import level_note
+from pendpipe.diagnosis.forensics.colour import note_level
+from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.lost_samples import find_lost_samples
 from pendpipe.diagnosis.forensics.tails import Tail, fit_tail, tail_of_squares
 from pendpipe.diagnosis.hypothesis import settled
@@ -154,7 +155,10 @@ def test_noise_that_falls_is_said_to_change_in_time_and_is_no_fault() -> None:
     clean = pendulum.model().reading(pendulum.values())
     falling = np.linspace(3.0, 1.0, pendulum.count)
     white = 1e-4 * np.random.default_rng(1).standard_normal(pendulum.count)
-    said = level_note(fitted(pendulum, clean + falling * white).noise)
-    assert said is not None
-    assert "larger in the first half" in said
-    assert level_note(fitted(pendulum, clean + white).noise) is None
+    said = []
+    for noise in (falling * white, white):
+        record = fitted(pendulum, clean + noise)
+        note = note_level(Evidence(record.data, record.fit, record.noise, record.samples))
+        said.append(note and note.summary)
+    assert "larger in the first half" in str(said[0])
+    assert said[1] is None

@@ -10,6 +10,7 @@ from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.faults import _with
 from pendpipe.diagnosis.forensics import slips
+from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.result import Finding
@@ -18,7 +19,7 @@ from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
 
-from .records import swung
+from .records import hypothesis_of, swung
 
 OMEGA, LOSS, START, COUNT, RATE_HZ = 5.0, 0.004, 0.6, 0.02, 60.0
 
@@ -111,9 +112,9 @@ def found(name: str, samples: Samples) -> tuple[Data, Finding]:
         noise_rms=samples.noise_rms,
     )
     find = slips.find_clock if name == "clock-slips" else slips.find_counts
-    noise = white_noise(data, 2e-4)
-    finding = find(data, fit_of(data), noise, samples) or Finding(name, 1.0)
-    return _with(finding, data), finding
+    noise, fit = white_noise(data, 2e-4), fit_of(data)
+    finding = find(Evidence(data, fit, noise, samples)) or Finding(name, 1.0)
+    return _with(finding, hypothesis_of(fit, data, noise, (), fit, samples)).data, finding
 
 
 def clocked(swing: Swing, rows: IntArray, sizes: FloatArray, seed: int) -> Samples:

@@ -1,5 +1,7 @@
 """Machine code: kept, found again, renewed, and never trusted when damaged."""
 
+from __future__ import annotations  # kernels read annotations as text
+
 import math
 import os
 import subprocess

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.fit.by_points import as_angles, held_values
-from pendpipe.analysis.fit.by_waveform import start_values, usable_span
+from pendpipe.analysis.fit.by_waveform import held_places, start_values, usable_span
 from pendpipe.analysis.fit.result import Baseline, FitResult
 from pendpipe.analysis.torque import restoring_of
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
@@ -16,7 +16,6 @@ from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data, gather
 from pendpipe.diagnosis.unwrapped import anchored
-from pendpipe.dynamics import Eq8, Release
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects.baseline import (
@@ -30,6 +29,7 @@ from pendpipe.effects.baseline import (
     B,
     C,
     pendulum_of,
+    values_of,
     with_parts,
 )
 from pendpipe.effects.catalogue import CATALOGUE
@@ -109,10 +109,10 @@ def begin(
         span = slice(None)
         readings = samples.time_s, samples.values, 2.0 * math.pi / float(value[OMEGA])
         starts = tuple(each for effect in CATALOGUE if (each := effect.start(*readings)))
-        value = _values_of(starts[0].law, starts[0].release, float(value[OFFSET]))
+        value = values_of(starts[0].law, starts[0].release, float(value[OFFSET]))
     elif fit is not None and fit.motion is not None and fit.light != "red":
         law, release = fit.motion
-        drag, value = law.drag, _values_of(law, release, fit.value("offset"))
+        drag, value = law.drag, values_of(law, release, fit.value("offset"))
         before = int(release.time_s < samples.time_s[0])
         span = usable_span(samples, angles, start._replace(value=value, before=before))
     omega, angle = float(value[OMEGA]), float(value[START])
@@ -149,16 +149,10 @@ def begin(
         raise NoMotionError("it would swing far beyond the readings")
     if not starts:
         data = replace(data, anchor=anchored(data, at))
-    held = _held(held_rates, fixed, parts, baseline)
+    held = held_places(held_rates, fixed, parts, baseline)
+    # Held parts of b are handled by the model.
+    held = tuple(place for place in held if not parts or place not in (B, SHARE))
     return Beginning(data, model, value, held, data.noise_rms, points, fit, starts)
-
-
-def _values_of(law: Eq8, release: Release, offset: float) -> FloatArray:
-    """The baseline's values of a law that moves from a turning point."""
-    b = law.hysteretic + law.viscous
-    share = law.hysteretic / b if b > 0.0 else 0.5
-    losses = law.quadratic, b, law.coulomb, share
-    return np.array([*losses, law.angular_frequency, release.angle_rad, release.time_s, offset])
 
 
 def _far_from_the_stop(data: Data, value: FloatArray) -> Data:
@@ -198,19 +192,3 @@ def order_for(amplitude: float, unit: str) -> int:
     if unit not in ("rad", "rad/s"):
         return _NODES[0][1]
     return next((nodes for up_to, nodes in _NODES if amplitude < up_to), 48)
-
-
-def _held(
-    held_rates: Mapping[str, float],
-    fixed: Mapping[str, float],
-    parts: Mapping[str, float],
-    baseline: Baseline,
-) -> tuple[int, ...]:
-    index = {"a": A, "b": B, "c": C, "amplitude": START, "offset": OFFSET}
-    # Held parts of b are handled by the model.
-    held = [index[name] for name in held_rates if name != "b" or not parts]
-    if "frequency" in fixed:
-        held.append(OMEGA)
-    if baseline == "viscous" or held_rates.get("b") == 0.0:
-        held.append(SHARE)
-    return tuple(held)

@@ -9,11 +9,11 @@ from typing import Any, Final
 import numpy as np
 from scipy.special import stdtr
 
+from pendpipe.analysis.demodulation import lock_in
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.unwrapped import lock_in
 from pendpipe.effects.model import Evaluated
 from pendpipe.quantities import after_number, with_error
 

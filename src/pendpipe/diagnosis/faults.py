@@ -16,6 +16,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data, at_even_times
 from pendpipe.diagnosis.detect import TESTS_SHARE
 from pendpipe.diagnosis.forensics import FINDERS, RANDOM_TORQUE, Finder
+from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Task, is_further, price_of_another
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import Noise
@@ -49,19 +50,22 @@ def correct(state: Hypothesis, task: Task) -> Hypothesis:
 
 def examine(state: Hypothesis, task: Task) -> Hypothesis:
     """Make the tests that need the final model: any misfit could look like what they find."""
-    return _with_findings(state, task, last=True)
+    again = {finder.name for finder in FINDERS if finder.last}
+    notes = {name: said for name, said in state.notes.items() if name not in again}
+    return _with_findings(replace(state, notes=notes), task, last=True)
 
 
 def _with_findings(state: Hypothesis, task: Task, *, last: bool) -> Hypothesis:
     """Apply the finding that pays most, and fit again, until none pays."""
     for _ in range(_MOST_ROUNDS if state.samples is not None else 0):
+        evidence = _evidence(state)
         found = [
             finding
             for finder in FINDERS
             if finder.last is last
             and (finder.repeats or _known(finder.name, state) is None)
-            and finder.may_ask(state.data, state.fit)
-            and (finding := _asked(finder, state, task)) is not None
+            and finder.may_ask(evidence)
+            and (finding := _asked(finder, evidence, state)) is not None
         ]
         better = [after for each in found if (after := _applied(each, state, task)) is not None]
         if not better:
@@ -71,19 +75,23 @@ def _with_findings(state: Hypothesis, task: Task, *, last: bool) -> Hypothesis:
     return state
 
 
-def _asked(finder: Finder, state: Hypothesis, task: Task) -> Finding | None:
+def _evidence(state: Hypothesis) -> Evidence:
+    assert state.samples is not None
+    return Evidence(state.data, state.fit, state.noise, state.samples)
+
+
+def _asked(finder: Finder, evidence: Evidence, state: Hypothesis) -> Finding | None:
     """Make a test on the readings, with what its earlier finding left out or took off put back."""
-    data, fit, noise = state.data, state.fit, state.noise
-    samples = task.samples if finder.as_recorded else state.samples
     known = _known(finder.name, state)
     if known is not None:
-        data = _without(known, data)
-        noise = replace(noise, weight=data.weight)
+        before, held = _put_back(known, state), state.held
+        fit, data, noise = state.fit, before.data, replace(state.noise, weight=before.data.weight)
         if data.used > state.data.used and any(effect.local for effect in fit.model.effects):
             # Without the readings about it an instant is known less well.
-            fit = refine(fit.model, data, noise, fit.value, held=state.held)
-            fit = with_better_instants(fit, data, noise, state.held)
-    finding = finder.find(data, fit, noise, samples) if samples is not None else None
+            fit = refine(fit.model, data, noise, fit.value, held=held)
+            fit = with_better_instants(fit, data, noise, held)
+        evidence = replace(_evidence(before), fit=fit, noise=noise)
+    finding = finder.find(evidence)
     if finding is None:
         return None
     p_value = min(finding.p_value / _SHARE_OF_EACH, 1.0)
@@ -96,70 +104,70 @@ def _known(name: str, state: Hypothesis) -> Finding | None:
     return next((each for each in found if each.time_s is None), None)
 
 
-def _without(finding: Finding, data: Data) -> Data:
-    """Put back what a finding left out, or took off."""
-    count = len(data)
+def _put_back(finding: Finding, state: Hypothesis) -> Hypothesis:
+    """Withdraw a finding, and put back what it left out or took off."""
+    data, faults = state.data, tuple(each for each in state.faults if each is not finding)
     if finding.mask is not None:
-        data = replace(data, weight=np.where(finding.mask[:count], 1.0, data.weight))
-    if finding.taken is not None:
-        data = replace(data, values=data.values + finding.taken[:count])
-    return data
+        weight = np.where(finding.mask[: len(data)], 1.0, data.weight)
+        data = replace(data, weight=weight)
+    state = replace(state, data=data, faults=faults)
+    return state if finding.taken is None else _less(-finding.taken[: len(data)], state)
 
 
-def _with(finding: Finding, data: Data) -> Data:
+def _with(finding: Finding, state: Hypothesis) -> Hypothesis:
     """Leave out, take off and give other times as a finding says."""
+    state = state if finding.taken is None else _less(finding.taken, state)
+    data = state.data
     if finding.mask is not None:
         data = data.masked((data.weight == 0.0) | finding.mask)
-    if finding.taken is not None:
-        data = replace(data, values=data.values - finding.taken)
-    return data if finding.time_s is None else at_even_times(data, finding.time_s)
+    if finding.time_s is not None:
+        data = at_even_times(data, finding.time_s)
+    return replace(state, data=data)
+
+
+def _less(taken: FloatArray, state: Hypothesis) -> Hypothesis:
+    """Take something off the readings, and off those that were recorded, which tests look at."""
+    data, samples = state.data, state.samples
+    if samples is not None:
+        reading = (np.arange(len(samples)) - data.row) // (data.fold * data.every)
+        values = samples.values - taken[np.clip(reading, 0, len(taken) - 1)]
+        samples = replace(samples, values=values)
+    return replace(state, data=replace(data, values=data.values - taken), samples=samples)
 
 
 def _applied(finding: Finding, state: Hypothesis, task: Task) -> Applied | None:
     """Apply a finding that is significant and pays, withdraw one that does no more."""
-    known, others = _known(finding.identifier, state), state.faults
+    known = _known(finding.identifier, state)
     if finding.kind == "property" and known is None:
         return None
-    data = state.data
-    if known is not None:
-        others = tuple(each for each in others if each is not known)
-        data = _without(known, data)
+    before = state if known is None else _put_back(known, state)
     if finding.p_value > task.level or not _pays(finding, state):
-        if known is None:
-            return None
         said = f"{finding.identifier}: no longer needed with the final model"
-        return Applied(math.inf, _settled(data, state, others), said)
+        return None if known is None else Applied(math.inf, _settled(before, state), said)
+    after = _with(finding, before)
     if finding.taken is None and finding.time_s is None:
-        return _left_out(finding, state, _with(finding, data), others)
-    data = _with(finding, data)
-    before = replace(state.data.first(len(data)), weight=data.weight)
+        after = replace(after, faults=(*before.faults, finding))
+        if not np.array_equal(after.data.weight, state.data.weight):
+            after = _settled(after, state)
+        elif known is not None:
+            return None
+        return Applied(finding.delta_chi2, after, f"{finding.identifier}: {finding.summary}")
+    data = after.data
+    same = replace(state.data.first(len(data)), weight=data.weight)
     try:
         fit, noise = _refined(data, state)
-        gain = _refined(before, state)[0].chi2 - fit.chi2
+        gain = _refined(same, state)[0].chi2 - fit.chi2
     except NoMotionError:
         return None  # the model comes to rest before the corrected times
     if gain <= max(finding.price, SETTLED):
         return None
     if finding.kind == "note":
-        after = replace(state, clock_notes=(*state.clock_notes, finding.summary))
+        after = replace(after, notes={**state.notes, finding.identifier: finding.summary})
     else:
         gains = gain + (known.delta_chi2 if known else 0.0)
         found = replace(finding, delta_chi2=finding.delta_chi2 + gains)
-        after = replace(state, faults=(*others, found))
-    after = _less(before.values - data.values, data, after)
+        after = replace(after, faults=(*after.faults, found))
     return Applied(gain, after.settle(fit, data, noise), finding.summary)
-
-
-def _left_out(
-    finding: Finding, state: Hypothesis, data: Data, others: tuple[Finding, ...]
-) -> Applied | None:
-    """Report a finding, and leave out the readings that are wrong."""
-    said, faults = f"{finding.identifier}: {finding.summary}", (*others, finding)
-    if not np.array_equal(data.weight, state.data.weight):
-        return Applied(finding.delta_chi2, _settled(data, state, faults), said)
-    if len(others) < len(state.faults):
-        return None  # it is known
-    return Applied(finding.delta_chi2, replace(state, faults=faults), said)
 
 
 def _pays(finding: Finding, state: Hypothesis) -> bool:
@@ -181,20 +189,10 @@ def _refined(data: Data, state: Hypothesis) -> tuple[Fit, Noise]:
     return refine(model, data, noise, state.fit.value, held=state.held), noise
 
 
-def _settled(data: Data, state: Hypothesis, faults: tuple[Finding, ...]) -> Hypothesis:
-    """Return the hypothesis with other readings and findings, and its noise estimated anew."""
-    fit, noise = _refined(data, state)
-    return replace(state, faults=faults).settle(fit, data, noise)
-
-
-def _less(taken: FloatArray, data: Data, state: Hypothesis) -> Hypothesis:
-    """Take off the recorded readings, which later tests look at, what was taken off these."""
-    samples = state.samples
-    if samples is None or not np.any(taken):
-        return state
-    reading = (np.arange(len(samples)) - data.row) // (data.fold * data.every)
-    values = samples.values - taken[np.clip(reading, 0, len(data) - 1)]
-    return replace(state, samples=replace(samples, values=values))
+def _settled(after: Hypothesis, state: Hypothesis) -> Hypothesis:
+    """Return a hypothesis of other readings, fitted, and its noise estimated anew."""
+    fit, noise = _refined(after.data, state)
+    return after.settle(fit, after.data, noise)
 
 
 def _measured_anew(found: list[Finding], state: Hypothesis, task: Task) -> Hypothesis:
@@ -203,7 +201,7 @@ def _measured_anew(found: list[Finding], state: Hypothesis, task: Task) -> Hypot
     A test that found nothing counts by its p-value: the record is no less likely than that. What
     does not pay its price is no more than chance, whatever its p-value.
     """
-    faults, quiet = list(state.faults), dict(state.quiet)
+    faults, quiet, notes = list(state.faults), dict(state.quiet), dict(state.notes)
     for finding in found:
         known = _known(finding.identifier, state)
         if known is not None and finding.taken is None:
@@ -211,14 +209,16 @@ def _measured_anew(found: list[Finding], state: Hypothesis, task: Task) -> Hypot
         elif known is None and finding.kind == "fault":
             least = finding.p_value if _pays(finding, state) else max(finding.p_value, task.level)
             quiet[finding.identifier] = min(least, quiet.get(finding.identifier, 1.0))
-    return replace(state, faults=tuple(faults), quiet=quiet)
+        elif finding.kind == "note" and finding.time_s is None:
+            notes[finding.identifier] = finding.summary
+    return replace(state, faults=tuple(faults), quiet=quiet, notes=notes)
 
 
 def random_torque(state: Hypothesis, rival: Rival, task: Task) -> Hypothesis | None:
     """Test whether random kicks explain more than an effect that leaves more than noise."""
     if state.samples is None or not remainder_of(rival.fit, state.data, state.noise).systematic:
         return None
-    finding = _asked(RANDOM_TORQUE, state, task)
+    finding = _asked(RANDOM_TORQUE, _evidence(state), state)
     if finding is None or finding.delta_chi2 < rival.gain - rival.charge:
         return None
     after = _applied(finding, state, task)

@@ -117,8 +117,8 @@ class Hypothesis:
         By name, the p-values of the tests that found nothing.
     tested
         The fit with which the measurement was tested.
-    clock_notes
-        What the tests of the time stamps found, a clause each.
+    notes
+        What the tests of the measurement say that is no fault, a clause each, by test.
     first, now
         The scans of the baseline's residual and of the present one.
     scanned
@@ -139,7 +139,7 @@ class Hypothesis:
     faults: tuple[Finding, ...] = ()
     quiet: Mapping[str, float] = field(default_factory=dict)
     tested: Fit | None = None
-    clock_notes: tuple[str, ...] = ()
+    notes: Mapping[str, str] = field(default_factory=dict)
     first: Detection | None = None
     now: Detection | None = None
     scanned: tuple[Fit, Data, Noise, list[Effect]] | None = None

@@ -6,10 +6,10 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.demodulation import by_cycle
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.remainder import by_cycle
 from pendpipe.diagnosis.result import Location
 from pendpipe.diagnosis.values import last_in
 from pendpipe.effects import Effect

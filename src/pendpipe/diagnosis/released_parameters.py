@@ -2,35 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Final
 
 from pendpipe.arrays import FloatArray
-from pendpipe.effects.baseline import (
-    HYSTERETIC,
-    OFFSET,
-    OMEGA,
-    SHARE,
-    START,
-    VISCOUS,
-    A,
-    B,
-    C,
-    share_by_b,
-)
+from pendpipe.dynamics.eq8 import PLACES, SHARE, B
+from pendpipe.effects.baseline import HYSTERETIC, VISCOUS, share_by_b
 from pendpipe.effects.effect import Effect
 
 if TYPE_CHECKING:
     from pendpipe.diagnosis.refine import Fit
 
-_INDEX: Final[Mapping[str, int]] = {
-    "a": A,
-    "b": B,
-    "c": C,
-    "frequency": OMEGA,
-    "amplitude": START,
-    "offset": OFFSET,
-}
 _PART: Final = {"quality_factor_hysteretic": HYSTERETIC, "quality_factor_viscous": VISCOUS}
 
 
@@ -50,7 +32,7 @@ class ReleasedParameter(Effect):
 
     def __init__(self, fixed: str) -> None:
         self.fixed = fixed
-        self.index = _INDEX.get(fixed)
+        self.index = PLACES.get(fixed)
         self.frees = _PART.get(fixed)  # type: ignore[misc]
         self.identifier = f"parameter-{fixed}"  # type: ignore[misc]
         self.name = f"another value of {fixed.replace('_', ' ')}"  # type: ignore[misc]

@@ -10,12 +10,12 @@ the losses.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 from scipy.fft import dct
 
+from pendpipe.analysis.demodulation import by_cycle
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
@@ -137,32 +137,5 @@ def with_errors(fit: Fit, data: Data, noise: Noise) -> Fit:
 
 def _in_parts(residual: FloatArray, phase: FloatArray) -> list[FloatArray]:
     """Return what lies in each of the parts of the motion, cycle by cycle, and between them."""
-    found, rest = by_cycle(residual, phase)
+    found, rest = by_cycle(residual, phase, _HARMONICS)
     return [found[:, 0], found[:, 1], found[:, 2], found[:, 3:], rest]
-
-
-def by_cycle(
-    residual: FloatArray, phase: FloatArray, harmonics: int = _HARMONICS
-) -> tuple[FloatArray, FloatArray]:
-    """Return coefficients of offset, cosine, sine and harmonics in each cycle, and the rest.
-
-    Shape (cycles, 1 + 2 harmonics, ...) for a residual of shape (n, ...). Within a cycle the
-    functions are orthonormal, so that noise gives each coefficient the variance 1.
-    """
-    number = np.floor((phase - phase[0]) / (2.0 * math.pi)).astype(np.int64)
-    ends = np.searchsorted(number, np.arange(number[-1] + 2))
-    width, rest = 1 + 2 * harmonics, residual.copy()
-    found = np.zeros((len(ends) - 1, width, *residual.shape[1:]))
-    for cycle, (first, last) in enumerate(pairwise(ends.tolist())):
-        size = min(width, (last - first) // 2)
-        if size < 1:
-            continue
-        part = phase[first:last]
-        waves = [np.ones(len(part))]
-        for harmonic in range(1, harmonics + 1):
-            waves += [np.cos(harmonic * part), np.sin(harmonic * part)]
-        basis, mixing = np.linalg.qr(np.stack(waves[:size], axis=1))
-        basis *= np.sign(np.diag(mixing))
-        found[cycle, :size] = basis.T @ residual[first:last]
-        rest[first:last] -= basis @ found[cycle, :size]
-    return found, rest

@@ -21,7 +21,6 @@ from pendpipe.diagnosis.cycles import SmallSwings, small_swings
 from pendpipe.diagnosis.data import with_scatter
 from pendpipe.diagnosis.detect import LEVEL
 from pendpipe.diagnosis.forensics.codes import with_true_step
-from pendpipe.diagnosis.forensics.colour import level_note, wander_note
 from pendpipe.diagnosis.forensics.lost_samples import loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.held_out import held_out
@@ -214,11 +213,7 @@ def diagnose_decay(
     effects = _in_order(found, weighed, samples)
     gap = gap_note((whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
     rounding = found.data.step / 12.0**0.5
-    # Of noise below that of rounding nothing is seen.
-    seen = not found.data.time_noise and found.noise.rms > rounding
-    changing = level_note(found.noise) if seen else None
-    wander = wander_note(found.noise, found.data, found.fit)
-    stamps = tuple(note for note in (gap, *found.clock_notes, changing, wander) if note)
+    stamps = tuple(note for note in (gap, *found.notes.values()) if note)
     # With a red light the fit has lost the motion, which the search follows by its phase; and a
     # part of b that is held bounds b here alone.
     stands = fit is not None and fit.light != "red" and not beginning.model.parts

@@ -30,6 +30,8 @@ BASELINE: Final = ("a", "b", "c", "share", "omega", "start_rad", "start_s", "off
 turning point from which the motion starts (about the equilibrium) and when; and the reading of the
 equilibrium."""
 A, B, C, SHARE, OMEGA, START, TIME, OFFSET = range(8)
+PLACES: Final = {"a": A, "b": B, "c": C, "frequency": OMEGA, "amplitude": START, "offset": OFFSET}
+"""Where what a user may hold stands in it."""
 
 
 Restoring = Literal["linear", "sine"]

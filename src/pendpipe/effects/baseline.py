@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Eq8, Release
 from pendpipe.dynamics.any_law import Clock, Motion
 from pendpipe.dynamics.eq8 import BASELINE, OFFSET, OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.effects.effect import Pendulum
@@ -32,6 +33,7 @@ __all__ = [
     "held_indices",
     "pendulum_of",
     "share_by_b",
+    "values_of",
     "with_parts",
 ]
 
@@ -48,6 +50,14 @@ def pendulum_of(value: FloatArray) -> Pendulum:
         float((1.0 - value[SHARE]) * value[B]),
         float(value[C]),
     )
+
+
+def values_of(law: Eq8, release: Release, offset: float = 0.0) -> FloatArray:
+    """The baseline's values of a law that moves from a turning point."""
+    b = law.hysteretic + law.viscous
+    share = law.hysteretic / b if b > 0.0 else 0.5
+    losses = law.quadratic, b, law.coulomb, share
+    return np.array([*losses, law.angular_frequency, release.angle_rad, release.time_s, offset])
 
 
 def closed_form(value: FloatArray, clock: Clock) -> Motion:

@@ -20,7 +20,7 @@ from pendpipe.configuration.models import NotNegative, Positive, Section, Sensor
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.any_law import Motion, NoMotionError, sample_pieces
 from pendpipe.dynamics.eq8 import Drag, Restoring
-from pendpipe.effects.baseline import BASELINE, TIME
+from pendpipe.effects.baseline import TIME, values_of
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.effect import Effect, Parameter
 from pendpipe.effects.model import Model as EffectsModel
@@ -458,19 +458,7 @@ def _with_effects(
         If the pendulum never turns.
     """
     effects = tuple(one.effect for one in given)
-    value = np.zeros(len(BASELINE))
-    linear = equation.hysteretic + equation.viscous
-    share = equation.hysteretic / linear if linear else 0.0
-    value[:7] = (
-        equation.quadratic,
-        linear,
-        equation.coulomb,
-        share,
-        equation.angular_frequency,
-        release.angle_rad,
-        release.time_s,
-    )
-    value = np.concatenate([value, *(one.values for one in given)])
+    value = np.concatenate([values_of(equation, release), *(one.values for one in given)])
     interval = float(time_s[1] - time_s[0]) if len(time_s) > 1 else 1.0
     model = EffectsModel(
         time_s, interval, effects, _ORDER, restoring=equation.restoring, drag=equation.drag

@@ -16,6 +16,7 @@ from pendpipe.analysis.fit.by_waveform import (
     waveform_result,
 )
 from pendpipe.analysis.fit.goodness import LEVEL
+from pendpipe.analysis.fit.quality import period_of_frequency
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, read_fit
 from pendpipe.analysis.torque import may_be_sine, restoring_of, told_apart
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
@@ -265,8 +266,8 @@ def _with_other_frequency(found: FitResult, as_spring: float) -> FitResult:
 
 
 def _period(frequency: Estimate) -> str:
-    value = 1.0 / frequency.value
-    return with_error(value, frequency.sd * value**2, "s", short=True)
+    period = period_of_frequency(frequency)
+    return with_error(period.value, period.sd, "s", short=True)
 
 
 def _worst(result: FitResult) -> float:

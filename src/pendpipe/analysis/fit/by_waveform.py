@@ -48,7 +48,7 @@ from pendpipe.dynamics import (
     sample_with_jacobian,
     turning_points_with_jacobian,
 )
-from pendpipe.dynamics.eq8 import OFFSET, OMEGA, SHARE, START, TIME, A, B, C, Restoring
+from pendpipe.dynamics.eq8 import OFFSET, OMEGA, PLACES, SHARE, START, TIME, A, B, C, Restoring
 from pendpipe.dynamics.kernel import kernel
 from pendpipe.estimate import Estimate
 from pendpipe.physics.decay import amplitude, time_at
@@ -622,7 +622,7 @@ def fitted_waveform(
     """
     fixed = fixed or {}
     held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
-    held = _held(held_rates, fixed, parts, baseline)
+    held = held_places(held_rates, fixed, parts, baseline)
     start = start_values(points, held_rates, fixed, baseline, restoring, samples=samples)
     span = usable_span(samples, points, start)
     seen: Seen = "position" if length_m else "rate" if samples.unit == "rad/s" else "angle"
@@ -1017,15 +1017,14 @@ def waveform_result(
     )
 
 
-def _held(
+def held_places(
     held_rates: Mapping[str, float],
     fixed: Mapping[str, float],
     parts: Mapping[str, float],
     baseline: Baseline,
 ) -> tuple[int, ...]:
     """Indices of what is not fitted."""
-    index = {"a": A, "b": B, "c": C, "amplitude": START, "offset": OFFSET}
-    held = [index[name] for name in held_rates]
+    held = [PLACES[name] for name in held_rates]
     if "frequency" in fixed:
         held.append(OMEGA)
     if parts or baseline == "viscous" or held_rates.get("b") == 0.0:

@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.decrement import TOLERANCE, Decrement, Light, is_off
+from pendpipe.analysis.fit.decrement import TOLERANCE, Check, Light, is_off
 from pendpipe.analysis.fit.period import fit_period
 from pendpipe.analysis.fit.quality import relative_loss_sd
+from pendpipe.analysis.noise import of_neighbours
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.dynamics import Eq8
 from pendpipe.estimate import Estimate
@@ -38,25 +39,6 @@ _LOSSES: Final = ("a", "b", "c", "amplitude", "offset")
 _TIMES: Final = ("frequency", "phase")
 
 
-class PeriodCheck(NamedTuple):
-    """The period of small swings, by the law and as the turning points show it."""
-
-    amplitude_rad: float
-    """Of the swings that show it."""
-    fitted: float
-    """s."""
-    seen: float
-    """s, from the times of the turning points and the torque that was fitted."""
-    seen_sd: float
-    scatter: float = 1.0
-    """Variance of the times about a steady period over their own."""
-
-    @property
-    def excess(self) -> float:
-        """By what part of the seen period the law's is longer."""
-        return self.fitted / self.seen - 1.0
-
-
 class Widening(NamedTuple):
     """By what standard deviations are multiplied for what the law misses; 1 for nothing."""
 
@@ -64,12 +46,12 @@ class Widening(NamedTuple):
     losses: float = 1.0
 
 
-def check_period(points: TurningPoints, law: Eq8) -> tuple[PeriodCheck, ...]:
+def check_period(points: TurningPoints, law: Eq8) -> tuple[Check, ...]:
     """Compare a law's period with the times of the turning points.
 
     Returns
     -------
-    tuple of PeriodCheck
+    tuple of Check
         Of the whole decay, and of its large, middle and small swings; empty where there are too
         few of them.
     """
@@ -85,19 +67,17 @@ def check_period(points: TurningPoints, law: Eq8) -> tuple[PeriodCheck, ...]:
     return tuple(_seen_period(clear.chosen(part), law) for part in parts)
 
 
-def _seen_period(points: TurningPoints, law: Eq8) -> PeriodCheck:
+def _seen_period(points: TurningPoints, law: Eq8) -> Check:
     rates = law.quadratic, law.hysteretic + law.viscous, law.coulomb
     found = fit_period(points, points.amplitude_rad, rates, restoring=law.restoring)
     late = found.late_rad - np.mean(found.late_rad)
-    # Neighbours that are late alike are fewer than they seem.
-    alike = float(late[1:] @ late[:-1]) / max(float(late @ late), 1e-300)
-    alike = min(max(alike, 0.0), 0.9)
     omega = found.angular_frequency
-    correlated = (1.0 + alike) / (1.0 - alike)
+    # Neighbours that are late alike are fewer than they seem.
+    correlated = of_neighbours(late, 0.9)
     variance = float(found.covariance[0, 0]) * correlated
     seen = 2.0 * math.pi / omega
     middle = math.sqrt(float(points.amplitude_rad[0]) * abs(float(points.amplitude_rad[-1])))
-    return PeriodCheck(
+    return Check(
         middle,
         2.0 * math.pi / law.angular_frequency,
         seen,
@@ -150,7 +130,7 @@ def judged(
     )
 
 
-def _scattered(checks: Sequence[PeriodCheck | Decrement], most: float) -> float:
+def _scattered(checks: Sequence[Check], most: float) -> float:
     """By how much more than their own errors the turning points scatter about any smooth law."""
     return math.sqrt(min(median([each.scatter for each in checks] or [1.0]), most))
 
@@ -194,26 +174,27 @@ def _widened(result: FitResult, widening: Widening, enlarged: float) -> FitResul
     factors |= dict.fromkeys(_TIMES, widening.period / root)
     scale = np.array([factors[name] for name in result.covariance_order])
     parameters = {
-        name: _scaled(each, factors[name], at_least=0.0 if name in "abc" else -math.inf)
-        for name, each in result.parameters.items()
+        name: scaled(each, factors[name], name) for name, each in result.parameters.items()
     }
     limit = result.quality_factor_limit
     return replace(
         result,
         parameters=parameters,
         covariance=result.covariance * scale[:, None] * scale,
-        quality_factor_limit=limit and _scaled(limit, factors["b"], at_least=0.0),
+        quality_factor_limit=limit and scaled(limit, factors["b"], "b"),
     )
 
 
-def _scaled(estimate: Estimate, factor: float, *, at_least: float) -> Estimate:
+def scaled(estimate: Estimate, factor: float, name: str) -> Estimate:
+    """A parameter with a larger error; the interval of a loss keeps to its bound at zero."""
     value, (low, high) = estimate.value, estimate.bounds95
-    ends = max(value - factor * (value - low), min(at_least, low)), value + factor * (high - value)
+    least = min(0.0, low) if name in "abc" else -math.inf
+    ends = max(value - factor * (value - low), least), value + factor * (high - value)
     return replace(estimate, sd=factor * estimate.sd, interval95=ends)
 
 
 def _quotable(
-    result: FitResult, periods: Sequence[PeriodCheck]
+    result: FitResult, periods: Sequence[Check]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What may be quoted, and why the rest may not."""
     checks, unit = result.decrement_check, result.parameters["amplitude"].unit
@@ -252,7 +233,7 @@ def _quotable(
     return tuple(quotable), tuple(problems)
 
 
-def unsure(result: FitResult) -> tuple[list[Decrement], list[Decrement]]:
+def unsure(result: FitResult) -> tuple[list[Check], list[Check]]:
     """Return where the turning points show another loss, and where nothing shows it well enough.
 
     Where the one test of fit finds nothing but noise, a difference is its chance, and the loss is

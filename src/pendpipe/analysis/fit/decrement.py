@@ -12,6 +12,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.fit.goodness import normal_tail
+from pendpipe.analysis.noise import of_neighbours
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points, turning_points_with_jacobian
@@ -40,21 +41,23 @@ _STEPS: Final = 4.0
 """Steps of the readings within which rounding moves all turning points alike."""
 
 
-class Decrement(NamedTuple):
-    """Relative loss of amplitude -d ln y/dt at one amplitude, by the law and as seen."""
+class Check(NamedTuple):
+    """What the turning points about one amplitude show without a law, and what the law has.
+
+    The relative loss -d ln y/dt in 1/s, the law's averaged over a cycle of its own motion; or the
+    period of small swings in s (`consequence`).
+    """
 
     amplitude_rad: float
     fitted: float
-    """1/s, averaged over a cycle of the law's own motion."""
     seen: float
-    """1/s, of the turning points."""
     seen_sd: float
     scatter: float = 1.0
-    """Variance of the turning points about a smooth decay over their own."""
+    """Variance of the turning points about a smooth decay, or a steady period, over their own."""
 
     @property
     def excess(self) -> float:
-        """By what part of the seen loss the law loses more."""
+        """By what part of what is seen the law has more."""
         return (self.fitted - self.seen) / abs(self.seen) if self.seen else math.inf
 
     @property
@@ -85,7 +88,7 @@ class Decrement(NamedTuple):
         )
 
 
-def check_decrement(points: TurningPoints, law: Eq8) -> tuple[Decrement, ...]:
+def check_decrement(points: TurningPoints, law: Eq8) -> tuple[Check, ...]:
     """Compare a law's loss with the decrement at a large, a middle and a small amplitude.
 
     Parameters
@@ -97,7 +100,7 @@ def check_decrement(points: TurningPoints, law: Eq8) -> tuple[Decrement, ...]:
 
     Returns
     -------
-    tuple of Decrement
+    tuple of Check
         The large amplitude first; empty where there are too few turning points.
     """
     least = np.maximum(_SEEN * points.angle_sd_rad, _STEPS * points.step_rad)
@@ -118,7 +121,7 @@ def check_decrement(points: TurningPoints, law: Eq8) -> tuple[Decrement, ...]:
         if further[-1][2] <= _CONFIRMED * abs(further[-1][1]):
             found = further
     return tuple(
-        Decrement(amplitude, loss_of(law, amplitude), loss, sd, scatter)
+        Check(amplitude, loss_of(law, amplitude), loss, sd, scatter)
         for amplitude, loss, sd, scatter in found
     )
 
@@ -170,9 +173,7 @@ def seen_loss(points: TurningPoints) -> tuple[float, float, float, float]:
     variance, scatter = float(inverse[1] @ inverse[1]) / scale[1] ** 2, 1.0
     if freedom > 0:
         square = float(residual @ residual)
-        alike = float(residual[1:] @ residual[:-1]) / max(square, 1e-300)
-        alike = min(max(alike, 0.0), 0.8)
-        scatter = max(1.0, square / freedom * (1.0 + alike) / (1.0 - alike))
+        scatter = max(1.0, square / freedom * of_neighbours(residual, 0.8))
     sd = math.sqrt(variance * scatter) / span
     return math.exp(values[0]), -float(values[1]) / span, sd, scatter
 
@@ -234,7 +235,7 @@ _OFF: Final = 2.4
 miss something: one of three is by chance in one decay of twenty."""
 
 
-def is_off(check: Decrement) -> bool:
+def is_off(check: Check) -> bool:
     """Whether a loss misses the turning points' by more than 5 % and by more than their errors."""
     missed = abs(check.fitted - check.seen)
     return missed > TOLERANCE * abs(check.seen) and missed > _OFF * check.seen_sd

@@ -12,9 +12,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.demodulation import harmonic_columns, normal_equations
 from pendpipe.analysis.noise import quantisation_rms, undithered_rms
 from pendpipe.analysis.turning_points.measure import invert
-from pendpipe.arrays import AnyArray, FloatArray
+from pendpipe.arrays import FloatArray
 
 LEVEL: Final = 1e-3
 """How often a recording of the fitted law may be refuted by chance, over all questions."""
@@ -181,26 +182,11 @@ def _demodulated(
     phase: FloatArray, sums: FloatArray, weights: FloatArray, count: int, harmonics: int
 ) -> _Blocks:
     """Fit a level and harmonics to each block."""
-    edges = np.linspace(phase[0], phase[-1], count + 1)
-    place = np.searchsorted(phase, edges[:-1])
-    wave = np.exp(1j * phase)
-    powers: list[AnyArray] = [np.ones_like(wave)]
-    for _ in range(2 * harmonics):
-        powers.append(powers[-1] * wave)
-    # Products of cosines and sines are those of sums and differences of their phases.
-    folded = np.stack([np.add.reduceat(weights * power, place) for power in powers])
-    taken = np.stack([np.add.reduceat(sums * power, place) for power in powers[: harmonics + 1]])
-    # A level, and cosine and sine of each harmonic: Re and Im of -i times its power.
-    harmonic = np.arange(1, 2 * harmonics + 2) // 2
-    turned = (-1j) ** (np.arange(1, 2 * harmonics + 2) % 2 * (harmonic > 0))
-    right = (turned[:, None] * taken[harmonic]).real.T
-    apart = harmonic[:, None] - harmonic
-    less = np.where((apart >= 0)[..., None], folded[np.abs(apart)], folded[np.abs(apart)].conj())
-    add = folded[harmonic[:, None] + harmonic] * np.outer(turned, turned)[..., None]
-    less = less * np.outer(turned, turned.conj())[..., None]
-    gram = 0.5 * (add + less).real.transpose(2, 0, 1)
+    edges, root = np.linspace(phase[0], phase[-1], count + 1), np.sqrt(weights)
+    waves, starts = harmonic_columns(phase, harmonics), np.searchsorted(phase, edges[:-1])
+    gram, right = normal_equations(waves * root, sums / root, starts)
     # Blocks with a gap tell not all of them.
-    inverse = np.ascontiguousarray(gram + _HAIR * gram[:, :1, :1] * np.eye(len(harmonic)))
+    inverse = gram + _HAIR * gram[:, :1, :1] * np.eye(len(waves))
     invert(inverse)
     whole = np.einsum("kpp->k", inverse) * gram[:, 0, 0] < _GAPPED
     inverse, right = inverse[whole], right[whole]

@@ -228,8 +228,9 @@ CHI2_95: Final = 3.841458820694124
 """95 % point of chi^2 with one degree of freedom."""
 _FAR: Final = 8.0
 """Standard deviations from which a bound is out of sight."""
-_HAIR: Final = 1e-13
-"""For what the readings do not tell apart."""
+_CLOSE_TO: Final = 1e-10
+_NEWTON: Final = 50
+"""Steps to the end of an interval, at most."""
 
 
 def intervals95(
@@ -275,14 +276,9 @@ def intervals95(
         return [(float(value[j] - half[j]), float(value[j] + half[j])) for j in indices]
     found = []
     for j in indices:
-        reach = _FAR * float(deviations[j])
-        low, high = (
-            _profiled_end(value, normal, gradient, bounds, j, held, far)
-            if reach > 0.0
-            else value[j]
-            for far in (-reach, reach)
-        )
-        found.append((float(low), float(high)))
+        ways = (-float(half[j]), float(half[j]))
+        low, high = (_profiled_end(value, normal, gradient, room, j, held, way) for way in ways)
+        found.append((low, high))
     return found
 
 
@@ -290,55 +286,30 @@ def _profiled_end(
     value: FloatArray,
     normal: FloatArray,
     gradient: FloatArray,
-    bounds: Bounds,
+    room: Bounds,
     index: int,
     held: Sequence[int],
-    reach: float,
+    half: float,
 ) -> float:
-    """One end of an interval that a bound takes part in, at most `reach` away.
+    """One end of an interval that a bound takes part in, `half` away without it.
 
-    The others follow within their bounds: which of them lie at one changes at some places of the
-    way, and between these chi^2 is a parabola.
+    The others follow within their bounds. Chi^2 along the way is convex, and made of parabolas, so
+    that Newton's steps come to where it has risen enough.
     """
-    room, side = bounds.about(value), math.copysign(1.0, reach)
-    most = min(abs(reach), float(room.upper[index] if side > 0.0 else -room.lower[index]))
-    if most <= 0.0:
+    side = math.copysign(1.0, half)
+    wall = float(room.upper[index] if side > 0.0 else -room.lower[index])
+    most = min(_FAR / math.sqrt(CHI2_95) * abs(half), wall)
+    if not most > 0.0:
         return float(value[index])
-    others = np.array([j for j in range(len(value)) if j != index and j not in held], dtype=int)
-    low, high = room.lower[others], room.upper[others]
-    part = normal[np.ix_(others, others)]
-    part = part + _HAIR * np.diag(part.diagonal())
-    along = side * normal[others, index]
-    pull, step = gradient[others], np.zeros(len(others))
-    # -1 and 1: at its lower, and at its upper bound.
-    hair = _SLACK / np.sqrt(np.maximum(part.diagonal(), 1e-300))
-    walls = 1.0 * ((high <= hair) & (pull >= 0.0)) - 1.0 * ((low >= -hair) & (pull <= 0.0))
-    pull = pull * np.abs(walls)
-    bend, slope = float(normal[index, index]), side * float(gradient[index])
-    end, risen = 0.0, 0.0
-    for _ in range(4 * len(others) + 4):
-        free = np.flatnonzero(walls == 0.0)
-        pace = np.zeros(len(others))
-        pace[free] = -np.linalg.solve(part[np.ix_(free, free)], along[free])
-        change = -along - part @ pace
-        curvature = max(bend + float(along @ pace), 0.0)
-        # chi^2 rises by curvature t^2 - 2 slope t; then a follower meets its bound, or leaves it.
-        root = math.sqrt(max(slope**2 + curvature * (CHI2_95 - risen), 0.0))
-        ahead = (slope + root) / curvature if curvature > 0.0 else math.inf
-        with np.errstate(all="ignore"):
-            meets = np.where(pace < 0.0, low - step, high - step) / pace
-            leaves = -pull / change
-        meets = np.where(pace != 0.0, np.maximum(meets, 0.0), math.inf)
-        leaves = np.where(walls * change < 0.0, np.maximum(leaves, 0.0), math.inf)
-        event = np.minimum(meets, leaves)
-        which = int(np.argmin(event)) if len(event) else -1
-        taken = min(ahead, most - end, float(event[which]) if which >= 0 else math.inf)
-        end += taken
-        if which < 0 or taken < event[which]:
+    end, moved = min(abs(half), most), np.zeros(len(value))
+    for _ in range(_NEWTON):
+        moved[index] = side * end
+        step = moved + bounded_step(normal, gradient - normal @ moved, room, (*held, index))
+        pull = normal @ step - gradient
+        risen, slope = float(step @ (pull - gradient)), 2.0 * side * float(pull[index])
+        before, end = end, most
+        if slope > 0.0:
+            end = min(max(before + (CHI2_95 - risen) / slope, 0.0), most)
+        if abs(end - before) <= _CLOSE_TO * end:
             break
-        risen += curvature * taken**2 - 2.0 * slope * taken
-        slope -= curvature * taken
-        step, pull = step + taken * pace, np.where(walls != 0.0, pull + taken * change, 0.0)
-        walls[which] = 0.0 if walls[which] else math.copysign(1.0, pace[which])
-        pull[which] = 0.0
     return float(value[index] + side * end)

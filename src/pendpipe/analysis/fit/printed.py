@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendpipe.analysis.fit.consequence import unsure
-from pendpipe.analysis.fit.quality import LOSSES, Quality
+from pendpipe.analysis.fit.quality import LOSSES, Quality, period_of_frequency
 from pendpipe.analysis.torque import TOP
 from pendpipe.analysis.turning_points import BEAT
 from pendpipe.dynamics import Eq8, Release, turning_points
@@ -124,7 +124,7 @@ def _remarks(result: FitResult) -> Iterator[str]:
     if result.light != "green":
         yield result.light_reason
     if (other := result.other_frequency) is not None:
-        period = Estimate(1.0 / other.value, other.sd / other.value**2, "s")
+        period = period_of_frequency(other)
         text = with_error(period.value, period.sd, "s", short=True)
         yield f"as a spring or torsion wheel (--restoring linear) its period would be {text}"
     if result.cuts:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from pendpipe.analysis.fit.consequence import PeriodCheck, Widening, judged
-from pendpipe.analysis.fit.decrement import Decrement, Light, check_decrement
+from pendpipe.analysis.fit.consequence import Widening, judged, scaled
+from pendpipe.analysis.fit.decrement import Check, Light, check_decrement
 from pendpipe.analysis.fit.goodness import LEVEL, Goodness, combined
 from pendpipe.analysis.fit.least_squares import CHI2_95
 from pendpipe.analysis.fit.printed import html, lines
@@ -174,7 +174,7 @@ class FitResult:
     warnings: tuple[str, ...] = ()
     restoring: Restoring = "linear"
     settled: bool = True
-    decrement_check: tuple[Decrement, ...] = ()
+    decrement_check: tuple[Check, ...] = ()
     fit_p_value: float | None = None
     drag_form: DragForm = "energy"
     drag: Literal["energy", "speed"] = "energy"
@@ -184,7 +184,7 @@ class FitResult:
     light: Light = "amber"
     light_reason: str = "the decrement was not checked"
     quotable: tuple[str, ...] = ()
-    period_check: tuple[PeriodCheck, ...] = ()
+    period_check: tuple[Check, ...] = ()
     widening: Widening = field(default_factory=Widening)
     hysteretic_share: float = 0.5
     clock_ppm: float | None = None
@@ -481,8 +481,8 @@ class FitResult:
             scale_percent=content.get("scale_percent"),
             quotable=tuple(content.get("quotable", ())),
             widening=Widening(**content.get("widening", {})),
-            period_check=tuple(PeriodCheck(**check) for check in content.get("period_check", ())),
-            decrement_check=tuple(Decrement(**check) for check in content["decrement_check"]),
+            period_check=tuple(Check(**check) for check in content.get("period_check", ())),
+            decrement_check=tuple(Check(**check) for check in content["decrement_check"]),
             **held,
         )
 
@@ -627,10 +627,8 @@ def _stretched(result: FitResult, powers: Mapping[str, float], part: float) -> F
     for name, power in powers.items():
         old = parameters[name]
         sd = math.hypot(old.sd, part * power * old.value)
-        factor = sd / old.sd if old.sd > 0.0 else 1.0
-        low, high = (old.value + factor * (end - old.value) for end in old.bounds95)
-        least = min(0.0, old.bounds95[0]) if name in "abc" else -math.inf
-        parameters[name] = replace(old, sd=sd, interval95=(max(low, least), high))
+        found = scaled(old, sd / old.sd if old.sd > 0.0 else 1.0, name)
+        parameters[name] = replace(found, sd=sd)
     return replace(result, parameters=parameters, covariance=covariance)
 
 

@@ -31,13 +31,16 @@ from pendpipe.analysis.turning_points.measure import (
 )
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
-from pendpipe.dynamics.kernel import Matrix, kernel
+from pendpipe.dynamics.kernel import kernel
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.recording import Recording
 
 _ENOUGH: Final = 24
 """Readings in a half cycle that a first look needs, and half cycles from which it is worth it."""
 _LOOK: Final = 200_000
+_AT_ONCE: Final = 1 << 13
+"""Half cycles that are smoothed together."""
+_WIDEST: Final = 80
 _GAP: Final = 0.4
 """Half periods without a reading from which a turning point may be lost in them."""
 _EDGE: Final = 0.05
@@ -117,21 +120,6 @@ def _level(value: FloatArray) -> float:
     return float(np.median(0.25 * (value[:-2] + 2.0 * value[1:-1] + value[2:])))
 
 
-@kernel()
-def solve_in_place(matrix: Matrix, right: FloatArray, size: int) -> None:
-    """Solve a small positive definite system; `right` becomes the solution."""
-    for p in range(size):
-        for q in range(p + 1, size):
-            factor = matrix[q, p] / matrix[p, p]
-            for r in range(p, size):
-                matrix[q, r] -= factor * matrix[p, r]
-            right[q] -= factor * right[p]
-    for p in range(size - 1, -1, -1):
-        for q in range(p + 1, size):
-            right[p] -= matrix[p, q] * right[q]
-        right[p] /= matrix[p, p]
-
-
 def smooth_times(
     number: IntArray, time_s: FloatArray, weight: FloatArray, wanted: float, at: IntArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -146,60 +134,33 @@ def smooth_times(
     centre_s, half_period_s
         Smoothed time and slope at each number in `at`.
     """
-    centre, slope = np.empty(len(at)), np.empty(len(at))
-    room = np.empty((3, 3)), np.empty(3), np.empty(3)
-    _smooth_times(number, time_s, weight, wanted, at, centre, slope, *room)
-    return centre, slope
-
-
-@kernel()
-def _smooth_times(
-    number: IntArray,
-    time_s: FloatArray,
-    weight: FloatArray,
-    wanted: float,
-    at: IntArray,
-    centre: FloatArray,
-    slope: FloatArray,
-    normal: Matrix,
-    right: FloatArray,
-    power: FloatArray,
-) -> None:
-    """Fill `centre` and `slope`; the last three are room to work in."""
-    last = number.size - 1
-    middle = 0
-    for k in range(at.size):
-        while middle > 0 and number[middle - 1] >= at[k]:
-            middle -= 1
-        while middle <= last and number[middle] < at[k]:
-            middle += 1
-        lo, hi = max(middle - 2, 0), min(middle + 2, last)
-        lo, hi = max(min(lo, hi - 3), 0), min(max(hi, lo + 3), last)
-        total = 0.0
-        for j in range(lo, hi + 1):
-            total += weight[j]
-        while total < wanted and hi - lo < 80 and (lo > 0 or hi < last):
-            if lo > 0:
-                lo -= 1
-                total += weight[lo]
-            if hi < last:
-                hi += 1
-                total += weight[hi]
-        size = 3 if hi - lo >= 4 else 2
-        normal[:, :] = 0.0
-        right[:] = 0.0
-        power[0] = 1.0
-        for j in range(lo, hi + 1):
-            u = float(number[j] - at[k])
-            for p in range(1, size):
-                power[p] = power[p - 1] * u
-            for p in range(size):
-                right[p] += weight[j] * power[p] * (time_s[j] - time_s[lo])
-                for q in range(size):
-                    normal[p, q] += weight[j] * power[p] * power[q]
-        solve_in_place(normal, right, size)
-        centre[k] = time_s[lo] + right[0]
-        slope[k] = right[1]
+    if len(at) > _AT_ONCE:
+        pieces = np.array_split(at, len(at) // _AT_ONCE + 1)
+        both = [smooth_times(number, time_s, weight, wanted, piece) for piece in pieces]
+        return np.concatenate([c for c, _ in both]), np.concatenate([h for _, h in both])
+    last, middle = len(number) - 1, np.searchsorted(number, at)
+    low, high = np.maximum(middle - 2, 0), np.minimum(middle + 2, last)
+    low, high = np.minimum(low, high - 3), np.maximum(high, low + 3)
+    low, high = np.maximum(low, 0), np.minimum(high, last)
+    total = np.append(0.0, np.cumsum(weight))
+    while np.any(
+        grows := (total[high + 1] - total[low] < wanted)
+        & (high - low < _WIDEST)
+        & ((low > 0) | (high < last))
+    ):
+        low, high = np.maximum(low - grows, 0), np.minimum(high + grows, last)
+    near = low[:, None] + np.arange(np.max(high - low, initial=0) + 1)
+    inside, near = near <= high[:, None], np.minimum(near, last)
+    u, since = (number[near] - at[:, None]).astype(np.float64), time_s[low]
+    columns = np.stack([np.ones_like(u), u, u * u])
+    columns[2, high - low < 4] = 0.0
+    weighted = columns * (weight[near] * inside)
+    normal = np.einsum("pkn,qkn->kpq", weighted, columns)
+    # Of fewer than five a line.
+    normal[:, 2, 2] += high - low < 4
+    right = np.einsum("pkn,kn->kp", weighted, time_s[near] - since[:, None])
+    found = np.linalg.solve(normal, right[..., None])[..., 0]
+    return since + found[:, 0], found[:, 1]
 
 
 @kernel()

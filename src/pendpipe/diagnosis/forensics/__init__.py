@@ -1,7 +1,7 @@
 """Tests of the measurement: what no smooth signature in time shows.
 
-Each is a function ``find(data, fit, noise, samples) -> Finding | None``: None where it is not made.
-`diagnosis.faults` asks those that are declared here, and applies what pays.
+Each is a function ``find(evidence) -> Finding | None``: None where it is not made.
+`diagnosis.faults` asks those that are declared here, applies what pays, and keeps what they note.
 """
 
 import math
@@ -9,8 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from pendpipe.analysis.turning_points.measure import Samples
-from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics import (
     colour,
     converter,
@@ -20,8 +18,8 @@ from pendpipe.diagnosis.forensics import (
     slips,
     tracking,
 )
-from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR, Fit
+from pendpipe.diagnosis.forensics.evidence import Evidence
+from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR
 from pendpipe.diagnosis.result import Finding
 
 _CLEAN: Final = 1.3
@@ -49,25 +47,23 @@ class Finder:
     repeats
         Whether it is made again with each model once it has found something. What it left out or
         took off is then put back first, and may stay.
-    as_recorded
-        Whether it is made on what was recorded, whatever was taken off since.
     """
 
     name: str
-    find: Callable[[Data, Fit, Noise, Samples], Finding | None]
+    find: Callable[[Evidence], Finding | None]
     most_misfit: float = math.inf
     most_phase_rad: float = math.inf
     last: bool = False
     repeats: bool = False
-    as_recorded: bool = False
 
-    def may_ask(self, data: Data, fit: Fit) -> bool:
+    def may_ask(self, evidence: Evidence) -> bool:
         """Whether a model is good enough for the test."""
-        good = fit.chi2 <= self.most_misfit * data.used
+        fit = evidence.fit
+        good = fit.chi2 <= self.most_misfit * evidence.data.used
         return good and fit.max_phase_error_rad <= self.most_phase_rad
 
 
-def _last(name: str, find: Callable[[Data, Fit, Noise, Samples], Finding | None]) -> Finder:
+def _last(name: str, find: Callable[[Evidence], Finding | None]) -> Finder:
     return Finder(name, find, _CLEAN, LARGE_PHASE_ERROR, last=True)
 
 
@@ -75,13 +71,7 @@ RANDOM_TORQUE: Final = _last("broadband-drive", colour.find_random_torque)
 FINDERS: Final = (
     Finder("time-stamps", sampling_times.find_irregular, most_phase_rad=_IN_PHASE),
     Finder("dropped-samples", lost_samples.find, repeats=True),
-    Finder(
-        "tracking-noise",
-        tracking.find,
-        most_phase_rad=LARGE_PHASE_ERROR,
-        repeats=True,
-        as_recorded=True,
-    ),
+    Finder("tracking-noise", tracking.find, most_phase_rad=LARGE_PHASE_ERROR, repeats=True),
     Finder("count-slips", slips.find_counts, most_phase_rad=_ON_ITS_TURN),
     Finder("clock-slips", slips.find_clock, most_phase_rad=_IN_PHASE),
     Finder("clipping", converter.find_clipping, GROSS, LARGE_PHASE_ERROR, repeats=True),
@@ -93,5 +83,7 @@ FINDERS: Final = (
     _last("jitter", sampling_times.find_jitter),
     _last("coloured-noise", colour.find_coloured_noise),
     RANDOM_TORQUE,
+    Finder("changing-noise", colour.note_level, last=True),
+    Finder("wandering-zero", colour.note_wander, last=True),
 )
 """The tests of the measurement."""

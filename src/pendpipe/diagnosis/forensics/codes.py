@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -12,12 +12,11 @@ from pendpipe.analysis.fit.by_waveform import best_noise
 from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
-from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.local import Local, error_of, local_residual
+from pendpipe.diagnosis.forensics.local import Local, local_residual
 from pendpipe.dynamics.any_law import lagrange
 
 if TYPE_CHECKING:
-    from pendpipe.diagnosis.refine import Fit
+    from pendpipe.diagnosis.forensics.evidence import Evidence
 
 _DITHERED: Final = 0.6
 """Rms of the errors in steps from which rounding is dithered."""
@@ -58,20 +57,19 @@ class Lattice:
         return np.asarray((value - self.origin) / self.step)
 
 
-def find_lattice(
-    values: FloatArray, step: float | None, slack: float = _TOLERANCE
-) -> Lattice | None:
-    """Number the codes of readings; None if they lie on no lattice within a tolerance `slack`.
+def lattice_of(values: FloatArray, samples: Samples) -> Lattice | None:
+    """Number the codes of a recording's readings (or some of them); None if they lie on no lattice.
 
-    The step is refined over the whole range, so that codes far from zero are numbered right.
+    The step is refined over the whole range, so that codes far from zero are numbered right. The
+    coarser step of an earlier stage is rounded to the converter's own.
     """
-    if step is None or not step > 0.0:
-        return None
+    step, slack = samples.step, _TOLERANCE
     distinct, inverse = np.unique(values, return_inverse=True)
-    if len(distinct) < 3:
+    if step is None or len(distinct) < 3:
         return None
-    gaps = np.round(np.diff(distinct) / step).astype(np.int64)
-    number = np.concatenate([[0], np.cumsum(gaps)])
+    if samples.promised_step is not None:
+        slack = max(_LARGEST_ROUNDING * samples.promised_step / step, slack)
+    number = np.append(0, np.cumsum(np.rint(np.diff(distinct) / step).astype(np.int64)))
     if number[-1] < 2:
         return None
     refined, origin = np.polyfit(number, distinct, 1).tolist()
@@ -79,17 +77,6 @@ def find_lattice(
         return None
     shift = round(origin / refined)
     return Lattice(refined, (number + shift)[inverse], origin - shift * refined)
-
-
-def lattice_of(values: FloatArray, samples: Samples) -> Lattice | None:
-    """Number the codes of a recording's readings (or some of them), as `find_lattice`.
-
-    The coarser step of an earlier stage is rounded to the converter's own.
-    """
-    if samples.step is None or samples.promised_step is None:
-        return find_lattice(values, samples.step)
-    rounded = _LARGEST_ROUNDING * samples.promised_step / samples.step
-    return find_lattice(values, samples.step, max(rounded, _TOLERANCE))
 
 
 def with_true_step(samples: Samples) -> Samples:
@@ -172,8 +159,8 @@ class Coded:
 
     Parameters
     ----------
-    lattice
-        Step and origin (with the codes of all readings).
+    step
+        The lattice's.
     code
         Of each reading, shape (m,).
     position
@@ -184,20 +171,14 @@ class Coded:
         Noise before rounding, in steps.
     """
 
-    lattice: Lattice
+    step: float
     code: IntArray
     position: FloatArray
     blur: float
     ratio: float
 
-    @property
-    def error(self) -> FloatArray:
-        """Reading less angle, in steps, shape (m,)."""
-        return self.code - self.position
 
-
-@dataclass(frozen=True)
-class Raw:
+class Raw(NamedTuple):
     """Original readings, where the data may be means of several; shape (m,).
 
     Parameters
@@ -212,35 +193,33 @@ class Raw:
     used: BoolArray
 
 
-def raw_readings(data: Data, fit: Fit, samples: Samples) -> Raw:
+def raw_readings(evidence: Evidence) -> Raw:
     """Return the original readings of the data; of very many every second, third, ..."""
-    sampled, reading = fit.at.sampled, fit.at.reading
+    data, samples, phase = evidence.data, evidence.samples, evidence.sampled.phase
     index = data.rows.reshape(-1)
     if data.fold == 1:
-        return Raw(samples.values[index], error_of(data, fit), sampled.phase, data.weight > 0.0)
+        return Raw(samples.values[index], evidence.error, phase, evidence.used)
     index = index[:: max(1, len(index) // _MOST_READINGS)]
     when, values = samples.time_s[index], samples.values[index]
     # The model by polynomials through six neighbouring means.
     start = np.clip(np.searchsorted(data.time_s, when) - 3, 0, len(data) - 6)
     weights = lagrange(data.time_s, start, when)
-    near = np.stack([reading[start + point] for point in range(len(weights))])
-    return Raw(
-        values,
-        values - np.sum(weights * near, axis=0),
-        np.interp(when, data.time_s, sampled.phase),
-        np.interp(when, data.time_s, data.weight) > 0.99,
-    )
+    near = evidence.fit.at.reading[start + np.arange(len(weights))[:, None]]
+    used = np.interp(when, data.time_s, data.weight) > 0.99
+    read = np.sum(weights * near, axis=0)
+    return Raw(values, values - read, np.interp(when, data.time_s, phase), used)
 
 
-def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
-    """Return codes and angles; None if the readings have no step.
+def read_codes(evidence: Evidence) -> Coded | None:
+    """Return codes and angles; None if the readings have no step, or mark counts.
 
     The angles are those of the model if it fits to a small part of a step, else those of local
     fits to the readings.
     """
-    if samples.counts or samples.step is None:
+    samples = evidence.samples
+    if evidence.data.time_noise or samples.counts or samples.step is None:
         return None
-    raw = raw_readings(data, fit, samples)
+    raw = raw_readings(evidence)
     lattice = lattice_of(raw.values, samples)
     if lattice is None:
         return None
@@ -254,4 +233,4 @@ def read_codes(data: Data, fit: Fit, samples: Samples) -> Coded | None:
     if misfit < _GOOD_MODEL:
         error, blur = raw.residual, min(0.5 * misfit, 0.05)
     position = lattice.position((raw.values - error)[good])
-    return Coded(lattice, lattice.code[good], position, blur, ratio)
+    return Coded(step, lattice.code[good], position, blur, ratio)

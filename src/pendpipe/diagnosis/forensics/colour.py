@@ -7,28 +7,20 @@ the pendulum's frequency; the density of coloured noise there differs from its m
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.fft import dct
 
-from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.blocks import blocks_of
-from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.local import residual_of
+from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.tails import tail_of_squares, upper_tail
-from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.projection import tangent_basis
 from pendpipe.diagnosis.result import Finding, Location
 from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, compact
-
-if TYPE_CHECKING:
-    from pendpipe.diagnosis.refine import Fit
 
 _HARMLESS_RATIO: Final = 1.5
 """Ratio of densities below which the colour changes no conclusion."""
@@ -55,40 +47,46 @@ _LARGEST_IMBALANCE: Final = 2.5
 """Largest ratio of the total gain to that of the quadrature with the smaller one."""
 
 
-def level_note(noise: Noise) -> str | None:
-    """Say by how much the noise's level changes along the record; None where it hardly does."""
-    if noise.level is None:
+def note_level(evidence: Evidence) -> Finding | None:
+    """Say by how much the noise's level changes along the record, where it does and is seen."""
+    data, level = evidence.data, evidence.noise.level
+    # Of noise below that of rounding nothing is seen.
+    if level is None or data.time_noise or evidence.noise.rms <= data.step / math.sqrt(12.0):
         return None
-    first, last = (float(np.sqrt(np.mean(part**2))) for part in np.array_split(noise.level, 2))
-    ratio = float(noise.level.max() / noise.level.min())
+    first, last = (float(np.sqrt(np.mean(part**2))) for part in np.array_split(level, 2))
+    ratio = float(level.max() / level.min())
     if ratio < _HARMLESS_RATIO:
         return None
     how = "larger" if first > last else "smaller"
-    return f"the noise changes in time, by a factor of {ratio:.2g}; it is {how} in the first half"
+    said = f"the noise changes in time, by a factor of {ratio:.2g}; it is {how} in the first half"
+    return Finding("changing-noise", 1.0, summary=said, kind="note")
 
 
-def wander_note(noise: Noise, data: Data, fit: Fit) -> str | None:
+def note_wander(evidence: Evidence) -> Finding | None:
     """Say how far the zero wanders if most of what is left is noise slower than the motion."""
+    data, fit = evidence.data, evidence.fit
     count, omega = len(data), fit.at.sampled.motion.angular_frequency
     slower = max(int(_SLOWER * omega / math.pi * count * data.interval_s), 1)
     power = dct(data.residual(fit.at.reading) * data.weight, norm="ortho") ** 2 / count
     slow, fast = float(power[:slower].sum()), float(power[slower:].sum())
-    if data.time_noise or not noise.coloured or slow < fast:
+    if data.time_noise or not evidence.noise.coloured or slow < fast:
         return None
     wander, rest = (compact(math.sqrt(part), data.unit) for part in (slow, fast))
-    return (
+    said = (
         f"most of what is left is slower than the motion: the zero wanders by {wander} rms,"
         f" and what is faster is {rest} rms"
     )
+    return Finding("wandering-zero", 1.0, summary=said, kind="note")
 
 
-def find_coloured_noise(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
+def find_coloured_noise(evidence: Evidence) -> Finding | None:
     """Test whether the density near the pendulum's frequency differs from the mean by over 1.5.
 
     Density and error are those of the spectrum that the readings were weighed with. The null is
     composite: any ratio between 1/1.5 and 1.5. Noise that is red only below a tenth of the
     frequency is not reported.
     """
+    data, fit, noise = evidence.data, evidence.fit, evidence.noise
     if not data.uniform or not noise.coloured or fit.chi2 > _MISFIT * data.used:
         return None
     frequency_hz = fit.at.sampled.motion.angular_frequency / (2.0 * math.pi)
@@ -144,17 +142,40 @@ class Shapes(NamedTuple):
     square: FloatArray
 
     @property
-    def smoother(self) -> Shapes:
-        """The same squares, of fluctuations that are smoother than a random walk."""
-        return Shapes(self.weight**2, self.square)
-
-    @property
     def chance(self) -> float:
         """Probability that noise alone gives such squares."""
         return tail_of_squares(float(self.weight @ self.square), self.weight)
 
+    def walk(self, which: slice = slice(None), power: int = 1) -> tuple[float, float, float]:
+        """Return the variance of a kick, its error, and twice the gain in log-likelihood.
 
-def find_random_torque(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
+        With a `power` of 2 of fluctuations that are smoother than a random walk.
+        """
+        weight, square = self.weight[which] ** power, self.square[which]
+        sizes = np.append(0.0, _SIZES) / weight.max()
+        variance = 1.0 + sizes[:, None] * weight
+        # -2 ln L.
+        twice = np.sum(np.log(variance) + square / variance, axis=1)
+        best = int(np.argmin(twice))
+        relative = weight / variance[best]
+        sd = math.sqrt(2.0 / float(relative @ relative))
+        return float(sizes[best]), sd, float(twice[0] - twice[best])
+
+    @property
+    def may_walk(self) -> bool:
+        """Whether it is no smoother than a random walk, and of one strength at all scales."""
+        if self.walk(power=2)[2] > self.walk()[2] + _SMOOTH_GAIN:
+            return False
+        half = len(self.weight) // 2
+        slow, slow_sd, slow_gain = self.walk(slice(half))
+        fast, fast_sd, fast_gain = self.walk(slice(half, None))
+        if min(slow_gain, fast_gain) < _SMOOTH_GAIN:
+            return True
+        sd = math.hypot(slow_sd / slow, fast_sd / fast)
+        return abs(math.log(slow / fast)) < math.log(_LARGEST_RATIO) + 3.0 * sd
+
+
+def find_random_torque(evidence: Evidence) -> Finding | None:
     """Test for a random torque of white density S_a.
 
     In a time dt it adds to both quadratures of the angle independent steps of variance
@@ -164,31 +185,42 @@ def find_random_torque(data: Data, fit: Fit, noise: Noise, samples: Samples) -> 
     sum of squares. It must show in amplitude and in phase, which a missing term of the law of
     motion seldom does: p = max(p_amplitude, p_phase)^2.
     """
+    data, fit, sampled = evidence.data, evidence.fit, evidence.sampled
     if data.used < 100 or fit.max_phase_error_rad > _LARGEST_PHASE_ERROR:
         return None
-    amplitude, phase, per_kick = _fluctuations(data, fit, noise)
+    amplitude, phase, per_kick = _fluctuations(evidence)
     few = min(len(amplitude.weight), len(phase.weight)) < 5
     # A missing term of the law of motion, or a tone, is not a random walk.
-    if few or not (_may_walk(amplitude) and _may_walk(phase)):
+    if few or not (amplitude.may_walk and phase.may_walk):
         return None
     p_value = max(amplitude.chance, phase.chance) ** 2
-    both = Shapes(
-        np.append(amplitude.weight, phase.weight), np.append(amplitude.square, phase.square)
-    )
-    size, sd, gain = _likelihood(both)
+    both = Shapes(*(np.append(*pair) for pair in zip(amplitude, phase, strict=True)))
+    size, sd, gain = both.walk()
     # What a law lacks changes amplitude and phase too, and more smoothly than kicks do.
-    margin = gain - _likelihood(both.smoother)[2]
-    less = min(_likelihood(amplitude)[2], _likelihood(phase)[2])
-    gain = min(gain, _LARGEST_IMBALANCE * less) if p_value < _SUSPECT else 0.0
-    found = _described(data, fit, p_value, size / per_kick, sd / per_kick, gain)
-    return replace(found, margin=margin)
+    margin = gain - both.walk(power=2)[2]
+    less = min(amplitude.walk()[2], phase.walk()[2])
+    omega, density = sampled.motion.angular_frequency, size / per_kick
+    linear = max(fit.model.pendulum(fit.value).linear, 1e-12)
+    floor = math.sqrt(density / (8.0 * omega**2 * linear))
+    unit = f"({data.unit}/s^2)^2/Hz"
+    return Finding(
+        "broadband-drive",
+        p_value,
+        min(gain, _LARGEST_IMBALANCE * less) if p_value < _SUSPECT else 0.0,
+        {"acceleration_density": Estimate(density, sd / per_kick, unit)},
+        evidence.everywhere(frequency_hz=(omega / (2.0 * math.pi),)),
+        summary="amplitude and phase fluctuate as under a random torque"
+        f" ({density:.2g} {unit}; it would sustain {floor:.2g}{after_number(data.unit)} rms)",
+        margin=margin,
+    )
 
 
-def _fluctuations(data: Data, fit: Fit, noise: Noise) -> tuple[Shapes, Shapes, float]:
+def _fluctuations(evidence: Evidence) -> tuple[Shapes, Shapes, float]:
     """Return the shapes in amplitude and in phase, and the variance of a kick for S_a = 1."""
+    data, whole = evidence.data, evidence.fit
     edges = np.linspace(data.time_s[0], data.time_s[-1], _KICKS + 1)
-    residual = np.append(noise.whiten(residual_of(data, fit)), fit.residual[-1])
-    blocks = blocks_of(fit, noise)
+    residual = np.append(evidence.noise.whiten(evidence.residual), whole.residual[-1])
+    blocks = blocks_of(whole, evidence.noise)
     fit, noise, residual = blocks.fit, blocks.noise, blocks.numbers_of(residual)
     sampled = fit.at.sampled
     time = sampled.time_s
@@ -199,71 +231,18 @@ def _fluctuations(data: Data, fit: Fit, noise: Noise) -> tuple[Shapes, Shapes, f
     grown = there * np.interp(instants, time, growth)
     basis = tangent_basis(fit)
     residual -= basis @ (basis.T @ residual)
-    quadratures = (
-        (sampled.amplitude * sampled.cosine * growth, grown),
-        (sampled.amplitude * sampled.sine, there),
-    )
+    # A kick's random steps are spread over its window.
+    after = np.clip((time[:, None] - edges[:-1]) / spacing, 0.0, 1.0)
 
-    def columns(quadrature: FloatArray, scale: FloatArray) -> Iterator[FloatArray]:
-        for edge, size in zip(edges[:-1], scale, strict=True):
-            # A kick's random steps are spread over its window.
-            after = np.clip((time - edge) / spacing, 0.0, 1.0)
-            # The last entry is the prior's.
-            yield np.append(noise.whiten(after * quadrature / size), 0.0)
+    def shapes(quadrature: FloatArray, scale: FloatArray) -> Shapes:
+        # The last entry is the prior's.
+        columns = np.pad(noise.whiten(after * quadrature[:, None] / scale), ((0, 1), (0, 0)))
+        columns -= basis @ (basis.T @ columns)
+        weight, vectors = np.linalg.eigh(columns.T @ columns)
+        keep = weight > _SMALLEST_EIGENVALUE * weight[-1]
+        weight, vectors = weight[keep][::-1], vectors[:, keep][:, ::-1]
+        return Shapes(weight, (vectors.T @ (columns.T @ residual)) ** 2 / weight)
 
-    amplitude, phase = (
-        _shapes(np.stack([*columns(*pair)], axis=1), basis, residual) for pair in quadratures
-    )
+    amplitude = shapes(sampled.amplitude * sampled.cosine * growth, grown)
+    phase = shapes(sampled.amplitude * sampled.sine, there)
     return amplitude, phase, spacing / (4.0 * sampled.motion.angular_frequency**2)
-
-
-def _shapes(columns: FloatArray, basis: FloatArray, residual: FloatArray) -> Shapes:
-    columns = columns - basis @ (basis.T @ columns)
-    weight, vectors = np.linalg.eigh(columns.T @ columns)
-    keep = weight > _SMALLEST_EIGENVALUE * weight[-1]
-    weight, vectors = weight[keep][::-1], vectors[:, keep][:, ::-1]
-    return Shapes(weight, (vectors.T @ (columns.T @ residual)) ** 2 / weight)
-
-
-def _likelihood(shapes: Shapes) -> tuple[float, float, float]:
-    """Return the variance of a kick, its error, and twice the gain in log-likelihood."""
-    sizes = np.append(0.0, _SIZES) / shapes.weight.max()
-    variance = 1.0 + sizes[:, None] * shapes.weight
-    # -2 ln L.
-    twice = np.sum(np.log(variance) + shapes.square / variance, axis=1)
-    best = int(np.argmin(twice))
-    size = float(sizes[best])
-    relative = shapes.weight / (1.0 + size * shapes.weight)
-    return size, math.sqrt(2.0 / float(relative @ relative)), float(twice[0] - twice[best])
-
-
-def _may_walk(shapes: Shapes) -> bool:
-    """Whether it may be a random walk: no smoother than one, and of one strength at all scales."""
-    if _likelihood(shapes.smoother)[2] > _likelihood(shapes)[2] + _SMOOTH_GAIN:
-        return False
-    half = len(shapes.weight) // 2
-    slow, slow_sd, slow_gain = _likelihood(Shapes(shapes.weight[:half], shapes.square[:half]))
-    fast, fast_sd, fast_gain = _likelihood(Shapes(shapes.weight[half:], shapes.square[half:]))
-    if min(slow_gain, fast_gain) < _SMOOTH_GAIN:
-        return True
-    sd = math.hypot(slow_sd / slow, fast_sd / fast)
-    return abs(math.log(slow / fast)) < math.log(_LARGEST_RATIO) + 3.0 * sd
-
-
-def _described(
-    data: Data, fit: Fit, p_value: float, best: float, sd: float, gain: float
-) -> Finding:
-    sampled = fit.at.sampled
-    omega = sampled.motion.angular_frequency
-    pendulum = fit.model.pendulum(fit.value)
-    linear = max(pendulum.linear, 1e-12)
-    floor = math.sqrt(best / (8.0 * omega**2 * linear))
-    return Finding(
-        "broadband-drive",
-        p_value,
-        gain,
-        {"acceleration_density": Estimate(best, sd, f"({data.unit}/s^2)^2/Hz")},
-        Location.over(data.time_s, sampled.amplitude, frequency_hz=(omega / (2.0 * math.pi),)),
-        summary="amplitude and phase fluctuate as under a random torque"
-        f" ({best:.2g} (rad/s^2)^2/Hz; it would sustain {floor:.2g}{after_number(data.unit)} rms)",
-    )

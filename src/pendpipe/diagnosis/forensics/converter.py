@@ -9,12 +9,9 @@ import numpy as np
 from scipy.fft import irfft, rfft
 from scipy.special import gammaincc, log_ndtr, ndtr, xlogy
 
-from pendpipe.analysis.turning_points.measure import Samples
-from pendpipe.arrays import BoolArray, FloatArray, IntArray
-from pendpipe.diagnosis.data import Data
+from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.forensics.codes import (
     Coded,
-    Lattice,
     Raw,
     lattice_of,
     noise_before_rounding,
@@ -23,13 +20,12 @@ from pendpipe.diagnosis.forensics.codes import (
 )
 from pendpipe.diagnosis.forensics.local import local_residual
 from pendpipe.diagnosis.forensics.tails import upper_tail
-from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.result import Finding, Location
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number
 
 if TYPE_CHECKING:
-    from pendpipe.diagnosis.refine import Fit
+    from pendpipe.diagnosis.forensics.evidence import Evidence
 
 _FEWEST_AT_END: Final = 2
 """Readings exactly at the end of the range that make a flat top."""
@@ -63,7 +59,7 @@ class End(NamedTuple):
     delta_chi2: float
 
 
-def find_clipping(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
+def find_clipping(evidence: Evidence) -> Finding | None:
     """Test whether the largest (smallest) reading is smaller than the motion's.
 
     With the true angles x_j from the rest of each window (without readings at the end), the
@@ -74,17 +70,48 @@ def find_clipping(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Findi
     the distribution of the largest reading. It is tested only if two readings or more are
     equal, as at the end of a converter's range.
     """
+    data, samples = evidence.data, evidence.samples
     if data.time_noise or samples.counts or data.used < 60:
         return None
-    raw = raw_readings(data, fit, samples)
+    raw = raw_readings(evidence)
     lattice = lattice_of(raw.values, samples)
     step = lattice.step if lattice is not None else 0.0
-    ends = [_end(raw, step, side, noise.memory) for side in _SIGN]
-    p_value = -math.expm1(2.0 * math.log1p(-min(min(end.p_value for end in ends), 1.0 - 1e-12)))
-    clipped = [end for end in ends if end.p_value < _MASK_BELOW]
-    if not clipped:
+    both = [_end(raw, step, side, evidence.noise.memory) for side in _SIGN]
+    p_value = -math.expm1(2.0 * math.log1p(-min(min(end.p_value for end in both), 1.0 - 1e-12)))
+    ends = [end for end in both if end.p_value < _MASK_BELOW]
+    if not ends:
         return Finding("clipping", p_value, summary="the largest readings agree with the motion")
-    return _described_ends(data, fit, samples, lattice, clipped, p_value)
+    values, codes = samples.values[data.rows], ()
+    clipped = np.zeros(values.shape, dtype=bool)
+    slack = 0.5 * step if step else 1e-9 * abs(ends[0].limit)
+    for end in ends:
+        clipped |= _SIGN[end.side] * (values - end.limit) >= -slack
+    if lattice is not None:
+        at = lattice.position(np.array([end.limit for end in ends]))
+        codes = tuple(np.rint(at).astype(int).tolist())
+    number, mask = int(np.count_nonzero(clipped)), np.asarray(clipped.any(axis=1))
+    sd, when = step / math.sqrt(12.0), data.time_s[mask]
+    parameters = {f"{end.side}_level": Estimate(end.limit, sd, data.unit) for end in ends}
+    parameters["number"] = Estimate(float(number), 0.0, "")
+    sides = " and ".join(end.side for end in ends)
+    limits = " and ".join(f"{end.limit:.5g}" for end in ends)
+    around = {"upper": 0.0, "lower": math.pi}[ends[0].side]
+    phase = (around - 0.2) % (2.0 * math.pi), (around + 0.2) % (2.0 * math.pi)
+    return Finding(
+        "clipping",
+        p_value,
+        sum(end.delta_chi2 for end in ends),
+        parameters,
+        Location.over(
+            when,
+            evidence.sampled.amplitude[mask],
+            phase if len(ends) == 1 else None,
+            adc_codes=codes,
+        ),
+        mask=mask,
+        summary=f"{number} readings lie at the {sides} end of the range ({limits}"
+        f"{after_number(data.unit)}), which the motion exceeds, until {when[-1]:.4g} s",
+    )
 
 
 def _end(raw: Raw, step: float, side: Side, memory: float) -> End:
@@ -109,98 +136,7 @@ def _end(raw: Raw, step: float, side: Side, memory: float) -> End:
     return End(side, sign * limit, p_value, float(beyond @ beyond))
 
 
-def _clipped(data: Data, samples: Samples, ends: list[End], step: float) -> tuple[int, BoolArray]:
-    """Return how many samples are at the ends, and which readings contain some; shape (n,)."""
-    values = samples.values[data.rows]
-    clipped = np.zeros(values.shape, dtype=bool)
-    slack = 0.5 * step if step else 1e-9 * abs(ends[0].limit)
-    for end in ends:
-        clipped |= _SIGN[end.side] * (values - end.limit) >= -slack
-    return int(np.count_nonzero(clipped)), np.asarray(clipped.any(axis=1))
-
-
-def _described_ends(
-    data: Data,
-    fit: Fit,
-    samples: Samples,
-    lattice: Lattice | None,
-    ends: list[End],
-    p_value: float,
-) -> Finding:
-    step, limits_at = 0.0, np.array([end.limit for end in ends])
-    codes: tuple[int, ...] = ()
-    if lattice is not None:
-        step, codes = lattice.step, tuple(np.rint(lattice.position(limits_at)).astype(int).tolist())
-    number, mask = _clipped(data, samples, ends, step)
-    sd = step / math.sqrt(12.0)
-    parameters = {f"{end.side}_level": Estimate(end.limit, sd, data.unit) for end in ends}
-    parameters["number"] = Estimate(float(number), 0.0, "")
-    when = data.time_s[mask]
-    sides = " and ".join(end.side for end in ends)
-    limits = " and ".join(f"{end.limit:.5g}" for end in ends)
-    around = {"upper": 0.0, "lower": math.pi}[ends[0].side]
-    phase = (around - 0.2) % (2.0 * math.pi), (around + 0.2) % (2.0 * math.pi)
-    return Finding(
-        "clipping",
-        p_value,
-        sum(end.delta_chi2 for end in ends),
-        parameters,
-        Location.over(
-            when,
-            fit.at.sampled.amplitude[mask],
-            phase if len(ends) == 1 else None,
-            adc_codes=codes,
-        ),
-        mask=mask,
-        summary=f"{number} readings lie at the {sides} end of the range ({limits}"
-        f"{after_number(data.unit)}), which the motion exceeds, until {when[-1]:.4g} s",
-    )
-
-
-class Counts(NamedTuple):
-    """Numbers of readings of some codes, or of codes that are equal modulo a number; shape (k,).
-
-    Parameters
-    ----------
-    code
-        Each code, or residue.
-    found, expected
-        Observed and expected numbers.
-    chance
-        Probability of as few; 1 where too few are expected to tell.
-    """
-
-    code: IntArray
-    found: FloatArray
-    expected: FloatArray
-    chance: FloatArray
-
-    @classmethod
-    def of(cls, code: IntArray, readings: IntArray, expected: FloatArray) -> Counts:
-        """Count the readings of each code, and compare with the expectations.
-
-        `readings` are places in `code`; `expected` has the shape (errors, k), its middle row
-        without error. The p-values are those of Poisson distributions, P(N <= found) at the
-        smallest expectation.
-        """
-        found = np.bincount(readings, minlength=len(code)).astype(np.float64)
-        least = expected.min(axis=0)
-        chance = np.where(least > _FEWEST_EXPECTED, gammaincc(found + 1.0, least), 1.0)
-        return cls(code, found, expected[len(expected) // 2], chance)
-
-    def chosen(self, which: BoolArray | slice) -> Counts:
-        """Return some of them."""
-        chosen = self.found[which], self.expected[which], self.chance[which]
-        return Counts(self.code[which], *chosen)
-
-    @property
-    def gain(self) -> float:
-        """Twice the gain in log-likelihood (Poisson)."""
-        likely = xlogy(self.found, self.found / self.expected)
-        return 2.0 * float(np.sum(likely - self.found + self.expected))
-
-
-def find_missing_codes(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
+def find_missing_codes(evidence: Evidence) -> Finding | None:
     """Compare how often each code occurs with what motion and noise predict.
 
     Each number is tested against a Poisson distribution (readings scatter less, so the p-value is
@@ -208,38 +144,38 @@ def find_missing_codes(data: Data, fit: Fit, noise: Noise, samples: Samples) -> 
     Codes that are equal modulo a power of two are tested together, and single ones; the p-value
     counts all of them.
     """
-    coded = None if data.time_noise else read_codes(data, fit, samples)
+    coded = read_codes(evidence)
     if coded is None or len(coded.code) < 100 or np.ptp(coded.code) < 2:
         return None
     comb = worst_comb(coded.code, _expectations(coded))
     if comb.p_value > 0.01:
         return Finding("missing-codes", comb.p_value, summary="codes occur as often as expected")
-    counts, codes, readings = comb.counts, comb.codes, len(coded.code)
-    found, expected = float(counts.found.sum()), float(counts.expected.sum())
-    missing, sd = expected - found, math.sqrt(max(expected, 1.0))
+    codes, readings = comb.codes, len(coded.code)
+    missing, sd = comb.expected - comb.found, math.sqrt(max(comb.expected, 1.0))
     parameters = {
         "share": Estimate(missing / readings, sd / readings, ""),
         "number": Estimate(float(comb.number), 0.0, ""),
-        "found": Estimate(found, math.sqrt(max(found, 1.0)), ""),
-        "expected": Estimate(expected, 0.0, ""),
+        "found": Estimate(comb.found, math.sqrt(max(comb.found, 1.0)), ""),
+        "expected": Estimate(comb.expected, 0.0, ""),
     }
     named = ", ".join(map(str, codes[:5])) + (", ..." if comb.number > 5 else "")
     lead = ""
     if comb.period:
         parameters["period"] = Estimate(float(comb.period), 0.0, "")
-        lead = f"{len(counts.code)} in every {comb.period} codes: "
-        if 2 * len(counts.code) == comb.period:
+        lead = f"{comb.residues} in every {comb.period} codes: "
+        if 2 * comb.residues == comb.period:
             bit = comb.period.bit_length() - 2
             parameters["bit"] = Estimate(float(bit), 0.0, "")
             lead = f"bit {bit} of the converter is stuck or unreliable, or its steps are unequal: "
     return Finding(
         "missing-codes",
         comb.p_value,
-        counts.gain,
+        comb.gain,
         parameters,
         Location(adc_codes=tuple(int(code) for code in codes)),
-        summary=f"{lead}{comb.number} code(s) ({named}, in steps of {coded.lattice.step:.4g}"
-        f"{after_number(data.unit)}) occurred {found:.0f} times where {expected:.0f} were expected",
+        summary=f"{lead}{comb.number} code(s) ({named}, in steps of {coded.step:.4g}"
+        f"{after_number(evidence.data.unit)}) occurred {comb.found:.0f} times where"
+        f" {comb.expected:.0f} were expected",
     )
 
 
@@ -296,18 +232,25 @@ class Comb(NamedTuple):
     ----------
     period
         The power of two modulo which they are equal; 0 for single codes.
+    residues
+        How many different ones there are modulo it.
     number, codes
         How many they are, and the first of them.
-    counts
-        How often those of each residue occur.
+    found, expected
+        Observed and expected readings of all of them.
+    gain
+        Twice the gain in log-likelihood (Poisson).
     p_value
         With all periods, residues and codes that were tested.
     """
 
     period: int
+    residues: int
     number: int
     codes: IntArray
-    counts: Counts
+    found: float
+    expected: float
+    gain: float
     p_value: float
 
 
@@ -334,26 +277,34 @@ def worst_comb(code: IntArray, expected: FloatArray) -> Comb:
     tables = []
     for period in (*periods, *([modulus] if number <= modulus else [])):
         rows = expected.reshape(len(expected), -1, period).sum(axis=1)
-        counts = Counts.of(np.arange(period), inside % period, rows)
-        tried += int(np.count_nonzero(np.min(rows, axis=0) > _FEWEST_EXPECTED))
-        tables.append((period, counts, float(counts.chance.min())))
-    period, counts, worst = min(tables, key=lambda table: table[2])
-    seldom = counts.chosen(counts.chance <= max(_SIGNIFICANT / period, worst))
+        least = rows.min(axis=0)
+        found = np.bincount(inside % period, minlength=period).astype(np.float64)
+        # P(N <= found) of a Poisson distribution; 1 where too few are expected to tell.
+        chance = np.where(least > _FEWEST_EXPECTED, gammaincc(found + 1.0, least), 1.0)
+        tried += int(np.count_nonzero(least > _FEWEST_EXPECTED))
+        tables.append((period, chance, found, rows[len(rows) // 2]))
+    period, chance, found, usual = min(tables, key=lambda table: float(table[1].min()))
+    worst = float(chance.min())
+    seldom = np.flatnonzero(chance <= max(_SIGNIFICANT / period, worst))
+    found, usual = found[seldom], usual[seldom]
     # The first code of each residue, and those a period apart from it.
-    start = first + (seldom.code - first) % period
+    start = first + (seldom - first) % period
     start = start[start <= last]
     many = int(np.sum((last - start) // period + 1))
     codes = np.sort((start + period * np.arange(_MOST_LISTED)[:, None]).ravel())
     return Comb(
         period if period in periods else 0,
+        len(seldom),
         many,
         codes[codes <= last][:_MOST_LISTED],
-        seldom,
+        float(found.sum()),
+        float(usual.sum()),
+        2.0 * float(np.sum(xlogy(found, found / usual) - found + usual)),
         min(1.0, tried * worst),
     )
 
 
-def find_coarse_steps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
+def find_coarse_steps(evidence: Evidence) -> Finding | None:
     """Test whether the errors depend on the angle's position between two codes.
 
     Rounding an angle x with noise s to steps q shifts the mean reading by
@@ -365,18 +316,18 @@ def find_coarse_steps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> F
     errors are pseudo-random and do no harm: a property of the record.
 
     """
-    if samples.promised_step is not None:
-        return None
-    coded = None if data.time_noise else read_codes(data, fit, samples)
+    data = evidence.data
+    coded = None if evidence.samples.promised_step is not None else read_codes(evidence)
     if coded is None or len(coded.code) < 60:
         return None
     wave = -np.sin(2.0 * math.pi * coded.position)
     wave = wave - wave.mean()
-    error = coded.error - coded.error.mean()
+    error = coded.code - coded.position
+    error = error - error.mean()
     size = float(wave @ error) / float(wave @ wave)
     sd = math.sqrt(float(np.mean(error**2)) / float(wave @ wave))
     allowed = math.exp(-2.0 * (math.pi * _HARMLESS_NOISE) ** 2) / math.pi
-    step, end = coded.lattice.step, float(fit.at.sampled.amplitude[-1])
+    step, end = coded.step, float(evidence.sampled.amplitude[-1])
     return Finding(
         "coarse-quantisation",
         upper_tail((size - allowed) / sd),
@@ -386,7 +337,7 @@ def find_coarse_steps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> F
             "noise_over_step": Estimate(coded.ratio, 0.2 * coded.ratio, ""),
             "bias_over_step": Estimate(size, sd, ""),
         },
-        Location.over(data.time_s, fit.at.sampled.amplitude),
+        evidence.everywhere(),
         summary=f"the step of {step:.3g}{after_number(data.unit)} is {1.0 / coded.ratio:.2g} times"
         " the noise, so that errors depend on the codes; the final amplitude is"
         f" {end / step:.2g} steps",
@@ -394,7 +345,7 @@ def find_coarse_steps(data: Data, fit: Fit, noise: Noise, samples: Samples) -> F
     )
 
 
-def find_dead_bits(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
+def find_dead_bits(evidence: Evidence) -> Finding | None:
     """Report codes that all lie on a coarser lattice; by chance each would with 1/times.
 
     The converter's lowest bits are dead, or an earlier stage has a coarser step.
@@ -403,6 +354,7 @@ def find_dead_bits(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
     that each reading contributes ln(times) to the log-likelihood. The lattice's origin is
     estimated from the codes, and so is its spacing if that is not a whole number.
     """
+    data, samples = evidence.data, evidence.samples
     step, promised = samples.step, samples.promised_step
     if step is None or promised is None:
         return None
@@ -424,7 +376,7 @@ def find_dead_bits(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
         times**-free,
         2.0 * data.used * math.log(times),
         parameters,
-        Location.over(data.time_s, fit.at.sampled.amplitude),
+        evidence.everywhere(),
         summary=f"only one code in {times:.0f} occurs: {steps}"
         if whole
         else f"the codes that occur are {times:.4g} apart, rounded to whole ones: {steps}",

@@ -9,20 +9,17 @@ third harmonic where these are significant).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from itertools import combinations_with_replacement
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from scipy.fft import dct, idct
 
+from pendpipe.analysis.demodulation import cycle_starts, harmonic_columns, normal_equations
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
-from pendpipe.diagnosis.unwrapped import unwrapped
 
 if TYPE_CHECKING:
-    from pendpipe.diagnosis.data import Data
     from pendpipe.diagnosis.noise import Noise
-    from pendpipe.diagnosis.refine import Fit
 
 _WINDOW_CYCLES: Final = 2
 _WINDOW_READINGS: Final = 40
@@ -80,21 +77,6 @@ class Local:
         return self.left / self.spread
 
 
-def residual_of(data: Data, fit: Fit) -> FloatArray:
-    """Return readings minus model, along the motion if out of phase; 0 where masked."""
-    return np.asarray(unwrapped(data, fit.at)[0] * (data.weight > 0.0))
-
-
-def error_of(data: Data, fit: Fit) -> FloatArray:
-    """Return readings minus the motion, rounding errors included; 0 where masked.
-
-    The tests of codes and tails treat rounding errors themselves. Subtracting their mean first
-    (`Data.residual`) would move a reading beyond a code's edge by a whole step, and the motion to
-    the middle of the code.
-    """
-    return residual_of(replace(data, lattice=None), fit)
-
-
 def whitened_in_time(residual: FloatArray, noise: Noise) -> FloatArray:
     """Return S^-1 r in units of its standard deviation, for noise of any colour.
 
@@ -148,65 +130,51 @@ def local_residual(
         Readings that may not take part in the fits, shape (n,).
     """
     part = used if leave_out is None else used & ~leave_out
-    window, far = _windows(phase), np.zeros(len(phase), dtype=bool)
+    starts, far = _window_starts(phase), np.zeros(len(phase), dtype=bool)
     for harmonics in (1, 3):
-        columns = _columns(phase, window, harmonics)
-        local = _fitted(columns, window, values, part & ~far, used)
+        columns = _columns(phase, starts, harmonics)
+        local = _fitted(columns, starts, values, part & ~far, used)
         again = np.abs(local.scaled) > _OUTLIER_SD
         if np.any(again != far):
-            far, local = again, _fitted(columns, window, values, part & ~again, used)
-        if harmonics > 1 or not _has_harmonics(phase, window, local, part & ~far):
+            far, local = again, _fitted(columns, starts, values, part & ~again, used)
+        if harmonics > 1 or not _has_harmonics(phase, starts, local, part & ~far):
             break
     return local
 
 
-def _windows(phase: FloatArray) -> IntArray:
-    """Return each reading's window: whole cycles, with enough readings."""
+def _window_starts(phase: FloatArray) -> IntArray:
+    """Return the first reading of each window: whole cycles, with enough readings."""
     turns = (phase[-1] - phase[0]) / (2.0 * math.pi)
     cycles = max(_WINDOW_CYCLES, math.ceil(_WINDOW_READINGS * turns / len(phase)))
-    number = np.floor((phase - phase[0]) / (2.0 * math.pi * cycles)).astype(np.int64)
     # An incomplete window at the end joins the one before.
-    last = max(int(turns / cycles + 0.25), 1) - 1
-    return np.asarray(np.minimum(number, last))
+    return cycle_starts(phase, cycles)[: max(int(turns / cycles + 0.25), 1)]
 
 
-def _columns(phase: FloatArray, window: IntArray, harmonics: int) -> FloatArray:
-    """Return the smooth functions: offset, fundamental and its slope, harmonics; shape (p, n)."""
-    starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
-    ends = np.append(starts[1:], len(phase)) - 1
-    middle = 0.5 * (phase[starts] + phase[ends])
-    half = np.maximum(0.5 * (phase[ends] - phase[starts]), 1e-9)
-    along = (phase - middle[window]) / half[window]
-    cosine, sine = np.cos(phase), np.sin(phase)
-    parts = [np.ones(len(phase)), cosine, sine, along * cosine, along * sine]
-    for harmonic in range(2, harmonics + 1):
-        parts += [np.cos(harmonic * phase), np.sin(harmonic * phase)]
-    return np.stack(parts)
+def _columns(phase: FloatArray, starts: IntArray, harmonics: int) -> FloatArray:
+    """Return the smooth functions: offset, harmonics, the fundamental's slope; shape (p, n)."""
+    lengths = np.diff(starts, append=len(phase))
+    first, last = phase[starts], phase[starts + lengths - 1]
+    half = np.maximum(0.5 * (last - first), 1e-9)
+    along = (phase - np.repeat(0.5 * (first + last), lengths)) / np.repeat(half, lengths)
+    waves = harmonic_columns(phase, harmonics)
+    return np.concatenate([waves, along * waves[1:3]])
 
 
 def _fitted(
-    columns: FloatArray, window: IntArray, values: FloatArray, part: BoolArray, used: BoolArray
+    columns: FloatArray, starts: IntArray, values: FloatArray, part: BoolArray, used: BoolArray
 ) -> Local:
     """Least squares in every window at once."""
-    starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
-    lengths = np.diff(starts, append=len(window))
-    kept, size = columns * part, len(columns)
-    matrix = np.empty((len(starts), size, size))
-    # A pair of columns at a time: all products of all readings would take gigabytes.
-    for i, j in combinations_with_replacement(range(size), 2):
-        matrix[:, i, j] = matrix[:, j, i] = np.add.reduceat(kept[i] * columns[j], starts)
+    lengths = np.diff(starts, append=len(values))
+    gram, right = normal_equations(columns * part, values, starts)
     # Regularised for windows with few readings.
-    matrix += 1e-9 * np.eye(size) * np.maximum(matrix[:, :1, :1], 1.0)
-    right = np.add.reduceat(kept * values, starts, axis=1).T
-    inverse = np.linalg.inv(matrix)
+    gram += 1e-9 * np.eye(len(columns)) * np.maximum(gram[:, :1, :1], 1.0)
+    inverse = np.linalg.inv(gram)
     solved = (inverse @ right[..., None])[..., 0]
     left, hat = values.astype(np.float64), np.zeros(len(values))
-    for i in range(size):
-        left -= columns[i] * np.repeat(solved[:, i], lengths)
-        turned = np.zeros(len(values))
-        for j in range(size):
-            turned += np.repeat(inverse[:, i, j], lengths) * columns[j]
-        hat += turned * columns[i]
+    for i, column in enumerate(columns):
+        left -= column * np.repeat(solved[:, i], lengths)
+        turned = np.repeat(inverse[:, i], lengths, axis=0)
+        hat += column * np.einsum("np,pn->n", turned, columns)
     left *= used
     leverage = np.where(part, -np.minimum(hat, 1.0), np.minimum(hat, 10.0))
     freedom = max(float(np.sum(1.0 + leverage[part])), 1.0)
@@ -225,13 +193,10 @@ def _rms(left: FloatArray, freedom: float) -> float:
     return max(rms, 1e-300)
 
 
-def _has_harmonics(phase: FloatArray, window: IntArray, local: Local, part: BoolArray) -> bool:
+def _has_harmonics(phase: FloatArray, starts: IntArray, local: Local, part: BoolArray) -> bool:
     """Whether windows contain more of the second or third harmonic than noise would."""
-    starts = np.searchsorted(window, np.arange(int(window[-1]) + 1))
-    waves = [wave(order * phase) for order in (2, 3) for wave in (np.cos, np.sin)]
-    kept = np.array(waves) * part
-    norm = np.add.reduceat(kept * kept, starts, axis=1)
-    size = np.add.reduceat(kept * local.left, starts, axis=1)
-    power = np.minimum(size[norm > 4.0] ** 2 / norm[norm > 4.0] / local.rms**2, 50.0)
+    gram, right = normal_equations(harmonic_columns(phase, 3)[3:] * part, local.left, starts)
+    norm = np.einsum("kpp->kp", gram)
+    power = np.minimum(right[norm > 4.0] ** 2 / norm[norm > 4.0] / local.rms**2, 50.0)
     chance = len(power) + _HARMONICS_SD * math.sqrt(2.0 * max(len(power), 1))
     return float(power.sum()) > chance

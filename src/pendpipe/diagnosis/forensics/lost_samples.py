@@ -13,8 +13,8 @@ from scipy.special import stdtr
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.slips import beside
-from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Confirmation, Finding, Location
 from pendpipe.diagnosis.unwrapped import alignment
@@ -61,8 +61,9 @@ class LostSamples(NamedTuple):
     measured: float
 
 
-def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
+def find(evidence: Evidence) -> Finding | None:
     """Give the readings after lost samples the times at which they were taken."""
+    data, fit = evidence.data, evidence.fit
     interval, lost = data.interval_s / data.fold, find_lost_samples(data, fit)
     if not lost:
         return None

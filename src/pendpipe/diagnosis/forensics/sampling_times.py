@@ -7,19 +7,16 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.codes import read_codes
-from pendpipe.diagnosis.forensics.local import local_residual, residual_of, whitened_series
+from pendpipe.diagnosis.forensics.local import whitened_series
 from pendpipe.diagnosis.forensics.tails import tail_of_squares, upper_tail
-from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.result import Finding, Location
+from pendpipe.diagnosis.result import Finding
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import with_error
 
 if TYPE_CHECKING:
-    from pendpipe.diagnosis.refine import Fit
+    from pendpipe.diagnosis.forensics.evidence import Evidence
 
 _LARGEST_DEVIATION: Final = 0.25
 """Largest deviation from a regular clock, in intervals."""
@@ -36,6 +33,8 @@ _AGREE_SD: Final = 2.6
 _RULED: Final = 0.1
 """Noise before rounding, in steps, below which rounding rules the errors."""
 _ROUNDS: Final = 6
+_FAST: Final = 0.25 * math.pi, 0.75 * math.pi
+"""Phases at which the motion is fast."""
 
 
 def gap_note(time_s: FloatArray, half_period_s: float, counts: bool) -> str | None:
@@ -67,7 +66,7 @@ def gap_note(time_s: FloatArray, half_period_s: float, counts: bool) -> str | No
     return f"{note} (an encoder that writes its counts is silent at rest)" if counts else note
 
 
-def find_irregular(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
+def find_irregular(evidence: Evidence) -> Finding | None:
     """Test whether the readings were taken more regularly than their time stamps say.
 
     Time stamps that are rounded or written late differ by d_j from a regular clock. If the
@@ -77,14 +76,14 @@ def find_irregular(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
 
     with k = 1 for wrong time stamps and 0 for true ones.
     """
+    data, sampled = evidence.data, evidence.sampled
     clock = None if data.time_noise else regular_clock(data.time_s)
     if clock is None or data.used < 60:
         return None
     even_s, interval_s = clock
     off_s = data.time_s - even_s
-    sampled, used = fit.at.sampled, data.weight > 0.0
-    local = local_residual(sampled.phase, residual_of(data, fit), used)
-    wave = local_residual(sampled.phase, -sampled.velocity * off_s, used).left
+    local = evidence.local(evidence.residual)
+    wave = evidence.local(-sampled.velocity * off_s).left
     size = float(wave @ wave)
     if size <= 1e-6 * local.rms**2:
         return None
@@ -99,7 +98,7 @@ def find_irregular(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Find
             "unevenness": Estimate(rms, rms / math.sqrt(2.0 * len(data)), "s"),
             "interval": Estimate(interval_s, rms / len(data), "s"),
         },
-        Location.over(data.time_s, sampled.amplitude, (0.25 * math.pi, 0.75 * math.pi)),
+        evidence.everywhere(_FAST),
         time_s=even_s,
         summary=f"the time stamps are irregular by {rms:.2g} s and the readings are not: they were"
         f" taken every {interval_s:.6g} s",
@@ -152,7 +151,7 @@ class Squares(NamedTuple):
     shared: float
 
 
-def find_jitter(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
+def find_jitter(evidence: Evidence) -> Finding | None:
     """Test whether the noise's variance is sigma^2 + sigma_t^2 v^2.
 
     The score for sigma_t^2 at zero is a sum of squared errors, weighted by v^2 minus its mean; its
@@ -161,28 +160,46 @@ def find_jitter(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding
     frequency must agree with the whole, or it alone counts: noise that decays with the amplitude is
     not jitter.
     """
+    data = evidence.data
     if data.time_noise or data.used < 60:
         return None
-    coded = read_codes(data, fit, samples)
-    squares = _squares(data, fit, noise)
+    coded, squares = read_codes(evidence), _squares(evidence)
     ruled = coded is not None and coded.ratio < _RULED
     if ruled or squares is None or len(squares.square) < 50:
         return None
-    p_value = _p_value(squares, squares.mean + squares.double)
+    speed = squares.mean + squares.double
+    p_value = _p_value(squares, speed)
     # At constant amplitude the mean of v^2 can't be distinguished from the variance of the noise.
     if float(np.std(squares.mean)) > _CONSTANT * float(np.mean(squares.mean)):
-        size, covariance = _fitted(squares, [squares.mean, squares.double])
+        size, covariance = _fitted(squares, squares.mean, squares.double)
         spread = math.sqrt(covariance[1, 1] + covariance[2, 2] - 2.0 * covariance[1, 2])
         if size[2] - size[1] < -_AGREE_SD * spread:
-            p_value = max(p_value, _p_value(squares, squares.double, beside=squares.mean))
-    return _described(data, fit, squares, p_value)
+            p_value = max(p_value, _p_value(squares, squares.double, squares.mean))
+    (base, more), covariance = _fitted(squares, speed)
+    (alone,), _ = _fitted(squares)
+    model, null = np.maximum(1.0 + base + more * speed, 0.1), max(1.0 + alone, 0.1)
+    gain = np.log(null / model) + squares.square * (1.0 / null - 1.0 / model)
+    share, sd = max(float(more), 0.0), math.sqrt(covariance[1, 1])
+    seconds = math.sqrt(share * squares.seconds_squared)
+    # d sigma_t = d(sigma_t^2)/(2 sigma_t); near zero the size of the square root itself.
+    error = 0.5 * sd * math.sqrt(squares.seconds_squared / max(share, 0.25 * sd))
+    omega = evidence.sampled.motion.angular_frequency
+    return Finding(
+        "jitter",
+        p_value,
+        max(float(gain.sum()), 0.0) if share > 0.0 else 0.0,
+        {"sigma_t": Estimate(seconds, error, "s")},
+        evidence.everywhere(_FAST, (omega / math.pi,)),
+        summary="the noise is largest where the motion is fastest, as if the sampling times"
+        f" were uncertain by {with_error(seconds, error, 's')}",
+    )
 
 
-def _squares(data: Data, fit: Fit, noise: Noise) -> Squares | None:
+def _squares(evidence: Evidence) -> Squares | None:
     """Return squares of normal errors; None if a misfit of the motion remains in them."""
-    sampled, used = fit.at.sampled, data.weight > 0.0
-    white, unit = whitened_series(residual_of(data, fit), noise)
-    local = local_residual(sampled.phase, white, used)
+    sampled, used = evidence.sampled, evidence.used
+    white, unit = whitened_series(evidence.residual, evidence.noise)
+    local = evidence.local(white)
     if local.smooth():
         return None
     top = 0.5 * (sampled.motion.angular_frequency * sampled.amplitude[used]) ** 2
@@ -196,12 +213,11 @@ def _squares(data: Data, fit: Fit, noise: Noise) -> Squares | None:
     )
 
 
-def _p_value(squares: Squares, weight: FloatArray, beside: FloatArray | None = None) -> float:
+def _p_value(squares: Squares, weight: FloatArray, *beside: FloatArray) -> float:
     """Return the probability of a weighted sum as large, the variance of the noise unknown."""
     capped = np.minimum(squares.square, _CLIP_SD**2)
     # Project out the variance (and `beside`), by least squares.
-    parts = [np.ones(len(weight)), *([] if beside is None else [beside])]
-    basis = np.stack(parts, axis=1)
+    basis = np.stack([np.ones(len(weight)), *beside], axis=1)
     rest = weight - basis @ np.linalg.lstsq(basis, weight, rcond=None)[0]
     off = capped - capped.mean()
     # Scatter relative to independent squares of normal numbers.
@@ -210,41 +226,12 @@ def _p_value(squares: Squares, weight: FloatArray, beside: FloatArray | None = N
     return tail_of_squares(total + float(rest.sum()), rest)
 
 
-def _fitted(squares: Squares, parts: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
+def _fitted(squares: Squares, *parts: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Fit a constant and parts to the variance; return sizes and their covariance."""
     columns = np.stack([np.ones(len(squares.square)), *parts], axis=1)
-    size = np.zeros(columns.shape[1])
-    matrix: FloatArray = np.eye(columns.shape[1])
-    off = np.minimum(squares.square, 25.0) - 1.0
+    size, off = np.zeros(columns.shape[1]), np.minimum(squares.square, 25.0) - 1.0
     for _ in range(_ROUNDS):
         weight = 0.5 / np.maximum(1.0 + columns @ size, 0.1) ** 2
         matrix = np.asarray(np.linalg.inv(columns.T @ (weight[:, None] * columns)))
         size = matrix @ (columns.T @ (weight * off))
     return size, matrix
-
-
-def _described(data: Data, fit: Fit, squares: Squares, p_value: float) -> Finding:
-    speed = squares.mean + squares.double
-    size, covariance = _fitted(squares, [speed])
-    model, null = (
-        np.maximum(1.0 + more, 0.1)
-        for more in (size[0] + size[1] * speed, _fitted(squares, [])[0][0])
-    )
-    gain = np.log(null / model) + squares.square * (1.0 / null - 1.0 / model)
-    share, sd = max(float(size[1]), 0.0), math.sqrt(covariance[1, 1])
-    seconds = math.sqrt(share * squares.seconds_squared)
-    # d sigma_t = d(sigma_t^2)/(2 sigma_t); near zero the size of the square root itself.
-    error = 0.5 * sd * math.sqrt(squares.seconds_squared / max(share, 0.25 * sd))
-    sampled = fit.at.sampled
-    omega = sampled.motion.angular_frequency
-    return Finding(
-        "jitter",
-        p_value,
-        max(float(gain.sum()), 0.0) if share > 0.0 else 0.0,
-        {"sigma_t": Estimate(seconds, error, "s")},
-        Location.over(
-            data.time_s, sampled.amplitude, (0.25 * math.pi, 0.75 * math.pi), (omega / math.pi,)
-        ),
-        summary="the noise is largest where the motion is fastest, as if the sampling times"
-        f" were uncertain by {with_error(seconds, error, 's')}",
-    )

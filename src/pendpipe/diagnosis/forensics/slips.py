@@ -6,9 +6,11 @@ whatever varies slowly is fitted beside the steps (level, amplitude, phase and h
 cycles), their sizes are free, and that they come out *whole* is the test.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -17,11 +19,13 @@ from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray, scaled_qr
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.tails import upper_tail
-from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Confirmation, Finding, Location
 from pendpipe.effects.model import jacobian
 from pendpipe.estimate import Estimate
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.forensics.evidence import Evidence
 
 _SIGNIFICANT_SD: Final = 7.0
 """Standard deviations from which a step is significant."""
@@ -91,7 +95,7 @@ class Slips(NamedTuple):
         """The instants of the steps."""
         return np.asarray(data.time_s[self.rows] - 0.5 * data.interval_s)
 
-    def joined(self) -> "Slips":
+    def joined(self) -> Slips:
         """Join steps in neighbouring readings: one within a reading, which is a mean, makes two."""
         groups = np.split(np.arange(len(self.rows)), 1 + np.flatnonzero(np.diff(self.rows) > 3))
         first = [group[np.argmax(np.abs(self.sizes[group]))] for group in groups]
@@ -106,39 +110,57 @@ class Slips(NamedTuple):
         return np.cumsum(steps)
 
 
-def whole_steps(data: Data, fit: Fit, unit: FloatArray) -> Slips | None:
-    """Find steps of whole units; None where there are too few.
+def whole_steps(evidence: Evidence, unit: FloatArray) -> Slips | None:
+    """Find steps of whole units; None where there are too few, or only white noise is left.
+
+    Slips that go on and on are as steady as noise, but never white.
 
     Parameters
     ----------
-    data, fit
+    evidence
         The readings, and a model that keeps their phase.
     unit
         What a step of one changes in each reading, rad, shape (n,).
     """
-    whole_left, slow = data.residual(fit.at.reading) * data.weight, _slow(data, fit)
+    data, fit = evidence.data, evidence.fit
+    if fit.chi2 <= _CLEAN * data.used and not evidence.noise.coloured:
+        return None
+    unit, whole_left = unit * data.weight, data.residual(fit.at.reading) * data.weight
+    slow = _slow(data, fit)
     known = slow.shape[1]
     basis = np.empty((len(slow), known + _MOST), order="F")
     basis[:, :known] = slow
     left = whole_left - slow @ (slow.T @ whole_left)
-    whole = _later(unit[:, None] ** 2 * data.weight[:, None])
-    alone = whole - np.sum(_later(unit[:, None] * slow) ** 2, axis=1, keepdims=True)
-    rows: list[int] = []
+    whole = _later(unit**2)
+    alone = whole - np.sum(_later(unit[:, None] * slow) ** 2, axis=1)
+    found: list[int] = []
     for _ in range(_MOST):
-        seen = alone[:, 0] > 1e-6 * whole[0]
-        product = _later((unit * left)[:, None])[:, 0]
-        gain = np.where(seen, product**2 / np.where(seen, alone[:, 0], 1.0), 0.0)
+        seen = alone > 1e-6 * whole[0]
+        gain = np.where(seen, _later(unit * left) ** 2 / np.where(seen, alone, 1.0), 0.0)
         row = int(np.argmax(gain))
         if gain[row] < (2.0 * math.log(len(left)) + _CHOICE) * spread(left) ** 2:
             break
-        rows.append(row)
-        column = _beside(_step(row, unit, data), basis[:, :known])
-        if column is not None:
-            left = left - column * float(column @ left)
-            alone -= _later((unit * column)[:, None]) ** 2
-            basis[:, known] = column
-            known += 1
-    return _whole(whole_left, slow, unit, data, np.sort(np.array(rows, dtype=np.int64)))
+        found.append(row)
+        column = _steps(np.array([row]), unit)[:, 0]
+        # Twice, lest rounding leave a part of what is known.
+        for _ in range(2):
+            column = column - basis[:, :known] @ (basis[:, :known].T @ column)
+        column /= np.linalg.norm(column)
+        left = left - column * float(column @ left)
+        alone -= _later(unit * column) ** 2
+        basis[:, known] = column
+        known += 1
+    rows = np.sort(np.array(found, dtype=np.int64))
+    # All sizes together, beside what varies slowly.
+    while len(rows) >= _FEWEST:
+        columns = _steps(rows, unit)
+        columns -= slow @ (slow.T @ columns)
+        sizes = np.asarray(np.linalg.lstsq(columns, whole_left, rcond=1e-10)[0], dtype=np.float64)
+        kept = np.abs(sizes) > 0.5
+        if kept.all():
+            return Slips(rows, sizes)
+        rows = rows[kept]
+    return None
 
 
 def _later(columns: FloatArray) -> FloatArray:
@@ -172,71 +194,35 @@ def _slow(data: Data, fit: Fit) -> FloatArray:
     return np.asarray(basis @ mixing[:, lengths > 1e-6 * lengths[0]])
 
 
-def _step(row: int, unit: FloatArray, data: Data) -> FloatArray:
-    """Return a step's change of the readings."""
-    return np.where(np.arange(len(unit)) >= row, unit, 0.0) * data.weight
+def _steps(rows: IntArray, unit: FloatArray) -> FloatArray:
+    """Return what steps change in the readings, shape (n, steps)."""
+    return np.where(np.arange(len(unit))[:, None] >= rows, unit[:, None], 0.0)
 
 
-def _beside(column: FloatArray, basis: FloatArray) -> FloatArray | None:
-    """Return what a column has beside a basis, of unit length; None where that is nothing."""
-    length = float(np.linalg.norm(column))
-    for _ in range(2):
-        column = column - basis @ (basis.T @ column)
-    alone = float(np.linalg.norm(column))
-    return None if alone < 1e-6 * length else column / alone
-
-
-def _whole(
-    left: FloatArray, slow: FloatArray, unit: FloatArray, data: Data, rows: IntArray
-) -> Slips | None:
-    """Fit all sizes together, beside what varies slowly."""
-    while len(rows) >= _FEWEST:
-        columns = np.column_stack([_step(row, unit, data) for row in rows.tolist()])
-        columns -= slow @ (slow.T @ columns)
-        sizes = np.asarray(np.linalg.lstsq(columns, left, rcond=1e-10)[0], dtype=np.float64)
-        kept = np.abs(sizes) > 0.5
-        if kept.all():
-            return Slips(rows, sizes)
-        rows = rows[kept]
-    return None
-
-
-def find_counts(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
+def find_counts(evidence: Evidence) -> Finding | None:
     """Test whether an encoder loses counts: steps of any sizes are a wandering level as well."""
-    count = count_of(samples)
-    if not count:
-        return None
-    slips = _whole_steps(data, fit, noise, np.full(len(data), count))
+    data, count = evidence.data, count_of(evidence.samples)
+    slips = whole_steps(evidence, np.full(len(data), count)) if count else None
     if slips is None:
         return None
-    seen = steps_of_the_level(samples, count)
-    finding = _described(data, slips, count, seen)
+    finding = _described(data, slips, count, steps_of_the_level(evidence.samples, count))
     return replace(finding, taken=count * slips.staircase(len(data)))
 
 
-def find_clock(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
+def find_clock(evidence: Evidence) -> Finding | None:
     """Test whether a clock misses samples: steps of any sizes are a wandering clock as well."""
-    interval = data.interval_s / data.fold
+    data, interval = evidence.data, evidence.data.interval_s / evidence.data.fold
     if not data.uniform or data.time_noise:
         return None
-    slips = _whole_steps(data, fit, noise, interval * fit.at.sampled.velocity)
+    slips = whole_steps(evidence, interval * evidence.sampled.velocity)
     slips = slips and slips.joined()
     if slips is None or len(slips.rows) < _FEWEST:
         return None
-    seen = steps_of_the_time(samples, slips.when_s(data), data.fold, fit.at.span.period_s)
+    period_s = evidence.fit.at.span.period_s
+    seen = steps_of_the_time(evidence.samples, slips.when_s(data), data.fold, period_s)
     finding = _described(data, slips, interval, seen, clock=True)
     time_s = data.time_s + interval * slips.staircase(len(data))
     return replace(finding, p_value=seen.p_value if seen else slips.p_value, time_s=time_s)
-
-
-def _whole_steps(data: Data, fit: Fit, noise: Noise, unit: FloatArray) -> Slips | None:
-    """Find steps of whole units, unless only noise is left that slips have no part in.
-
-    Slips that go on and on are as steady as noise, but never white.
-    """
-    if fit.chi2 <= _CLEAN * data.used and not noise.coloured:
-        return None
-    return whole_steps(data, fit, unit)
 
 
 def _described(

@@ -7,9 +7,7 @@ import numpy as np
 
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.result import Confirmation, Finding, Location
 from pendpipe.estimate import Estimate
 
@@ -57,7 +55,7 @@ def wander_confirmed(samples: Samples, along: FloatArray, rows: int) -> Confirma
     )
 
 
-def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None:
+def find(evidence: Evidence) -> Finding | None:
     """Test for a wander that both coordinates show, and correct the angles in proportion.
 
     The p-value is that of the test without the model; ``kappa`` is the change of the angle with
@@ -65,6 +63,7 @@ def find(data: Data, fit: Fit, noise: Noise, samples: Samples) -> Finding | None
     """
     from scipy.ndimage import uniform_filter1d
 
+    data, fit, samples = evidence.data, evidence.fit, evidence.samples
     along, rows = wander(samples), rows_of(samples, fit.at.span.period_s)
     if along is None or not np.any(along) or len(along) < rows:
         return None

@@ -1,0 +1,158 @@
+"""Readings demodulated: least squares in each cycle, or window of cycles, on the motion's phase."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+from typing import Final
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.dynamics.any_law import Sampled
+
+_FEWEST_READINGS: Final = 5
+"""Fewest readings in a cycle for three fitted numbers."""
+_NEIGHBOURS: Final = 9
+"""Cycles over which the median number of readings is taken: an encoder that records its counts
+gives fewer at small amplitudes."""
+_HAIR: Final = 1e-12
+
+
+def harmonic_columns(phase: FloatArray, harmonics: int) -> FloatArray:
+    """Return 1, cos psi, sin psi, cos 2 psi, ...; shape (1 + 2 harmonics, n)."""
+    turned = np.arange(1, harmonics + 1)[:, None] * phase
+    waves = np.stack([np.cos(turned), np.sin(turned)], axis=1).reshape(-1, len(phase))
+    return np.concatenate([np.ones((1, len(phase))), waves])
+
+
+def cycle_starts(phase: FloatArray, cycles: int = 1) -> IntArray:
+    """Return the first reading of each so many cycles, from the first reading's phase on."""
+    number = np.floor((phase - phase[0]) / (2.0 * math.pi * cycles))
+    return np.searchsorted(number, np.arange(int(number[-1]) + 1))
+
+
+def normal_equations(
+    columns: FloatArray, values: FloatArray, starts: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Sum products of columns with each other, and with values, over each window.
+
+    Parameters
+    ----------
+    columns
+        Shape (p, n); zero where a reading does not count.
+    values
+        Shape (n, ...).
+    starts
+        First reading of each window, shape (k,).
+
+    Returns
+    -------
+    gram, right
+        Shapes (k, p, p) and (k, p, ...); zero of windows without readings.
+    """
+    size, empty = len(columns), np.diff(starts, append=columns.shape[1]) == 0
+    gram = np.empty((len(starts), size, size))
+    # A pair of columns at a time: all products of all readings would take gigabytes.
+    for i, j in combinations_with_replacement(range(size), 2):
+        gram[:, i, j] = gram[:, j, i] = np.add.reduceat(columns[i] * columns[j], starts)
+    right = np.stack([np.add.reduceat((column * values.T).T, starts) for column in columns], axis=1)
+    gram[empty], right[empty] = 0.0, 0.0
+    return gram, right
+
+
+def by_cycle(
+    residual: FloatArray, phase: FloatArray, harmonics: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return coefficients of offset, cosine, sine and harmonics in each cycle, and the rest.
+
+    Shape (cycles, 1 + 2 harmonics, ...) for a residual of shape (n, ...). Within a cycle the
+    functions are orthonormal, so that noise gives each coefficient the variance 1; of few readings
+    there are half as many.
+    """
+    starts, columns = cycle_starts(phase), harmonic_columns(phase, harmonics)
+    lengths = np.diff(starts, append=len(phase))
+    gram, right = normal_equations(columns, residual.reshape(len(phase), -1), starts)
+    idle = np.arange(len(columns)) >= lengths[:, None] // 2
+    unit = np.eye(len(columns))
+    gram = np.where(idle[:, None] | idle[:, :, None], unit, gram + _HAIR * gram[:, :1, :1] * unit)
+    right[idle] = 0.0
+    root = np.linalg.cholesky(gram)
+    found = np.linalg.solve(root, right)
+    sizes = np.linalg.solve(root.swapaxes(1, 2), found)
+    rest = residual.copy()
+    for k, column in enumerate(columns):
+        taken = column[:, None] * np.repeat(sizes[:, k], lengths, axis=0)
+        rest -= taken.reshape(residual.shape)
+    return found.reshape(*found.shape[:2], *residual.shape[1:]), rest
+
+
+@dataclass(frozen=True)
+class LockIn:
+    """Fits of ``offset + r (cosine cos psi + sine sin psi)`` to each cycle; all of shape (k,).
+
+    Parameters
+    ----------
+    number
+        Number of the cycle: psi from 2 pi number on.
+    readings
+        Number of readings that count.
+    cosine, sine
+        1 and 0 where readings and model agree.
+    strength
+        Sum of (r cos psi)^2: the inverse variance of `cosine` for readings of unit variance.
+    middle
+        Mean psi of the readings.
+    """
+
+    number: IntArray
+    readings: FloatArray
+    cosine: FloatArray
+    sine: FloatArray
+    strength: FloatArray
+    middle: FloatArray
+
+    @property
+    def phase(self) -> FloatArray:
+        """Phase by which the readings are ahead of the model, unwrapped."""
+        return np.unwrap(np.arctan2(-self.sine, self.cosine))
+
+
+def lock_in(readings: FloatArray, weight: FloatArray, sampled: Sampled, part: float) -> LockIn:
+    """Fit each cycle.
+
+    Parameters
+    ----------
+    readings, weight
+        Readings (an offset is fitted), and whether each counts, shape (n,).
+    sampled
+        The model's motion at the readings. On its clock ``x = r cos psi`` is exact, so that
+        a restoring torque that is not linear makes no harmonics here.
+    part
+        Part of the median number of readings that a cycle must have.
+    """
+    number = np.floor(sampled.phase / (2.0 * math.pi)).astype(np.int64)
+    numbers = np.arange(number.min(), number.max() + 1)
+    starts = np.searchsorted(number, numbers)
+    carrier = sampled.motion.upwards * sampled.amplitude
+    waves = np.stack([np.ones_like(readings), carrier * sampled.cosine, carrier * sampled.sine])
+    values = np.stack([readings, sampled.phase], axis=1)
+    gram, right = normal_equations(waves * weight, values, starts)
+    size = gram[:, 0, 0]
+    good = size >= np.maximum(float(_FEWEST_READINGS), part * _usual(size))
+    gram, right, size = gram[good], right[good], size[good]
+    solved = np.asarray(np.linalg.solve(gram, right[..., :1])[..., 0], dtype=np.float64)
+    middle = right[:, 0, 1] / size
+    return LockIn(numbers[good], size, solved[:, 1], solved[:, 2], gram[:, 1, 1], middle)
+
+
+def _usual(size: FloatArray) -> FloatArray:
+    """Return the median over each cycle and its neighbours, without empty cycles."""
+    seen = np.flatnonzero(size > 0.0)
+    width = min(_NEIGHBOURS, len(seen))
+    if not width:
+        return np.zeros(len(size))
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(size[seen], width), axis=1)
+    middle = seen[width // 2 : width // 2 + len(medians)]
+    return np.asarray(np.interp(np.arange(len(size)), middle, medians))
