@@ -280,6 +280,20 @@ def test_a_rate_is_that_of_a_pendulum(amplitude: float) -> None:
     assert g == pytest.approx(0.4 * OMEGA**2, rel=8.0 * result["frequency"].sd * math.pi / OMEGA)
 
 
+def test_g_of_a_linear_fit_is_that_of_small_swings() -> None:
+    """A swing of 0.5 rad takes 2 K(sin(y/2))/pi as long as a small one; the line says so."""
+    time = np.arange(0.0, 20.0, 0.01)
+    law = Eq8(OMEGA, viscous=1e-4, restoring="sine")
+    values = sample(law, Release(-0.2, 0.5), time)
+    result = fit_recording(recorded(values, time, 1e-3), restoring="linear")
+    line = gravity_line(result, length=Estimate(0.4, 0.0, "m"))
+    assert float(line.split()[1].partition("(")[0]) == pytest.approx(0.4 * OMEGA**2, rel=1e-3)
+    longer = 2.0 * ellipk(math.sin(0.25) ** 2) / math.pi
+    said = re.search(r"finite-amplitude correction (\S+) % included", line)
+    assert said is not None
+    assert float(said[1]) == pytest.approx(100.0 * (longer**2 - 1.0), rel=0.03)
+
+
 def test_where_only_the_smallest_swings_contradict_the_larger_are_fitted() -> None:
     values = sample(Eq8(OMEGA, 0.0, 0.0, 0.02, 1e-3), Release(-0.2, 0.5), TIME)
     # A bearing that takes far more from small swings than from large ones.
