@@ -19,7 +19,7 @@ GROUPS = {
         *("consistency", "null_families --number 15", "known_physics", "campaign_challenge"),
         *("apparatus", "acquisition faults"),
     ),
-    "robustness": ("acquisition flips kill disk", "kills", "hostile", "fuzz"),
+    "robustness": ("acquisition flips", "kills", "hostile", "fuzz"),
 }
 
 

@@ -23,7 +23,7 @@ from random import Random
 
 import numpy as np
 
-from benchmarks.acquisition_live import recorded_bytes
+from benchmarks.acquisition import recorded_bytes
 from benchmarks.journal import ROOT, answers, commit, judge_parser
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.devices import DEVICES

@@ -1,4 +1,4 @@
-"""Kill, starve and damage a small campaign: the next run ends as an undisturbed one.
+"""Kill and damage a small campaign: the next run ends as an undisturbed one.
 
     python -m benchmarks.kills                      every part; goes on where it was stopped
     python -m benchmarks.kills group job --number 10    ten cases of these parts
@@ -17,7 +17,6 @@ from __future__ import annotations
 import json
 import os
 import random
-import re
 import shutil
 import signal
 import subprocess
@@ -226,47 +225,8 @@ def killed(trial: Trial, folder: Path, draw: random.Random, kill: Callable[..., 
         alive += kill(process, project, draw)
         bad += wrong(trial, project)
         project.doctor()
-    case = trial.ended(project, {"disturbed": alive})
+    case = trial.ended(project, {"disturbed": alive, "named": True})
     return case | {"same": case["same"] and not bad, "differ": case["differ"] + bad}
-
-
-def full(trial: Trial, folder: Path, draw: random.Random) -> Case:
-    """A run on a disk that gets full, in a project on a file system of its own."""
-
-    def mount(*words: str) -> bool:
-        call = ["mount", *words, str(folder)]
-        return not subprocess.run(call, capture_output=True, check=False).returncode
-
-    begun, whole = size_of(Project(folder).folder), size_of(trial.kept)
-    room = begun + 65536 + round(draw.uniform(0.05, 0.95) * (whole - begun))
-    if not shutil.which("mount") or not mount("-t", "tmpfs", "-o", f"size={room}", "tmpfs"):
-        return {}
-    try:
-        project = Project(folder)
-        first, said = project.run()
-        logs = [path.read_text("utf-8", "replace") for path in project.results.glob("**/logs/*")]
-        named = re.search("No space left|too large", "".join([*logs, said]))
-        mount("-o", "remount,size=1g")
-        return trial.ended(project, {"disturbed": int(first != 0), "named": bool(named)})
-    finally:
-        subprocess.run(["umount", str(folder)], check=True)
-
-
-def size_of(folder: Path) -> int:
-    """Bytes, in blocks of 4096, of the files and folders."""
-    return sum(-(-path.lstat().st_size // 4096) * 4096 for path in folder.rglob("*"))
-
-
-def two(trial: Trial, folder: Path, draw: random.Random) -> Case:
-    """Two runs at once."""
-    project = Project(folder)
-    begun = project.start()
-    project.wait(begun, draw.uniform(0.0, 0.9), len(trial.sums))
-    second, said = project.run()
-    statuses = [begun.wait(PATIENCE_S), second]
-    named = re.search("LockException|cannot be locked", said)
-    disturbed = int(0 in statuses and statuses != [0, 0])
-    return trial.ended(project, {"disturbed": disturbed, "named": bool(named)})
 
 
 def torn(trial: Trial, folder: Path, draw: random.Random) -> Case:
@@ -290,8 +250,6 @@ def torn(trial: Trial, folder: Path, draw: random.Random) -> Case:
 PARTS: Final[dict[str, tuple[str, Callable[..., Case], int]]] = {
     "group": ("kill -9 of the group, 5 times", partial(killed, kill=kill_group), 20),
     "job": ("kill -9 of a job, 5 times", partial(killed, kill=kill_job), 10),
-    "full": ("disk full", full, 10),
-    "two": ("two at once", two, 10),
     "torn": ("result torn, emptied or altered", torn, 60),
 }
 
@@ -300,24 +258,20 @@ def tried(key: tuple[str, int], trial: Trial) -> Case:
     """Try one case of a part in a folder of its own."""
     with tempfile.TemporaryDirectory(prefix="pendpipe-") as folder:
         case = PARTS[key[0]][1](trial, Path(folder), random.Random(f"{key[0]} {key[1]}"))
-    if case.get("same") and case.get("named", True):
+    if case["same"] and case["named"]:
         del case["said"]
     return case
 
 
 def row(what: str, cases: Sequence[Case]) -> str:
     """A part's line of the table."""
-    done = [case for case in cases if case]
-    if not done:
-        return table_row(what, ["may not be tried here"])
-    left: Counter[str] = sum((Counter(case["left"]) for case in done), Counter())
-    after = {kind for case in done for kind in case["after"]} - {"temporary", "set-aside"}
-    cells: list[object] = [len(done), sum(case["disturbed"] for case in done)]
+    left: Counter[str] = sum((Counter(case["left"]) for case in cases), Counter())
+    after = {kind for case in cases for kind in case["after"]} - {"temporary", "set-aside"}
+    cells: list[object] = [len(cases), sum(case["disturbed"] for case in cases)]
     cells += [left["locked"], left["incomplete"], left["temporary"]]
-    named = [case["named"] for case in done if "named" in case]
-    cells += [f"{sum(named)} of {len(named)}", sum(case["same"] for case in done)]
-    middle = sorted(case["rerun_s"] for case in done)[len(done) // 2]
-    return table_row(what, [*cells, ", ".join(sorted(after)) or "none", f"{middle:.0f}"])
+    cells += [sum(case["same"] and case["named"] for case in cases), ", ".join(after) or "none"]
+    middle = sorted(case["rerun_s"] for case in cases)[len(cases) // 2]
+    return table_row(what, [*cells, f"{middle:.0f}"])
 
 
 def main() -> int:
@@ -328,7 +282,7 @@ def main() -> int:
     KEPT.mkdir(exist_ok=True)
     trial, bad = Trial(), []
     titles = ("what", "cases", "disturbed", "locks left", "cut results", "temporary files")
-    print(head(*titles, "reason named", "ended as undisturbed", "findings after it", "a case, s"))
+    print(head(*titles, "ended as undisturbed", "findings after it", "a case, s"))
     for name in told.parts or PARTS:
         what, _, number = PARTS[name]
         keys = [(name, case) for case in range(told.number or number)]

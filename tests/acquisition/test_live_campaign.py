@@ -10,18 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.acquisition_live import (
-    ROOT,
-    LiveCampaign,
-    changed_library,
-    served_device,
-    served_process,
-)
 
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.raw import RawWriter
 from pendpipe.cli import main
 from pendpipe.recording import read_plain
+
+from .live import ROOT, LiveCampaign, changed_library, served_process
 
 pytestmark = pytest.mark.slow
 LINK = "pty" if hasattr(os, "openpty") else "socket"
@@ -33,7 +28,7 @@ LONG_S = 8.0
 
 def test_neither_changed_code_nor_force_records_again(tmp_path: Path) -> None:
     """With the device gone, everything is made from the raw file, byte for byte."""
-    with served_device(tmp_path, LINK) as port:
+    with served_process(tmp_path, LINK) as (_, port):
         campaign = LiveCampaign(tmp_path, port, DURATION_S)
         done = campaign.run()
         assert done.returncode == 0, done.stderr
@@ -58,7 +53,7 @@ def test_neither_changed_code_nor_force_records_again(tmp_path: Path) -> None:
 
 
 def test_a_killed_campaign_uses_what_was_recorded(tmp_path: Path) -> None:
-    with served_device(tmp_path, LINK) as port:
+    with served_process(tmp_path, LINK) as (_, port):
         campaign = LiveCampaign(tmp_path, port, 600.0, "turning-points")
         campaign.kill_at(0.7 * DURATION_S)
         raw = campaign.raw_files
@@ -76,7 +71,7 @@ def test_a_killed_campaign_uses_what_was_recorded(tmp_path: Path) -> None:
 
 
 def test_a_dead_line_fails_its_job_alone_and_the_next_run_tries_again(tmp_path: Path) -> None:
-    with served_device(tmp_path, LINK) as port:
+    with served_process(tmp_path, LINK) as (_, port):
         pass  # unplugged before the first scan
     campaign = LiveCampaign(tmp_path, port, DURATION_S)
     done = campaign.run()
@@ -85,7 +80,7 @@ def test_a_dead_line_fails_its_job_alone_and_the_next_run_tries_again(tmp_path: 
     assert (campaign.results / "file/recording.csv").exists()
     assert not campaign.recording.exists()
     assert not (campaign.results / "live/refused.json").exists()
-    with served_device(tmp_path, LINK) as port:
+    with served_process(tmp_path, LINK) as (_, port):
         campaign.connect(port, 1.0)
         done = campaign.run()
     assert done.returncode == 0, done.stderr
@@ -109,7 +104,7 @@ def test_a_line_that_is_lost_fails_its_job_and_the_next_run_records_anew(tmp_pat
     assert not campaign.recording.exists()
     first = campaign.raw_files
     assert len(first) == 1
-    with served_device(tmp_path, LINK) as port:
+    with served_process(tmp_path, LINK) as (_, port):
         campaign.connect(port, 1.0)
         done = campaign.run()
     assert done.returncode == 0, done.stderr
@@ -148,7 +143,7 @@ def test_only_an_explicit_request_records_anew(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     call = ["acquire", "--campaign", str(tmp_path / "config.yaml"), "--record"]
-    with served_device(tmp_path, LINK) as port:
+    with served_process(tmp_path, LINK) as (_, port):
         campaign = LiveCampaign(tmp_path, port, 1.0)
         assert main([*call, "live"]) == 0
         first = campaign.raw_files
@@ -166,7 +161,7 @@ def test_only_an_explicit_request_records_anew(
 
 
 def test_two_jobs_never_record_from_one_port(tmp_path: Path) -> None:
-    with served_device(tmp_path, LINK) as port:
+    with served_process(tmp_path, LINK) as (_, port):
         command = [sys.executable, "-m", "pendpipe.cli", "acquire", "--port", port]
         command += ["--model", "di2108", "--duration", "3", "--out"]
         jobs = [

@@ -6,7 +6,7 @@ from random import Random
 
 import numpy as np
 import pytest
-from benchmarks.acquisition_live import flip, recorded_bytes
+from benchmarks.acquisition import flip, recorded_bytes
 from hypothesis import given
 from hypothesis import strategies as st
 

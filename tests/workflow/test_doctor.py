@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from benchmarks.acquisition_live import recorded_bytes
+from benchmarks.acquisition import recorded_bytes
 
 from pendpipe import manifest
 from pendpipe.acquisition.raw import lock

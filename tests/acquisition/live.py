@@ -1,30 +1,22 @@
-"""Recordings that must last: live ones in a campaign, and raw files with a flipped bit."""
-
-from __future__ import annotations
+"""A campaign with a live record, and the device that it records."""
 
 import os
 import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.raw import read_raw
-from pendpipe.acquisition.recorder import acquire_simulated
-from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.recording import GOOD
 
-ROOT: Final = Path(__file__).resolve().parents[1]
+ROOT: Final = Path(__file__).resolve().parents[2]
 SIGNAL: Final = """
 pendulum = {frequency_hz = 3.0, quality_factor_viscous = 60.0, release_angle_rad = 0.3}
 sensor = {volts_per_radian = 3.85, noise_volts = 0.001}
@@ -43,15 +35,8 @@ diagnose: {{enabled: false}}
 
 
 @contextmanager
-def served_device(folder: Path, link: str) -> Iterator[str]:
-    """A simulated DI-2108 in a process of its own; yields its port."""
-    with served_process(folder, link) as (_, port):
-        yield port
-
-
-@contextmanager
 def served_process(folder: Path, link: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """As `served_device`; yields its process as well."""
+    """A simulated DI-2108 in a process of its own; yields it and its port."""
     description = folder / "signal.toml"
     description.write_text(SIGNAL, encoding="utf-8")
     command = [sys.executable, "-m", "pendpipe.cli", "acquire", "--serve", "di2108"]
@@ -156,56 +141,3 @@ def changed_library(folder: Path) -> Path:
     with (library / "pendpipe/acquisition/decode.py").open("a") as source:
         source.write("# changed\n")
     return library
-
-
-def slow(time_s: FloatArray) -> FloatArray:
-    return np.asarray(5.0 * np.sin(0.02 * time_s))
-
-
-def recorded_bytes(kind: str) -> bytes:
-    """A raw recording of 40 s of the simulated device, some hundred frames."""
-    with tempfile.TemporaryDirectory(prefix="pendpipe-") as folder:
-        raw = Path(folder, "flips.raw")
-        acquire_simulated(
-            kind, slow, rate_hz=100.0, duration_s=40.0, clock_scale=20.0, raw_path=raw
-        )
-        return raw.read_bytes()
-
-
-@dataclass(frozen=True)
-class Flip:
-    """What one flipped bit of a raw file costs.
-
-    Parameters
-    ----------
-    noticed
-        Whether the recording's notes tell of it.
-    frames_lost, scans_lost
-        Frames and scans that are no longer there.
-    false_samples
-        Samples that are called good, and differ from those without the flip.
-    """
-
-    noticed: bool
-    frames_lost: int
-    scans_lost: int
-    false_samples: int
-
-
-def flip(whole: bytes, bit: int) -> Flip:
-    """Flip a bit of a raw file and decode it."""
-    damaged = bytearray(whole)
-    damaged[bit // 8] ^= 1 << bit % 8
-    before, after = decode_recording(whole), decode_recording(bytes(damaged))
-    raw_before, raw_after = read_raw(whole), read_raw(bytes(damaged))
-    good = after.usable if after.quality is None else after.usable & (after.quality == GOOD)
-    index = np.rint(after.time_s[good] / before.interval_s).astype(np.int64)
-    inside = index < len(before)
-    false = int(np.sum(before.values[index[inside]] != after.values[good][inside]))
-    false += int(np.sum(~inside))
-    return Flip(
-        any("damaged" in note for note in after.notes),
-        len(raw_before.arrival_s) - len(raw_after.arrival_s),
-        len(before) - int(np.sum(good)),
-        false,
-    )
