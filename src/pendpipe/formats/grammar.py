@@ -41,8 +41,6 @@ _NAMES: Final = {
 }
 _SIGN_WORDS: Final = {"\t": "tabs", ",": "commas", ";": "semicolons", " ": "blanks", "|": "bars"}
 _DECIMALS: Final = {"comma": ",", "point": ".", "dot": "."}
-_ROUGHER: Final = 0.7
-"""By so much less rough, as a logarithm, is the true one of two ways to read commas."""
 _MOST_WAYS: Final = 5000
 """Ways to read a row of commas that are tried."""
 _BLANK: Final = re.compile(
@@ -312,9 +310,6 @@ def joined_commas(
     ways = [way for way in ways if said is None or way != plain] or ways
     for fits in (_is_whole, _parts_change):
         ways = [way for way in ways if fits(way, columns)] or ways
-    # Where one number has a decimal comma for certain, the others have it too.
-    fewest = min(map(len, ways))
-    ways = ways if plain in ways else [way for way in ways if len(way) == fewest]
     # Whole numbers under no names are whole numbers, unless that leaves no time, or one that never
     # changes stands before others of one length, as the 0 of 0,38 does.
     fixed = [_often(re.escape(column[0]), column) > 0.98 for column in columns]
@@ -325,9 +320,7 @@ def joined_commas(
         return [plain, *joined[:1]]
     ways = joined or ways if said else ways
     ranks = [_evenness(_numbers(columns, way)) for way in ways]
-    ways = [way for way, rank in zip(ways, ranks, strict=True) if rank == max(ranks)]
-    rough = [_roughness(_numbers(columns, way)) for way in ways]
-    return [way for way, each in zip(ways, rough, strict=True) if each < min(rough) + _ROUGHER]
+    return [way for way, rank in zip(ways, ranks, strict=True) if rank == max(ranks)]
 
 
 def _is_whole(way: Sequence[int], columns: Sequence[Sequence[str]]) -> bool:
@@ -390,17 +383,6 @@ def _evenness(numbers: Sequence[FloatArray]) -> int:
     steps = np.diff(numbers[0])
     even = np.median(steps) > 0.0 and evenness(numbers[0]) > 0.9
     return 2 if even else int(np.mean(steps >= 0.0) > 0.98)
-
-
-def _roughness(numbers: Sequence[FloatArray]) -> float:
-    """Sum the logarithms of how rough the columns are: what is torn from a number is noise.
-
-    A column that never changes tells nothing.
-    """
-    turns = [float(np.percentile(np.abs(np.diff(values, 2)), 90)) for values in numbers]
-    spans = [float(np.ptp(values)) for values in numbers]
-    rough = [turn / span if span else 1.0 for turn, span in zip(turns, spans, strict=True)]
-    return float(np.sum(np.log(np.array(rough) + 1e-6)))
 
 
 def named(way: Sequence[int], row: str, layout: Layout) -> str:
