@@ -2,9 +2,9 @@
 
 import sys
 
-from pendpipe.commands.main import COMMANDS, STAGES, main, parse
+from pendpipe.commands.main import COMMANDS, STAGES, command_of, main, parse
 
-__all__ = ["COMMANDS", "STAGES", "main", "parse"]
+__all__ = ["COMMANDS", "STAGES", "command_of", "main", "parse"]
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -7,6 +7,7 @@ and ends with status 2; a Snakemake stage writes it into ``refused.json`` instea
 from __future__ import annotations
 
 import errno
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
@@ -63,6 +64,21 @@ def refuse_if(
     """
     if wrong:
         raise error(place, problem, remedy)
+
+
+def nearest(name: str, known: Iterable[str], otherwise: str = "") -> str:
+    """Suggest the known name that `name` may have meant, for a remedy.
+
+    Where none is near it is `otherwise`, or the list of them all.
+    """
+    from difflib import get_close_matches
+
+    names = sorted(known)
+    begun = [each for each in names if name and each.startswith(name)]
+    close = get_close_matches(name, names, n=1) or begun
+    if close:
+        return f"did you mean '{close[0]}'?"
+    return otherwise or f"known are {', '.join(names) or 'none'}"
 
 
 class NotAnalysableError(InputError):

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from pendpipe.errors import InputError, refuse_if
+from pendpipe.errors import InputError, nearest, refuse_if
 
 Flags = dict[str, dict[str, Any]]
 """Arguments of a command by their names, each with its options; see `arguments.declare`."""
@@ -278,11 +278,8 @@ def check(**given: Any) -> None:
         if value is None:
             continue
         if option.choices and value not in option.choices:
-            from difflib import get_close_matches
-
-            near = get_close_matches(str(value), option.choices, n=1)
             listed = " or ".join(map(repr, option.choices))
-            remedy = f"did you mean {near[0]!r}?" if near else f"give {listed}"
+            remedy = nearest(str(value), option.choices, f"give {listed}")
             raise InputError(name, f"{value!r} is not a valid choice", remedy)
         if isinstance(option.kind, Number):
             problem = option.kind.problem(value)

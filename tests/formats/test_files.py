@@ -8,7 +8,6 @@ import os
 import subprocess
 import sys
 import tracemalloc
-import wave
 import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -22,8 +21,9 @@ from scipy.io import savemat
 
 from pendpipe.errors import InputError
 from pendpipe.formats import containers, inspect, read, table, trees
+from pendpipe.formats.dialects import matlab
 
-from .cases import ANGLE, TIME, Case, Floats, check, read_as, same, text
+from .cases import ANGLE, TIME, Case, check, read_as, same, text
 
 PLAIN = text(TIME, ANGLE, head="t (s),theta (rad)\n")
 PAIRS = list(zip(TIME.round(3).tolist(), ANGLE.round(6).tolist(), strict=True))
@@ -65,15 +65,6 @@ def opendocument(rows: str) -> bytes:
     return zipped(mimetype=kind, content__xml=body)
 
 
-def sound(samples: Floats, rate: int) -> bytes:
-    def write(held: io.BytesIO) -> None:
-        with wave.open(held, "wb") as file:
-            file.setparams((1, 2, rate, 0, "NONE", ""))
-            file.writeframes(np.rint(32767 * samples).astype("<i2").tobytes())
-
-    return stream(write)
-
-
 SWINGS = Path(__file__).parent / "swings"
 """One swing as scipy, h5py, numpy, json and openpyxl write it; others byte by byte."""
 INFINITE = [1, 2]
@@ -98,17 +89,9 @@ def test_a_swing_is_read_from_a_file_of(tmp_path: Path, path: Path) -> None:
     check(tmp_path, Case(path.read_bytes(), name=path.name, **EXPECTED.get(path.name, {})))
 
 
-def test_the_strength_of_a_tone_may_swing(tmp_path: Path) -> None:
-    time_s = np.arange(20 * 8000) / 8000
-    strength = 0.5 + np.interp(time_s, TIME, 0.5 * ANGLE)
-    content = sound(strength * np.sin(2 * np.pi * 1000 * time_s), 8000)
-    recording = read_as(tmp_path, content, "b.wav")
-    expected = np.interp(recording.time_s + 0.0025, time_s, strength) / np.sqrt(2)
-    np.testing.assert_allclose(recording.values, expected, atol=2e-3)
-    assert any("a tone whose strength swings" in note for note in recording.notes)
-
-
 SAVED = (SWINGS / "matlab-by-names.mat").read_bytes()
+
+
 REFUSED: dict[str, tuple[bytes, str, str]] = {
     "entities": (b"<!DOCTYPE x [<!ENTITY a 'b'>]><cassylab/>", "a.labx", "no reader|entities"),
     "entities of XML": (
@@ -191,7 +174,7 @@ def test_what_unpacks_to_more_than_any_recording_is_refused(
     book.write_bytes(workbook(run=[["t", "angle"]]))
     same(read(path))
     for module, file, said in (
-        (trees, path, "its compressed data are more than 0 MB"),
+        (matlab, path, "its compressed data are more than 0 MB"),
         (table, book, "it unpacks to 0 MB"),
     ):
         monkeypatch.setattr(module, "most_unpacked", lambda _: 9_000)

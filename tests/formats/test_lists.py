@@ -170,7 +170,7 @@ def test_a_steady_or_driven_signal_is_reported(
 
 def test_a_misspelt_file_is_answered_by_the_nearest_name(tmp_path: Path) -> None:
     (tmp_path / "string-pendulum.csv").write_text("t,deg\n0,1\n")
-    with pytest.raises(InputError, match=r"no such file; did you mean string-pendulum\.csv\?"):
+    with pytest.raises(InputError, match=r"no such file; did you mean 'string-pendulum\.csv'\?"):
         read(tmp_path / "strin-pendulum.csv")
     with pytest.raises(InputError, match="no such file; check the path"):
         read(tmp_path / "rod.mat")

@@ -5,7 +5,6 @@ name.
 """
 
 import csv
-import difflib
 import json
 import re
 from collections import Counter
@@ -19,27 +18,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.dataclasses import dataclass as checked
 
 from pendpipe.configuration.models import WATER_C, Celsius, Configuration, Geometry, Section
-from pendpipe.errors import InputError, refuse_if
+from pendpipe.errors import InputError, nearest, refuse_if
 from pendpipe.files import is_file, names_in, read_json, read_text
 
-COLUMNS: Final = (
-    "record",
-    "source",
-    "fluid",
-    "branch",
-    "geometry",
-    "channel",
-    "unit",
-    "decimal",
-    "sample_rate",
-    "start_s",
-    "stop_s",
-    "volts_per_radian",
-    "temperature_c",
-    "restoring",
-    "order",
-    "pendulum",
-)
 REQUIRED: Final = ("record", "source")
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 LONGEST_NAME: Final = 100
@@ -105,6 +86,9 @@ class Record:
         """The file of the recording, where the source is one."""
         ours = self.source == "simulated" or self.source.startswith("dataq:")
         return None if ours else Path(self.source)
+
+
+COLUMNS: Final = tuple(Record.__dataclass_fields__)
 
 
 def read_records(path: str | Path) -> list[Record]:
@@ -220,8 +204,7 @@ class Campaign:
         for record in self.selected:
             path = record.file
             if path is not None and not is_file(path):
-                close = difflib.get_close_matches(path.name, names_in(path.parent), n=1)
-                hint = f"did you mean '{close[0]}'?" if close else "it will be refused"
+                hint = nearest(path.name, names_in(path.parent), "it will be refused")
                 where = f"{self.configuration.records}, record {record.record}"
                 lines.append(f"{where}: there is no file {path}; {hint}")
         return lines
@@ -404,14 +387,6 @@ def _check_geometries(configuration: Configuration, place: str | Path) -> None:
             "the apparatus has no sphere",
             "add it, or set sphere: false",
         )
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """Suggest the known name that `name` may have meant, or list them all."""
-    names = sorted(known)
-    without_unit = [known_name for known_name in names if name and known_name.startswith(name)]
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.6) or without_unit
-    return f"did you mean '{close[0]}'?" if close else f"known are {', '.join(names) or 'none'}"
 
 
 def as_input_error(

@@ -34,22 +34,7 @@ _MOST_CELLS: Final = 600_000
 _MOST_REPEATED: Final = 64
 """Columns that one cell of an OpenDocument table may fill: it fills the empty rest of the row."""
 _Sheets = dict[str, list[list[Any]]]
-_OLD_EXCEL: Final = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
-
-
-def is_old_workbook(head: bytes) -> bool:
-    """Say whether a file is an old workbook (.xls), or another of Microsoft's compound files."""
-    return head.startswith(_OLD_EXCEL)
-
-
-def read_old_workbook(place: Path, data: bytes, options: ReadOptions) -> Table:
-    """Read the sheet of an old workbook that holds most numbers."""
-    return _of_sheets(place, _sheets_of_excel(data), options)
-
-
-def is_archive(head: bytes) -> bool:
-    """Say whether a file is a zip archive, as workbooks are, and none of arrays."""
-    return head.startswith(b"PK") and b".npy" not in head[:128]
+OLD_EXCEL: Final = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 
 
 def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
@@ -60,6 +45,8 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
     InputError
         When it can't be read, or holds no table.
     """
+    if data.startswith(OLD_EXCEL):
+        return _of_sheets(place, _sheets_of_excel(data), options)
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         names = archive.namelist()
         refuse_unpacked(sum(part.file_size for part in archive.infolist()), len(data))
@@ -208,12 +195,6 @@ def _written(cell: Any) -> str:
 
 _LARGEST = 64 << 20
 """A tree of elements takes some ten times the file's memory."""
-_START = re.compile(rb"\s*(?:\xef\xbb\xbf)?\s*<(\?xml|cassylab|Document|object)\b")
-
-
-def is_project(head: bytes) -> bool:
-    """Say whether a file is XML that begins as one of these programs' projects."""
-    return _START.match(head[:200]) is not None
 
 
 def read_project(place: Path, data: bytes, options: ReadOptions) -> Table:  # noqa: ARG001

@@ -8,7 +8,6 @@ import sys
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from functools import cache
 from itertools import islice
 from math import isfinite
@@ -18,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.errors import InputError, refuse_if
+from pendpipe.errors import InputError, nearest, refuse_if
 from pendpipe.formats.columns import choose
 from pendpipe.formats.lists import (
     NOT_FREE,
@@ -121,8 +120,7 @@ def _near(place: Path) -> str:
         names = [other.name for other in islice(place.parent.iterdir(), _MOST_NAMES)]
     except OSError:
         return "check the path"
-    near = get_close_matches(place.name, names, n=1, cutoff=0.8)
-    return f"did you mean {near[0]}?" if near else "check the path"
+    return nearest(place.name, names, "check the path")
 
 
 def file_bytes(place: Path) -> bytes:

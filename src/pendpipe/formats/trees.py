@@ -1,26 +1,17 @@
-"""Files of named arrays: HDF5 (and MATLAB 7.3), MATLAB, NumPy, JSON, TDMS, sound.
-
-MATLAB's versions 5 to 7 are read here and not by scipy, whose reader trusts the sizes in a file, so
-that a damaged one makes it crash. Layout after MathWorks' "MAT-File Format", version 5: elements of
-a type, a byte count and the data, padded to eight bytes; arrays are elements that hold elements.
-"""
+"""Files of named arrays: HDF5 (and MATLAB 7.3), NumPy, JSON, TDMS, sound."""
 
 import io
 import json
 import re
-import struct
 import zipfile
-import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from itertools import islice
-from math import prod
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.arrays import AnyArray, FloatArray
+from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
 from pendpipe.formats.clock import column_of_clock_times
 from pendpipe.formats.header import interval_of
@@ -31,22 +22,16 @@ from pendpipe.formats.table import (
     ReadOptions,
     Table,
     damaged_if,
-    most_unpacked,
     refuse_unpacked,
-    swing_of,
 )
 from pendpipe.formats.text import table_of_text
 from pendpipe.formats.words import role_of, split_header
 
-_MOST: Final = 1 << 27
+MOST: Final = 1 << 27
 """Numbers that an array may hold."""
 _LARGEST_JSON: Final = 64 << 20
 _MOST_CELLS: Final = 1_500_000
 """Of records with texts: half a gigabyte."""
-_HDF5: Final = b"\x89HDF\r\n\x1a\n"
-_AUDIO_HZ: Final = 4000.0
-"""Rate from which on a file of sound may hold a tone that the swing modulates."""
-_STRETCH_S: Final = 5e-3
 
 
 def table_of_tree(
@@ -196,16 +181,6 @@ def _interval(arrays: dict[str, FloatArray]) -> float | None:
     return interval_of(lines)
 
 
-def is_hdf5(head: bytes) -> bool:
-    """Say whether a file is HDF5, or MATLAB's of version 7.3, which is that."""
-    return _HDF5 in head[:1024] or head[:10] == b"MATLAB 7.3"
-
-
-def is_numpy(head: bytes) -> bool:
-    """Say whether a file is NumPy's, of one array (.npy) or several (.npz)."""
-    return head[:6] == b"\x93NUMPY" or (head[:2] == b"PK" and b".npy" in head[:128])
-
-
 def read_hdf5(place: Path, data: bytes, options: ReadOptions) -> Table:
     """Read the data sets of all groups, with the units among their attributes."""
     import h5py
@@ -217,7 +192,7 @@ def read_hdf5(place: Path, data: bytes, options: ReadOptions) -> Table:
 
     def gather(name: str, node: Any) -> None:
         nonlocal whole
-        if not isinstance(node, h5py.Dataset) or name.startswith("#") or node.size > _MOST:
+        if not isinstance(node, h5py.Dataset) or name.startswith("#") or node.size > MOST:
             return
         if node.dtype.kind in "fiub" or node.dtype.names:
             path = name.replace("/", ".")
@@ -242,11 +217,6 @@ def read_numpy(place: Path, data: bytes, options: ReadOptions) -> Table:
     loaded = np.load(io.BytesIO(data), allow_pickle=False)
     tree = dict(loaded) if hasattr(loaded, "files") else loaded
     return table_of_tree(place, tree, "numpy", options)
-
-
-def is_json(head: bytes) -> bool:
-    """Say whether a file may be JSON: it begins with a bracket."""
-    return head.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] in (b"{", b"[")
 
 
 def read_json(place: Path, data: bytes, options: ReadOptions) -> Table:
@@ -310,24 +280,13 @@ def read_tdms(place: Path, data: bytes, options: ReadOptions) -> Table:
 
 
 def read_sound(place: Path, data: bytes, _options: ReadOptions) -> Table:
-    """Read the channels of a .wav, full scale as 1; a tone that a swing modulates by its strength.
-
-    A sound card passes no constant, so that some put the sensor's voltage on a tone.
-    """
+    """Read the channels of a .wav, full scale as 1."""
     from scipy.io import wavfile
 
     rate: float
     rate, samples = wavfile.read(io.BytesIO(data))
     scale = {"i": float(np.iinfo(samples.dtype).max) + 1.0, "u": 128.0}.get(samples.dtype.kind, 1.0)
     values = samples.reshape(len(samples), -1).astype(np.float64) / scale
-    notes: tuple[str, ...] = ()
-    stretch = round(_STRETCH_S * rate)
-    if rate >= _AUDIO_HZ and len(values) > 100 * stretch:
-        blocks = values[: len(values) // stretch * stretch].reshape(-1, stretch, values.shape[1])
-        strength = blocks.std(axis=1)
-        if strength.mean() > blocks.mean(axis=1).std() and swing_of(strength[:, 0]).clear:
-            values, rate = strength, rate / stretch
-            notes = (f"a tone whose strength swings: that, every {_STRETCH_S:g} s, is the reading",)
     return Table(
         place,
         "sound",
@@ -336,146 +295,4 @@ def read_sound(place: Path, data: bytes, _options: ReadOptions) -> Table:
             for number, column in enumerate(np.ascontiguousarray(values.T), start=1)
         ),
         interval_s=1.0 / rate,
-        notes=notes,
     )
-
-
-_STORED: Final = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8"} | {
-    12: "i8",
-    13: "u8",
-    16: "u1",
-    17: "u2",
-    18: "u4",
-}
-_MATRIX, _COMPRESSED = 14, 15
-_CELL, _STRUCT, _CHARACTERS = 1, 2, 4
-_NUMERIC: Final = range(6, 16)
-_COMPLEX: Final = 0x0800
-_DEEPEST: Final = 32
-_LAST_TYPE_4: Final = 51
-"""Of version 4: an array of bytes that is a text."""
-
-
-def is_matlab(data: bytes) -> bool:
-    """Say whether a file is one of version 5 to 7 by its head; version 7.3 is HDF5."""
-    head = data[:10] == b"MATLAB 5.0" or data[126:128] in (b"IM", b"MI")
-    return head and b"MATLAB 7.3" not in data[:128]
-
-
-def tree_of(data: bytes) -> dict[str, Any]:
-    """Read the variables of a file of version 5 to 7.
-
-    Raises
-    ------
-    ValueError
-        When a size or a type can't be true.
-    """
-    order = {b"IM": "<", b"MI": ">"}.get(data[126:128], "")
-    damaged_if(not order, "its header is damaged")
-    most, tree = most_unpacked(len(data)), {}
-    for kind, content in _elements(data, order, 128):
-        if kind == _COMPRESSED:
-            unpacker = zlib.decompressobj()
-            unpacked = unpacker.decompress(content, most)
-            many = len(unpacked) >= most
-            fault = f"are more than {most >> 20} MB" if many else "are cut short"
-            damaged_if(not unpacker.eof, f"its compressed data {fault}")
-            most -= len(unpacked)
-            kind, content = next(_elements(unpacked, order), (0, b""))
-        name, value = _array(kind, content, order)
-        tree[name] = value
-    return tree
-
-
-def _elements(data: bytes, order: str, at: int = 0) -> Iterator[tuple[int, bytes]]:
-    """Give type and content of the elements that stand one after the other."""
-    while at + 8 <= len(data):
-        kind, size = struct.unpack_from(order + "II", data, at)
-        start, small = at + 8, kind >> 16
-        if 0 < small <= 4:  # so few bytes stand in the tag itself
-            start, kind, size = at + 4, kind & 0xFFFF, small
-        damaged_if(
-            start + size > len(data), f"an element of {size} bytes does not fit at byte {at}"
-        )
-        yield kind, data[start : start + size]
-        at = start + size + (0 if kind == _COMPRESSED else -(start + size - at) % 8)
-
-
-def _element(parts: Iterator[tuple[int, bytes]], order: str, *kinds: int) -> AnyArray:
-    """Read the next element, which must be of one of these types."""
-    kind, content = next(parts, (0, b""))
-    damaged_if(kind not in kinds, f"an element of type {kind} stands where {kinds} is due")
-    return np.frombuffer(content, order + _STORED[kind])
-
-
-def _array(kind: int, content: bytes, order: str, depth: int = 0) -> tuple[str, Any]:
-    """Read an array: its name; numbers, text, or cells and structures as an array of objects.
-
-    ``None`` stands for what holds no readings: complex numbers, functions, objects.
-    """
-    damaged_if(
-        kind != _MATRIX or depth > _DEEPEST,
-        f"an element of type {kind} stands where an array is due",
-    )
-    if not content:
-        return "", None
-    parts = _elements(content, order)
-    flags, shape = _element(parts, order, 6), _element(parts, order, 5).tolist()
-    name = _element(parts, order, 1, 2, 16).tobytes().decode("latin-1")
-    damaged_if(not len(flags) or min(shape, default=-1) < 0, f"an array has the size {shape}")
-    group, count = int(flags[0]) & 0xFF, prod(shape)
-    if group in _NUMERIC:
-        values = _element(parts, order, *_STORED).reshape(shape, order="F")
-        return name, None if flags[0] & _COMPLEX else np.squeeze(values)
-    if group == _CHARACTERS:
-        return name, "".join(map(chr, _element(parts, order, *_STORED).tolist()))
-    if group not in (_CELL, _STRUCT):
-        return name, None
-    fields = [""]
-    if group == _STRUCT:
-        width = int(_element(parts, order, 5).sum())
-        names = _element(parts, order, 1).tobytes().decode("latin-1")
-        damaged_if(width < 1 or len(names) % width, "the names of a structure's fields are damaged")
-        fields = [names[at : at + width].partition("\0")[0] for at in range(0, len(names), width)]
-    held = [_array(*each, order, depth + 1)[1] for each in islice(parts, count * len(fields))]
-    due = count * len(fields)
-    damaged_if(len(held) < due, f"{len(held)} arrays stand where {due} are due")
-    entries = np.empty(len(held) // max(len(fields), 1), dtype=object)
-    for place in range(len(entries)):
-        some = held[place * len(fields) : (place + 1) * len(fields)]
-        entries[place] = some[0] if group == _CELL else dict(zip(fields, some, strict=True))
-    return name, entries
-
-
-def read_matlab(place: Path, data: bytes, options: ReadOptions) -> Table:
-    """Read the variables of a file of version 5 to 7."""
-    return table_of_tree(place, tree_of(data), "matlab-v5", options)
-
-
-def is_matlab_4(head: bytes) -> bool:
-    """Say whether a file begins as one of version 4: type, size, whether complex, a name."""
-    words = struct.unpack("<5i", head[:20].ljust(20, b"\xff"))
-    limits = ((0, _LAST_TYPE_4), (0, _MOST), (0, _MOST), (0, 1), (1, 64))
-    return all(low <= word <= high for word, (low, high) in zip(words, limits, strict=True))
-
-
-def read_matlab_4(place: Path, data: bytes, options: ReadOptions) -> Table:
-    """Read the variables of a file of version 4."""
-    return table_of_tree(place, tree_of_version_4(data), "matlab-v4", options)
-
-
-def tree_of_version_4(data: bytes) -> dict[str, Any]:
-    """Read the variables of a file of version 4, which scipy reads without compiled code.
-
-    Raises
-    ------
-    NotThisFormatError
-        When the file is none of that version.
-    """
-    from scipy.io import loadmat
-
-    try:
-        return dict(loadmat(io.BytesIO(data)))  # type: ignore[arg-type]
-    except Exception as fault:
-        # scipy's message may hold a name of a damaged file: any bytes, of any length.
-        raise NotThisFormatError(f"it is no file of MATLAB 4 ({str(fault)[:60]!a})") from None

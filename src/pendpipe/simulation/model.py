@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from pendpipe.arrays import FloatArray
-from pendpipe.configuration.load import as_input_error, nearest
+from pendpipe.configuration.load import as_input_error
 from pendpipe.configuration.models import NotNegative, Positive, Section, Sensor
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.any_law import Motion, NoMotionError, sample_pieces
@@ -24,7 +24,7 @@ from pendpipe.effects.baseline import TIME, values_of
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.effect import Effect, Parameter
 from pendpipe.effects.model import Model as EffectsModel
-from pendpipe.errors import InputError, refuse_if
+from pendpipe.errors import InputError, nearest, refuse_if
 from pendpipe.files import read_text
 from pendpipe.recording import Recording
 

@@ -5,7 +5,6 @@ own: whatever is declared here is found. Other packages name theirs under the en
 ``pendpipe.effects``; one that can't be loaded is named in a line and passed over.
 """
 
-import difflib
 import importlib
 import pkgutil
 import sys
@@ -15,7 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from pendpipe.effects.effect import Effect
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, nearest
 
 ENTRY_POINT: Final = "pendpipe.effects"
 _FIRST: Final = ("restoring", "losses", "in_time", "reading")
@@ -64,11 +63,8 @@ def by_identifier(name: str, place: str | Path = "effect") -> Effect:
     """
     found = _BY_IDENTIFIER.get(name)
     if found is None:
-        close = difflib.get_close_matches(name, _BY_IDENTIFIER, n=1, cutoff=0.5)
-        nearest = (
-            f"did you mean '{close[0]}'?" if close else "pendpipe effects --list prints all names"
-        )
-        raise InputError(place, f"there is no effect '{name}'", nearest)
+        remedy = nearest(name, _BY_IDENTIFIER, "pendpipe effects --list prints all names")
+        raise InputError(place, f"there is no effect '{name}'", remedy)
     return found
 
 
