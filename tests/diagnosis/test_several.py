@@ -58,13 +58,17 @@ def together(kind: str) -> Diagnosis:
     return found
 
 
+def assert_shared_values_are_true(found: dict[str, Any]) -> None:
+    for name, truth in (("b", B), ("c", C), ("frequency", 0.9)):
+        value = found["improved"]["parameters"][name]
+        assert abs(value["value"] - truth) < 4.0 * value["sd"]
+
+
 def test_three_releases_share_their_values_and_lack_nothing() -> None:
     found = together("nothing").to_dict()
     assert found["verdict"] == "consistent"
     assert found["unexplained"]["p_value"] > 1e-3
-    values = found["improved"]["parameters"]
-    for name, truth in (("b", B), ("c", C), ("frequency", 0.9)):
-        assert abs(values[name]["value"] - truth) < 4.0 * values[name]["sd"]
+    assert_shared_values_are_true(found)
 
 
 def test_shared_values_are_better_known_than_in_the_best_recording() -> None:
@@ -96,9 +100,7 @@ def test_amplitudes_exclude_a_drift_that_one_recording_cannot_tell_from_cubic_da
     assert "damping-drift" not in {name for name, _ in effect.indistinguishable}
     size = effect.parameters["d"]
     assert abs(size.value - 0.1) < 4.0 * size.sd
-    values = found.to_dict()["improved"]["parameters"]
-    for name, truth in (("b", B), ("c", C), ("frequency", 0.9)):
-        assert abs(values[name]["value"] - truth) < 4.0 * values[name]["sd"]
+    assert_shared_values_are_true(found.to_dict())
 
 
 def test_derivatives_of_two_recordings_are_those_of_each_by_what_it_has() -> None:
@@ -146,9 +148,7 @@ def test_knock_in_one_recording_is_its_own_and_the_shared_values_stand() -> None
     assert isinstance(found, Diagnosis)
     (effect,) = found.missing
     assert effect.location.summary == "in second alone"
-    values = found.to_dict()["improved"]["parameters"]
-    for name, truth in (("b", B), ("c", C), ("frequency", 0.9)):
-        assert abs(values[name]["value"] - truth) < 4.0 * values[name]["sd"]
+    assert_shared_values_are_true(found.to_dict())
     assert found.to_dict()["recordings"][1]["prediction"]["within_95"] > 0.9
 
 
