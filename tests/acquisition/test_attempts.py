@@ -81,8 +81,7 @@ def test_a_lost_line_is_reported_with_what_is_kept_of_what_was_asked(tmp_path: P
 def test_attempts_without_a_scan_do_not_count(tmp_path: Path) -> None:
     """A header alone, a part of one, an empty file; a damaged file beside a sound one."""
     kept(tmp_path, 1, 0, None)
-    whole = kept(tmp_path, 2, 0, None).read_bytes()
-    (tmp_path / "part.raw").write_bytes(whole[:20])
+    (tmp_path / "part.raw").write_bytes(kept(tmp_path, 2, 0, None).read_bytes()[:20])
     (tmp_path / "empty.raw").touch()
     assert read_attempts(tmp_path.iterdir()) == []
     (tmp_path / "damaged.raw").write_bytes(b"x" * 500)

@@ -114,8 +114,7 @@ def test_what_breaks_the_frame_mark_costs_one_scan(
     assert missing(recording) == 1
     assert any("1 scans lost at 1 places" in note for note in recording.notes)
     assert np.sum(recording.quality == SUSPECT) <= 1
-    bad = np.flatnonzero(recording.quality)
-    assert abs(bad - 500).max() <= 1
+    assert abs(np.flatnonzero(recording.quality) - 500).max() <= 1
     # A byte too many costs a row that was never lost: a hundredth of a second.
     assert error_steps(recording, late_s=1 / RATE_HZ) <= 0.51
 
@@ -176,16 +175,14 @@ def test_whole_scans_lost_are_said_and_move_nothing(kind: str, lost: int) -> Non
 
 def test_whole_scans_lost_on_a_line_are_said(recorded: Recorded) -> None:
     """2 s of 60, as the recorder stamps them: too short to be a silence."""
-    fault = Fault("lost scans", at=4000, count=200)
-    recording = recorded("di2108", fault, 60.0)
+    recording = recorded("di2108", Fault("lost scans", at=4000, count=200), 60.0)
     assert any("come late for good" in note for note in recording.notes)
     assert missing(recording) == 0
 
 
 @pytest.mark.parametrize("code", [1, 2, 3])
 def test_a_stop_code_is_no_data_and_the_stream_resumes(code: int, recorded: Recorded) -> None:
-    fault = Fault("overflow", at=4000, code=code)
-    recording = recorded("di2108", fault, 60.0)
+    recording = recorded("di2108", Fault("overflow", at=4000, code=code), 60.0)
     assert f"the device's buffer overflowed ('stop 0{code}')" in recording.notes
     assert any("broken off and resumed" in note for note in recording.notes)
     assert missing(recording) > 0

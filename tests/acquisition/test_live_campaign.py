@@ -35,8 +35,7 @@ def test_neither_changed_code_nor_force_records_again(tmp_path: Path) -> None:
     recording, raw = campaign.recording.read_bytes(), campaign.raw_files
     assert len(read_plain(campaign.recording)) == 60 * DURATION_S
     assert len(raw) == 1
-    library = changed_library(tmp_path)
-    done = campaign.run(library=library)
+    done = campaign.run(library=changed_library(tmp_path))
     assert done.returncode == 0, done.stderr
     assert f"live: {60 * DURATION_S:g} samples" in done.stdout
     assert campaign.recording.read_bytes() == recording

@@ -51,10 +51,8 @@ def test_what_was_kept_comes_back(pieces: list[bytes]) -> None:
 def test_a_frame_holds_a_second_at_most() -> None:
     """What comes at once after a pause is one arrival, in several frames."""
     stream = BytesIO()
-    writer = RawWriter(stream, HEADER, bytes_per_s=100)
-    writer.data(3.0, bytes(250))
-    raw = read_raw(stream.getvalue())
-    assert raw.arrived_bytes.tolist() == [250]
+    RawWriter(stream, HEADER, bytes_per_s=100).data(3.0, bytes(250))
+    assert read_raw(stream.getvalue()).arrived_bytes.tolist() == [250]
     # One byte of the last frame wrong: the two before are there.
     content = bytearray(stream.getvalue())
     content[-1] ^= 1
@@ -164,8 +162,7 @@ def test_a_damaged_first_frame_moves_nothing() -> None:
 def test_frames_need_not_hold_whole_scans(model: str) -> None:
     """Two channels in pieces of seven bytes: behind any lost piece they are told apart."""
     codes = np.arange(200)[:, None] * [[1, -1]] + [[0, 0]]
-    device = DEVICES["di2108" if model == "DI-2108" else "di154"]()
-    data = device.encode(codes)
+    data = DEVICES["di2108" if model == "DI-2108" else "di154"]().encode(codes)
     stream = BytesIO()
     writer = RawWriter(stream, {**HEADER, "model": model, "channels": [1, 2]})
     for number, begin in enumerate(range(0, len(data), 7)):

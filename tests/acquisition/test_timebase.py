@@ -60,8 +60,7 @@ def test_a_device_that_is_wrong_by_a_factor_is_believed_the_clock() -> None:
 def test_a_quartz_is_believed_before_the_time_stamps() -> None:
     """10 parts in a million cannot be seen in five seconds."""
     scans = np.arange(1.0, 501.0)
-    found = measure_rate(scans / (100.0 * (1 + 1e-5)), scans, 100.0)
-    assert found.rate_hz == 100.0
+    assert measure_rate(scans / (100.0 * (1 + 1e-5)), scans, 100.0).rate_hz == 100.0
 
 
 def test_too_few_arrivals_measure_nothing() -> None:
@@ -123,8 +122,7 @@ def test_a_drift_of_a_busy_hosts_delays_is_no_rate(drift_s: float, chosen: str) 
 
 def test_chance_makes_a_rate_as_rarely_as_students_distribution_says() -> None:
     """Twelve stretches and a line leave ten degrees of freedom: 1 in 8,000 beyond six."""
-    trust = decode._RATE_TRUST
-    assert 2.0 * t.sf(trust, 10) == pytest.approx(1.0 / 8000.0, rel=0.1)
+    assert 2.0 * t.sf(decode._RATE_TRUST, 10) == pytest.approx(1.0 / 8000.0, rel=0.1)
     generator, scans = np.random.default_rng(11), np.arange(1.0, 481.0) * 16.0
     beyond = 0
     for _ in range(1000):

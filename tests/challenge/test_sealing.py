@@ -178,8 +178,7 @@ def test_the_page_can_tell_which_sets_were_made_before(tmp_path: Path) -> None:
         sets.enter(ledger, {"set": name, "item": "item-0001"})
     assert sets.sets_before(ledger, "first") == "none"
     assert sets.sets_before(ledger, "third") == "2 (first, second)"
-    lines = ledger.read_text().splitlines(keepends=True)
-    ledger.write_text("".join(lines[1:]))
+    ledger.write_text("".join(ledger.read_text().splitlines(keepends=True)[1:]))
     assert "chain of hashes" in sets.sets_before(ledger, "third")
 
 

@@ -131,8 +131,7 @@ def test_glitches_are_masked_before_a_model_that_is_far_off_is_mended() -> None:
     off[OMEGA] *= 1.01
     fit = refine(right.fit.model, data, noise, off, held=(OMEGA,))
     assert is_gross(fit, data)
-    begun = hypothesis_of(fit, data, noise, (OMEGA,), fit, right.samples)
-    state = correct(begun, task)
+    state = correct(hypothesis_of(fit, data, noise, (OMEGA,), fit, right.samples), task)
     (fault,) = state.faults
     assert fault.identifier == "glitches"
     assert np.flatnonzero(state.data.weight == 0.0).tolist() == wild
@@ -146,8 +145,7 @@ def clipped_at(level_rad: float) -> FloatArray:
 def test_clipping_is_reported_once() -> None:
     """A nonlinear sensor is tried first; with the clipped readings masked it is not needed."""
     level = 0.9 * float(other_engine(TRUTH).max())
-    record = Recording(TIME_S, clipped_at(level), "angle_rad")
-    found = diagnose_recording(record)
+    found = diagnose_recording(Recording(TIME_S, clipped_at(level), "angle_rad"))
     (effect,) = found.effects
     assert effect.identifier == "clipping"
     assert effect.parameters["upper_level"].value == pytest.approx(level, rel=1e-6)
@@ -160,8 +158,7 @@ def test_clipping_is_reported_once() -> None:
 def test_lost_samples_are_placed_between_the_right_readings(off: float) -> None:
     """A quarter of a cycle lost; the fit is begun `off` intervals from the instant."""
     lost, instant = 0.27, TIME_S[700] + 0.5 * INTERVAL_S
-    dropped = by_identifier("dropped-samples")
-    model = Model(TIME_S, INTERVAL_S, (dropped,))
+    model = Model(TIME_S, INTERVAL_S, (by_identifier("dropped-samples"),))
     truth = np.concatenate([TRUTH, [lost, instant]])
     data, noise = prepared(model.reading(truth) + white(8))
     start = truth + np.array([*np.zeros(len(TRUTH)), 0.0, off * INTERVAL_S])

@@ -64,5 +64,4 @@ def test_effects_that_vary_slowly_need_no_closer_look() -> None:
     )
     noise = white_noise(data, NOISE)
     base = refine(model, data, noise, BASE)
-    effect = by_identifier("frequency-step")
-    assert finer_shape(base, noise, effect, (70.0,)) == (70.0,)
+    assert finer_shape(base, noise, by_identifier("frequency-step"), (70.0,)) == (70.0,)

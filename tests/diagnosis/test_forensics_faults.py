@@ -369,8 +369,7 @@ def test_a_loss_that_is_placed_a_reading_off_makes_no_glitch(
     (fault,) = state.faults
     assert fault.identifier == "dropped-samples"
     # What the readings beside it took from chi^2 is no gain of the correction.
-    weight = np.flatnonzero(state.data.weight == 0.0)
-    assert len(weight) == 4
+    assert len(np.flatnonzero(state.data.weight == 0.0)) == 4
 
 
 def test_readings_left_out_beside_a_step_are_no_gain_of_a_correction() -> None:

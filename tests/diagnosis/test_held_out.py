@@ -56,8 +56,7 @@ def test_a_law_that_only_noise_asked_for_predicted_worse_and_a_right_one_does_no
     model = fit.model.adding(by_identifier("tone-pickup"))
     more = refine(model, data, noise, np.concatenate([fit.value, [1e-4, 1e-4, 3.3]]))
     assert predicted_worse(fit, more, data, noise, (), (), drawn=False) > 0.0
-    outcome = diagnosed("sensor-cubic")
-    found = outcome.search
+    found = diagnosed("sensor-cubic").search
     fits = (found.baseline, found.fit, found.data, found.noise)
     assert predicted_worse(*fits, (), found.held, drawn=False) == 0.0
 
@@ -65,8 +64,7 @@ def test_a_law_that_only_noise_asked_for_predicted_worse_and_a_right_one_does_no
 def test_coloured_noise_is_predicted_from_what_is_known() -> None:
     """Noise with a memory: the error of the first missing reading is smaller than the noise."""
     count = 400
-    steps = np.random.default_rng(1).standard_normal(count)
-    walk = np.cumsum(steps)
+    walk = np.cumsum(np.random.default_rng(1).standard_normal(count))
     walk -= walk.mean()
     order = np.maximum(np.arange(count), 0.5)
     spectrum = 1.0 / (2.0 - 2.0 * np.cos(np.pi * order / count))

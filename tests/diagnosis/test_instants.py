@@ -32,8 +32,7 @@ def told(
     nearest = min(rows, key=lambda row: abs(row[0] - INSTANT_S))
     shape = finer_shape(without, noise, effect, tuple(nearest))
     start = np.concatenate([without.value, [0.0], shape])
-    fit = refine(model.adding(effect), data, noise, start)
-    found = effect_parameters(fit, effect)
+    found = effect_parameters(refine(model.adding(effect), data, noise, start), effect)
     return found, with_instants(found, effect, without, noise), truth
 
 

@@ -106,8 +106,7 @@ def test_a_name_stays_before_a_curve_until_the_odds_are_one_in_twenty(
         return found._replace(mates=tuple(curve), weights=np.array([1.0, odds, 0.0]) / (1 + odds))
 
     monkeypatch.setattr(weighing, "weigh", weighed)
-    outcome = scanned("circular-error")
-    found, _ = exchanged(outcome.search)
+    found, _ = exchanged(scanned("circular-error").search)
     assert [effect.identifier for effect in found.fit.model.effects] == [leads]
     assert found.steps[0].winner.identifier == leads
 

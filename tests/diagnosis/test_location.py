@@ -172,6 +172,5 @@ def test_a_line_of_every_second_reading_or_an_alias_is_seldom_there_by_chance(
     model = Model(TIME_S, INTERVAL_S, (tone,))
     truth = np.append(TRUTH, [3e-4, 2e-4, frequency_hz])
     data, noise = prepared(model.reading(truth) + white(3))
-    fit = refine(model, data, noise, truth)
-    found = near_harmonic_by_chance(fit, tone)
+    found = near_harmonic_by_chance(refine(model, data, noise, truth), tone)
     assert found > by_chance if by_chance == 0.9 else found < by_chance

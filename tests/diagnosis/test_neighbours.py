@@ -246,8 +246,7 @@ def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
     assert drawn.lower > 0.0
     state = drawn.state
     assert state.steps[-1].winner.lead.effect.kind == "unnamed"
-    after = remainder_of(state.fit, state.data, state.noise)
-    assert after.excess < 0.2 * before.excess
+    assert remainder_of(state.fit, state.data, state.noise).excess < 0.2 * before.excess
 
 
 def test_what_is_left_is_described_where_only_sin_x_was_found() -> None:
@@ -324,8 +323,7 @@ def test_a_random_cause_pays_the_price_of_a_name(name: str, names: tuple[str, ..
     state = replace(state_with(readings, *names), samples=samples)
     least = {"clipping": 0.0}.get(name, FURTHER if names else CHOICE)
     for gain, told in ((least - 1.0, least == 0.0), (least + 1.0, True)):
-        finding = Finding(name, 1e-9, gain)
-        after = _applied(finding, state, task_of(samples))
+        after = _applied(Finding(name, 1e-9, gain), state, task_of(samples))
         assert [fault.identifier for fault in (after.state.faults if after else ())] == [
             name
         ] * told

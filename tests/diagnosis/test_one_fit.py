@@ -84,8 +84,7 @@ def test_so_it_is_beside_an_effect(rate_hz: float) -> None:
 
 
 def test_a_drag_that_follows_the_speed_is_fitted_and_presumed() -> None:
-    recording = simulated(drag="speed", a=0.02, quality_factor_viscous=400.0)
-    fit, answer = judged(recording)
+    fit, answer = judged(simulated(drag="speed", a=0.02, quality_factor_viscous=400.0))
     assert fit.drag_form == answer["drag_form"] == "speed"
     presumed = [each["id"] for each in answer["effects"] if each["presumed"]]
     assert presumed == ["circular-error", "drag-form"]

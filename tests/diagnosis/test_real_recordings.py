@@ -103,8 +103,7 @@ def test_a_ship_hardens_rather_than_drifts() -> None:
 
 def test_a_mass_on_a_spring_beats_with_a_second_mode() -> None:
     fit = fitted(SPRING, presliding_friction=(0.0, 0.02), tone_pickup=(0.0, 0.0, 1.005))
-    tone = by_identifier("tone-pickup")
-    beat = beat_of(fit, tone)
+    beat = beat_of(fit, by_identifier("tone-pickup"))
     # The readings' spectrum has lines at 1.3451 and 1.0060 Hz.
     assert beat == pytest.approx(1.0 / (1.3451 - 1.0060), rel=0.02)
     # The smaller one's amplitude there is 0.4 mm.

@@ -194,8 +194,7 @@ def test_a_part_of_the_loss_is_held_while_the_other_is_fitted(part: str, share: 
     given = {f"quality_factor_{part}": quality_factor(rate)}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
     assert outcome.verdict == "consistent"
-    fit = outcome.search.baseline
-    kept = getattr(pendulum_of(fit.value), part)
+    kept = getattr(pendulum_of(outcome.search.baseline.value), part)
     assert kept == pytest.approx(rate, rel=1e-4)  # by the apparent frequency
     found = outcome.baseline.parameters["b"]
     assert 0.0 < abs(found.value - TRUTH[B]) < 4.0 * found.sd
@@ -207,8 +206,7 @@ def test_a_viscous_baseline_has_one_part_and_holds_it() -> None:
     outcome = diagnose_recording(record, baseline="viscous", fixed=given)
     names = [effect.identifier for effect in outcome.effects]
     assert names == ["parameter-quality_factor_viscous"]
-    held = outcome.baseline.parameters["b"]
-    assert held.sd == 0.0
+    assert outcome.baseline.parameters["b"].sd == 0.0
 
 
 @pytest.mark.parametrize("given", [{"c": 1.0}, {"mass": 1.0}, {"b": -0.1}])
@@ -239,8 +237,7 @@ def test_probabilities_are_shared_by_the_class_and_none_of_these(name: str) -> N
 
 @pytest.mark.parametrize("name", [*NAMES, "null", "two", "dropped-samples"])
 def test_the_result_is_json_without_nan(name: str) -> None:
-    content = diagnosed(name).to_dict()
-    again = json.loads(json.dumps(content, allow_nan=False))
+    again = json.loads(json.dumps(diagnosed(name).to_dict(), allow_nan=False))
     assert set(again) >= {
         "schema_version",
         "baseline",

@@ -114,8 +114,7 @@ def test_an_effect_scores_its_size_times_its_columns_length(name: str) -> None:
 @pytest.mark.parametrize("name", ["sensor-cubic", "frequency-drift", "equilibrium-step"])
 def test_a_score_of_noise_is_chi_squared_of_one_degree_of_freedom(name: str) -> None:
     bank, drawn = white_residuals(1500)
-    scores = bank.scores(drawn)[bank.rows()[name][0]]
-    assert kstest(scores, chi2(1).cdf).pvalue > 1e-3
+    assert kstest(bank.scores(drawn)[bank.rows()[name][0]], chi2(1).cdf).pvalue > 1e-3
 
 
 def test_a_size_that_cannot_be_negative_scores_with_its_own_sign_alone() -> None:
@@ -123,8 +122,7 @@ def test_a_size_that_cannot_be_negative_scores_with_its_own_sign_alone() -> None
     sided = [row for row, c in enumerate(bank.candidates) if c.effect.one_sided]
     assert sided
     scores = bank.scores(drawn)[sided[0]]
-    none = np.count_nonzero(scores == 0.0)
-    assert abs(none - 750) < 4.0 * np.sqrt(1500 / 4)
+    assert abs(np.count_nonzero(scores == 0.0) - 750) < 4.0 * np.sqrt(1500 / 4)
     assert kstest(scores[scores > 0.0], chi2(1).cdf).pvalue > 1e-3
 
 

@@ -55,8 +55,7 @@ def after_reversals(swing: Swing, random: np.random.Generator, sizes: FloatArray
     """A level that steps after some turning points."""
     turns = np.flatnonzero(np.diff(np.sign(np.diff(swing.angle)))) + 30
     level = np.zeros(len(swing.time_s))
-    chosen = random.choice(turns[4:-4], len(sizes), replace=False)
-    level[chosen] = sizes
+    level[random.choice(turns[4:-4], len(sizes), replace=False)] = sizes
     return np.asarray(np.cumsum(level))
 
 
@@ -70,8 +69,7 @@ def test_counts_lost_after_reversals_are_found_and_undone(swing: Swing) -> None:
     random = np.random.default_rng(3)
     sizes = COUNT * random.choice([-1.0, 1.0], 18)
     level = after_reversals(swing, random, sizes)
-    samples = counted(swing, level)
-    corrected, finding = found("count-slips", samples)
+    corrected, finding = found("count-slips", counted(swing, level))
     assert finding.p_value < 1e-6
     assert finding.parameters["number"].value == 18
     step = finding.parameters["step"]

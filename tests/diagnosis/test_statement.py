@@ -60,8 +60,7 @@ def test_a_class_is_listed_with_the_likeliest_first() -> None:
 
 
 def test_what_eq_8_describes_needs_no_effect() -> None:
-    model = FittedModel({}, 1e-4, 1.0)
-    text = statement("eq8", model, [], 1e-4, 0.4, 0.4, 0.01)
+    text = statement("eq8", FittedModel({}, 1e-4, 1.0), [], 1e-4, 0.4, 0.4, 0.01)
     assert text.startswith("Eq. 8 describes this recording")
     assert "p = 0.4" in text
 

@@ -63,8 +63,7 @@ def test_a_rival_is_compared_by_its_gain_with_the_final_noise(
     (step,) = found.steps
     weighed = weigh(found, step)
     one = step.rivals[place]
-    own = one.fit.value[len(TRUTH) :]
-    start = np.append(weighed.without.value, own)
+    start = np.append(weighed.without.value, one.fit.value[len(TRUTH) :])
     model = weighed.without.model.adding(one.lead.effect)
     fit = refine(model, found.data, found.noise, start, held=found.held)
     behind = fit.chi2 - found.fit.chi2
@@ -149,8 +148,7 @@ def test_each_of_several_names_is_less_certain_than_one() -> None:
         for name in ("impulse", "second-mode")
     ]
     # The comparison of one step does not look at what the others explain.
-    several = replace(found, steps=(step, *others))
-    doubted = weigh(several, step).weights
+    doubted = weigh(replace(found, steps=(step, *others)), step).weights
     assert doubted[-1] / doubted[0] == pytest.approx(np.exp(2.2) * alone[-1] / alone[0], rel=1e-2)
 
 
@@ -166,8 +164,7 @@ def test_a_line_near_a_harmonic_is_doubted_by_the_chance_that_it_is_so_near(
     second = by_identifier("second-mode")
     tone = [1e-3, 0.0, (order + off) * FREQUENCY_HZ, 30.0]
     readings = Model(TIME_S, INTERVAL_S, (second,)).reading(np.append(TRUTH, tone))
-    made = diagnose_recording(recording(readings, 5))
-    (effect,) = made.effects
+    (effect,) = diagnose_recording(recording(readings, 5)).effects
     assert effect.identifier == "second-mode"
     by_chance = min(2.0 * off, 6.0 * (1.0 / 3.0 - off))
     named = 1.0 / (1.0 + np.exp(-2.5) / by_chance)

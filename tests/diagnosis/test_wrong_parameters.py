@@ -66,8 +66,7 @@ def test_right_predictions_are_not_blamed_for_missing_physics() -> None:
     effect = by_identifier("cubic-damping")
     readings = Model(TIME_S, INTERVAL_S, (effect,)).reading(np.append(TRUTH, [0.05, 1.0]))
     given = {"a": float(TRUTH[A]), "b": float(TRUTH[B]), "c": float(TRUTH[C])}
-    outcome = diagnose_recording(recording(readings, 3), fixed=given)
-    (found,) = outcome.effects
+    (found,) = diagnose_recording(recording(readings, 3), fixed=given).effects
     assert not found.identifier.startswith("parameter")
     suspected = dict(found.indistinguishable)
     assert "cubic-damping" in {found.identifier, *suspected}
