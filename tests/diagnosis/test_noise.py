@@ -8,11 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.fft import idct
 from scipy.signal import lfilter
+from scipy.stats import chi2
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise, white_noise
-from pendpipe.diagnosis.noise_estimate import _about_lines, estimate_noise
+from pendpipe.diagnosis.noise_estimate import _about_lines, estimate_noise, stands_out
 
 COUNT, INTERVAL_S, MOTION_HZ = 1500, 1.0 / 15.0, 0.9
 FREQUENCY_HZ = np.arange(COUNT) / (2.0 * COUNT * INTERVAL_S)
@@ -248,3 +249,10 @@ def test_a_misfit_stands_out_of_noise_of_any_colour(
     times = np.arange(COUNT) * INTERVAL_S
     wrong = readings + 5e-4 * np.sin(2.0 * np.pi * MOTION_HZ * times)
     assert noise.misfit(noise.whiten(wrong)) > 3.0
+
+
+def test_a_square_stands_out_where_a_line_is_likelier_than_noise() -> None:
+    """chi^2 of one degree of freedom, against lines: a thousandth, over 20 of ln P."""
+    ratio = np.linspace(0.01, 60.0, 6000)
+    noise = ratio * chi2(1).pdf(ratio)
+    assert np.array_equal(stands_out(ratio), (noise < 1e-3 / 20.0) & (ratio > 1.0))
