@@ -176,7 +176,6 @@ class Found:
     noise: float = math.nan
     p_value: float | None = None
     restoring: str = ""
-    drag_form: str = ""
     verdict: str = ""
     names: tuple[str, ...] = ()
     diagnosed_noise: float = math.nan
@@ -211,7 +210,6 @@ def judge(truth: Truth, seed: int, *, diagnose: bool) -> Found:
         found.seconds = time.process_time() - begun
     found.light, found.reason, found.readings = result.light, result.light_reason, result.samples
     found.restoring = result.restoring
-    found.drag_form = str(getattr(result, "drag_form", "energy"))
     found.noise = result.noise_rms_rad
     found.p_value = getattr(result, "fit_p_value", None)
     _compare(found, result)
