@@ -2,6 +2,7 @@
 
 import json
 import os
+import socket
 import subprocess
 import sys
 import time
@@ -70,10 +71,13 @@ def test_a_killed_campaign_uses_what_was_recorded(tmp_path: Path) -> None:
 
 
 def test_a_dead_line_fails_its_job_alone_and_the_next_run_tries_again(tmp_path: Path) -> None:
-    with served_process(tmp_path, LINK) as (_, port):
-        pass  # unplugged before the first scan
-    campaign = LiveCampaign(tmp_path, port, DURATION_S)
-    done = campaign.run()
+    # Nobody listens there, and nobody else can: the name of a terminal, or of a socket that was
+    # closed, is given to the next device of any test.
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        port = f"socket://127.0.0.1:{silent.getsockname()[1]}"
+        campaign = LiveCampaign(tmp_path, port, DURATION_S)
+        done = campaign.run()
     assert done.returncode == 1
     assert port in (campaign.results / "live/logs/acquire.log").read_text()
     assert (campaign.results / "file/recording.csv").exists()
