@@ -61,7 +61,7 @@ def one_fault(random: np.random.Generator, model: str, label: str) -> tuple[bool
     channels, half = int(random.integers(1, 5)), 1 << (driver.bits - 1)
     # Distinct, so that every scan tells where it belongs.
     codes = random.choice(2 * half, size=(SCANS, channels), replace=False) - half
-    path = FaultyPath([fault_at(random, label, 2 * channels)])
+    path = FaultyPath(fault_at(random, label, 2 * channels))
     scans = driver.decode(path.stream(device.encode(codes), 2 * channels), channels)
     good = [tuple(row) for row in scans.counts[~scans.suspect].tolist()]
     true = {tuple(row) for row in codes.tolist()}

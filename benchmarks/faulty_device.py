@@ -1,4 +1,4 @@
-"""A simulated device with faults on demand, for tests and benchmarks.
+"""A simulated device with a fault on demand, for tests and benchmarks.
 
 A fault of the stream is set off once, when its place is reached; places count the bytes
 of data that the device has made since it was switched on, over all its streams. A fault
@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.devices.simulated import (
@@ -45,7 +45,7 @@ FAULTS: Final[Mapping[str, str]] = {
 }
 """What a `Fault` may be, by its kind."""
 
-Condition = Literal["", "overflow", "stall", "unplug", "silence"]
+OF_ANSWERS: Final = ("no echo", "wrong echo", "late echo", "padded echo", "junk")
 
 
 @dataclass(frozen=True)
@@ -91,57 +91,34 @@ class Fault:
 
 
 class FaultyPath:
-    """What stands between a device and its line, and does the harm.
+    """What stands between a device and its line, and does the harm once."""
 
-    Parameters
-    ----------
-    faults
-        Those to be set off.
-    """
-
-    def __init__(self, faults: Iterable[Fault] = ()) -> None:
-        every = tuple(faults)
-        self.rate_factor = 1.0
-        for fault in every:
-            if fault.kind == "wrong rate":
-                self.rate_factor *= fault.factor
-        self.stale = any(fault.kind == "stale stream" for fault in every)
-        self.condition: Condition = ""
-        self.condition_s = 0.0  # how long the condition lasts
-        echoes = {"no echo", "wrong echo", "late echo", "padded echo", "junk"}
-        self._answers = [[fault, fault.times] for fault in every if fault.kind in echoes]
-        self._stream = [
-            fault
-            for fault in sorted(every, key=lambda fault: fault.at)
-            if fault.kind not in echoes | {"wrong rate", "stale stream"}
-        ]
+    def __init__(self, fault: Fault) -> None:
+        self.fault = fault
+        self.condition = ""
+        self._answers = fault.times if fault.kind in OF_ANSWERS else 0
+        self._waits = fault.kind not in {*OF_ANSWERS, "wrong rate", "stale stream"}
         self._late: list[tuple[float, bytes]] = []
         self._passed = 0  # bytes of the stream
         self._skip = 0  # bytes still to be lost
-        if self._stream and self._stream[0].at < 0:
-            self._set(self._stream.pop(0))
+        if self._waits and fault.at < 0:
+            self._waits, self.condition = False, fault.kind
 
     def answer(self, reply: bytes, now_s: float) -> bytes:
         """Return what comes of an answer; what comes late is kept for `due`."""
-        for entry in self._answers:
-            fault, left = entry
-            if not (isinstance(fault, Fault) and isinstance(left, int)):
-                continue
-            if not reply or left <= 0 or fault.command not in reply:
-                continue
-            entry[1] = left - 1
-            if fault.kind == "junk":
-                reply = b"\xff\xfe\x7f" + reply
-            elif fault.kind == "no echo":
-                reply = b""
-            elif fault.kind == "wrong echo":
-                reply = bytes([reply[0] ^ 0x04]) + reply[1:]
-            elif fault.kind == "padded echo":
-                reply += b"\0" * fault.count
-            else:
-                self._late.append((now_s + fault.duration_s, reply))
-                reply = b""
-        return reply
+        if not reply or not self._answers or self.fault.command not in reply:
+            return reply
+        self._answers -= 1
+        match self.fault.kind:
+            case "junk":
+                return b"\xff\xfe\x7f" + reply
+            case "wrong echo":
+                return bytes([reply[0] ^ 0x04]) + reply[1:]
+            case "padded echo":
+                return reply + b"\0" * self.fault.count
+            case "late echo":
+                self._late.append((now_s + self.fault.duration_s, reply))
+        return b""
 
     def due(self, now_s: float) -> bytes:
         """Return the late answers that are due."""
@@ -155,37 +132,28 @@ class FaultyPath:
         After a fault that ends or delays the stream, `condition` says which: the rest of
         these bytes is lost with it (but for a stall).
         """
-        out = bytearray()
-        done = min(self._skip, len(data))
-        self._skip -= done
-        while self._stream and self._stream[0].at < self._passed + len(data):
-            fault = self._stream.pop(0)
-            here = min(len(data), max(done, fault.at - self._passed))
-            out += data[done:here]
-            done = here
-            if fault.kind in ("drop", "lost scans"):
-                self._skip += fault.count * (scan_bytes if fault.kind == "lost scans" else 1)
-                gone = min(self._skip, len(data) - done)
-                self._skip -= gone
-                done += gone
-            elif fault.kind == "duplicate":
-                out += data[done : done + fault.count]
-            elif fault.kind == "flip":
-                out += bytes([value ^ 1 << fault.bit for value in data[done : done + 1]])
-                done = min(len(data), done + 1)
-            else:
-                self._set(fault)
-                if fault.kind == "overflow":
-                    out += b"stop 0%d\r" % fault.code
-                if fault.kind != "stall":
-                    done = len(data)
+        fault, at = self.fault, self.fault.at - self._passed
         self._passed += len(data)
-        return bytes(out + data[done:])
-
-    def _set(self, fault: Fault) -> None:
-        if fault.kind in ("overflow", "stall", "unplug", "silence"):
-            self.condition = fault.kind  # type: ignore[assignment]
-            self.condition_s = fault.duration_s
+        if self._waits and at < len(data):
+            self._waits = False
+            head, rest = data[: max(at, 0)], data[max(at, 0) :]
+            match fault.kind:
+                case "drop" | "lost scans":
+                    self._skip = fault.count * (scan_bytes if fault.kind == "lost scans" else 1)
+                case "duplicate":
+                    head += rest[: fault.count]
+                case "flip":
+                    head += bytes([value ^ 1 << fault.bit for value in rest[:1]])
+                    rest = rest[1:]
+                case _:
+                    self.condition = fault.kind
+                    head += b"stop 0%d\r" % fault.code * (fault.kind == "overflow")
+                    rest = rest if fault.kind == "stall" else b""
+        else:
+            head, rest = b"", data
+        gone = min(self._skip, len(rest))
+        self._skip -= gone
+        return head + rest[gone:]
 
 
 class ReplaceableTerminal(PseudoTerminal):
@@ -229,7 +197,7 @@ class FaultyDevice(SimulatedDevice):
     ----------
     kind, signal, **options
         See `SimulatedDevice`.
-    faults
+    fault
         What is to go wrong.
     link
         ``"pty"``, ``"socket"``, ``None`` for what the system has, or a device's end itself.
@@ -239,12 +207,12 @@ class FaultyDevice(SimulatedDevice):
         self,
         kind: str,
         signal: Signal,
-        faults: Iterable[Fault],
+        fault: Fault,
         *,
         link: str | Link | None = None,
         **options: Any,
     ) -> None:
-        self._path = FaultyPath(faults)
+        self._path = FaultyPath(fault)
         self._offset_s = 0.0  # of the stream, on the signal's clock
         if link is None or isinstance(link, str):
             terminal = link == "pty" or (link is None and hasattr(os, "openpty"))
@@ -253,13 +221,13 @@ class FaultyDevice(SimulatedDevice):
             kind,
             lambda time_s: signal(time_s + self._offset_s),
             link=link,
-            rate_error=self._path.rate_factor - 1.0,
+            rate_error=fault.factor - 1.0,
             **options,
         )
         self._first_start_s: float | None = None
         self._until_s = 0.0  # the end of a stall or a silence
         self._condition = ""
-        if self._path.stale:
+        if fault.kind == "stale stream":
             self.dialect.streaming = True
             self._begin()
 
@@ -301,10 +269,10 @@ class FaultyDevice(SimulatedDevice):
         if condition == "overflow":
             self.dialect.streaming = False
         elif condition == "unplug":
-            self._replug(self._path.condition_s)
+            self._replug(self._path.fault.duration_s)
         elif condition:
             self._condition = condition
-            self._until_s = self.clock.now() + self._path.condition_s
+            self._until_s = self.clock.now() + self._path.fault.duration_s
         if self._condition == "silence":
             self._outbox.clear()
             if self._stream:
@@ -330,12 +298,12 @@ class FaultyDevice(SimulatedDevice):
 def acquire_faulty(
     kind: str,
     signal: Signal,
-    faults: Iterable[Fault],
+    fault: Fault,
     *,
     clock_scale: float,
     link: str | None = None,
     **options: Any,
 ) -> Recording:
     """Record from a simulated device with faults; `options` as for `recorder.record`."""
-    with FaultyDevice(kind, signal, faults, clock_scale=clock_scale, link=link) as device:
+    with FaultyDevice(kind, signal, fault, clock_scale=clock_scale, link=link) as device:
         return record_from(device, **options)

@@ -112,7 +112,7 @@ def recorded_in_steps(
 ) -> Recording:
     """Record as `acquire_simulated` does, in a time that only this recording knows."""
     clock, wire = SteppedClock(), Wire()
-    device = FaultyDevice(kind, signal, [fault], link=wire, clock=clock)
+    device = FaultyDevice(kind, signal, fault, link=wire, clock=clock)
     time = SimpleNamespace(sleep=clock.sleep, monotonic=clock.now)
     monkeypatch.setattr(pendpipe.acquisition.recorder, "time", time)
     monkeypatch.setattr(

@@ -48,7 +48,7 @@ def recorded(monkeypatch: pytest.MonkeyPatch) -> Recorded:
 def recorded_from_a_line(kind: str, fault: Fault, duration_s: float, **wish: Any) -> Recording:
     """Record from a terminal or socket, whose plug can be pulled."""
     return acquire_faulty(
-        kind, slow, [fault], rate_hz=RATE_HZ, duration_s=duration_s, clock_scale=SCALE, **wish
+        kind, slow, fault, rate_hz=RATE_HZ, duration_s=duration_s, clock_scale=SCALE, **wish
     )
 
 
