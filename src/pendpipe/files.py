@@ -17,6 +17,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path, PurePath
 from typing import IO, Any, Final
 
@@ -191,10 +192,14 @@ def is_file(path: Path) -> bool:
         return False
 
 
+_MOST_NAMES: Final = 10_000
+"""Of files among which a misspelt one is looked for."""
+
+
 def names_in(folder: Path) -> list[str]:
     """The names in a folder; none where it can't be read."""
     try:
-        return [path.name for path in folder.iterdir()]
+        return [path.name for path in islice(folder.iterdir(), _MOST_NAMES)]
     except (OSError, ValueError):
         return []
 

@@ -9,7 +9,6 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import islice
 from math import isfinite
 from pathlib import Path
 from typing import Any, Final
@@ -18,6 +17,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, nearest, refuse_if
+from pendpipe.files import names_in
 from pendpipe.formats.columns import choose
 from pendpipe.formats.lists import (
     NOT_FREE,
@@ -71,8 +71,6 @@ _OTHERS: Final = (
 )
 """What some give that holds no table, or none that is read; by its first bytes."""
 
-_MOST_NAMES: Final = 10_000
-"""Of files among which a misspelt one is looked for."""
 _MOST_UNPACKING: Final = 64 << 20
 """Bytes of memory that xz may ask for: nine times what it asks for as it is usually set."""
 _PACKED: Final[tuple[tuple[bytes, Callable[[], Any]], ...]] = (
@@ -114,15 +112,6 @@ def read(path: str | Path, options: ReadOptions = _ANYTHING) -> Recording:
     return part
 
 
-def _near(place: Path) -> str:
-    """Name the file whose name is nearest to one that does not exist."""
-    try:
-        names = [other.name for other in islice(place.parent.iterdir(), _MOST_NAMES)]
-    except OSError:
-        return "check the path"
-    return nearest(place.name, names, "check the path")
-
-
 def file_bytes(place: Path) -> bytes:
     """Read a file, or standard input (``-``, ``/dev/stdin``), whole.
 
@@ -145,7 +134,11 @@ def file_bytes(place: Path) -> bytes:
         _refuse_size(place, found.st_size if found else 0)
         data = _standard_input() if standard else place.read_bytes()
     except FileNotFoundError:
-        raise InputError(place, "there is no such file", _near(place)) from None
+        raise InputError(
+            place,
+            "there is no such file",
+            nearest(place.name, names_in(place.parent), "check the path"),
+        ) from None
     except (OSError, ValueError) as fault:
         reason = getattr(fault, "strerror", None) or str(fault)
         raise InputError(place, f"the file can't be read ({reason})", "check it") from None

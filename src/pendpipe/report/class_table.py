@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 import statistics
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
@@ -268,31 +269,26 @@ def class_page(fits: Sequence[Fitted], links: Sequence[str | None] | None = None
     )
 
 
-_TEX: Final = {"±": r"$\pm$", "×": r"$\times$", "°": r"\textdegree{}", "²": r"\textsuperscript{2}"}
+_RAISED: Final = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+_TEX: Final = str.maketrans(
+    {sign: "\\" + sign for sign in "&%$#_{}"}
+    | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+    | {"±": r"$\pm$", "×": r"$\times$", "°": r"\textdegree{}", "π": r"$\pi$"}
+    | {"\N{MINUS SIGN}": "$-$"}
+)
 
 
 def latex(text: str) -> str:
     r"""Escape a cell for LaTeX.
 
-    >>> latex("70 % drag_1")
-    '70 \\% drag\\_1'
+    >>> latex("70 % drag_1"), latex("s⁻¹")
+    ('70 \\% drag\\_1', 's\\textsuperscript{-1}')
     """
-    special = str.maketrans(
-        {sign: "\\" + sign for sign in "&%$#_{}"}
-        | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+    return re.sub(
+        "[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+",
+        lambda found: rf"\textsuperscript{{{found[0].translate(_RAISED)}}}",
+        text.translate(_TEX),
     )
-    text = text.translate(special)
-    raised = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
-    out, power = [], ""
-    for sign in [*text, ""]:
-        if sign and sign in "⁻⁰¹²³⁴⁵⁶⁷⁸⁹":
-            power += sign.translate(raised)
-            continue
-        if power:
-            out.append(rf"\textsuperscript{{{power}}}")
-            power = ""
-        out.append(_TEX.get(sign, sign))
-    return "".join(out).replace("\N{MINUS SIGN}", "$-$").replace("π", r"$\pi$")
 
 
 def _latex(fits: Sequence[Fitted]) -> str:
