@@ -42,9 +42,13 @@ USES: Final = ("*.py", "*.smk", "Snakefile", "*.html", "*.j2", "*.toml", "*.yaml
 """Files in which a name may be used."""
 PLAIN: Final = frozenset({"property", "cached_property", "staticmethod", "classmethod", "cache"})
 """Decorators that enter nothing into a registry."""
-PROTOCOLS: Final = frozenset({"from_param", "generic_resolve", "_repr_html_"})
+PROTOCOLS: Final = frozenset(
+    {"from_param", "generic_resolve", "_repr_html_", "do_GET", "log_message"}
+)
 """What other code finds by name: methods; and below, all definitions of some modules."""
-REGISTRIES: Final = re.compile(r"catalogue/|acquisition/(devices|drivers)/|entries\.py")
+REGISTRIES: Final = re.compile(
+    r"catalogue/|acquisition/(devices|drivers)/|formats/dialects/|entries\.py|logger_plugin"
+)
 LAYOUT: Final = {getattr(tokenize, k) for k in ("COMMENT", "NL", "NEWLINE", "INDENT", "DEDENT")}
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 

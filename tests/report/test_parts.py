@@ -1,6 +1,8 @@
 """Parts of the page: charts, tables, numbers."""
 
+import base64
 import re
+import zlib
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,7 @@ from pendpipe.figures.data import error, number
 from pendpipe.files import without_folders
 from pendpipe.quantities import with_error
 from pendpipe.recording import Recording
-from pendpipe.report.charts import extremes, line, pack, unpack
+from pendpipe.report.charts import extremes, line, pack
 from pendpipe.report.page import inline_svg
 from pendpipe.report.tables import (
     STATES,
@@ -156,6 +158,14 @@ def test_two_records_of_one_frequency_have_no_local_exponent() -> None:
     found = {"value": 0.5, "sd": 0.1, "local_slopes": [0.53, None, -0.2]}
     text = part_of_the_page("exponents.html", {"viscous_exponents": {"low": found}})
     assert "0.53, –, −0.20" in text
+
+
+def unpack(text: str, kind: str) -> Any:
+    """Undo the packing, as the script does: counts are ``"<i2"``, times ``"<i4"``."""
+    numbers = np.frombuffer(zlib.decompress(base64.b64decode(text)), kind)
+    for _ in range(2):
+        numbers = np.cumsum(numbers, dtype=numbers.dtype)
+    return numbers
 
 
 def test_counts_of_a_converter_survive_the_packing_to_the_bit() -> None:

@@ -189,14 +189,6 @@ def _packed(numbers: AnyArray) -> str:
     return base64.b64encode(zlib.compress(numbers.tobytes(), 9)).decode()
 
 
-def unpack(text: str, kind: str) -> AnyArray:
-    """Undo the packing, as the script does: counts are ``"<i2"``, times ``"<i4"``."""
-    numbers = np.frombuffer(zlib.decompress(base64.b64decode(text)), kind)
-    for _ in range(2):
-        numbers = np.cumsum(numbers, dtype=numbers.dtype)
-    return numbers
-
-
 def quality_by_amplitude(decay: Decay) -> Chart | None:
     """Draw Q of the fitted law against amplitude, and what the turning points alone show.
 
