@@ -30,8 +30,8 @@ PARTS: Final = {"null": 0.2, "single": 0.45, "combination": 0.15, "outside": 0.2
 EVIDENCE: Final = (100.0, 1e5)
 NOISES: Final = ("white", "memory", "red", "changing", "heavy-tails", "smoothed")
 """Families of `benchmarks.null_families` that some nulls have."""
-KEPT: Final = ("verdict", "effects")
-"""Of a diagnosis."""
+KEPT: Final = ("id", "presumed", "probability", "indistinguishable_from")
+"""Of each effect of a diagnosis."""
 
 
 def draw(name: str, number: int) -> Item:
@@ -66,7 +66,8 @@ def answer(key: tuple[str, int]) -> dict[str, Any]:
             content = pp.diagnose(pp.read(path)).to_dict()
         except Exception as error:
             return kept | {"failed": repr(error), "cpu_s": time.process_time() - before}
-    kept["diagnosis"] = {each: content[each] for each in KEPT}
+    effects = [{key: effect[key] for key in KEPT} for effect in content["effects"]]
+    kept["diagnosis"] = {"verdict": content["verdict"], "effects": effects}
     return kept | {"cpu_s": time.process_time() - before}
 
 

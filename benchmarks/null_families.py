@@ -26,51 +26,11 @@ from scipy import signal
 from benchmarks import journal
 from benchmarks.table import share
 from pendpipe.arrays import FloatArray as Array
-from pendpipe_challenge.motion import Motion
-from pendpipe_challenge.torques import of_rates
+from pendpipe_challenge.world import Scene
 
 RATES: Final = ("a", "b", "c", "frequency")
 STATED: Final = frozenset({"coloured-noise"})
 """Effects that say what the noise is, and name no cause."""
-
-
-# ---------------------------------------------------------------- the motion
-
-
-@dataclass(frozen=True)
-class Law:
-    """Eq. 8 with a linear restoring torque, by the rates of Eq. 13.
-
-    Parameters
-    ----------
-    frequency_hz
-        omega/(2 pi) of Eq. 8.
-    quadratic, viscous, hysteretic, coulomb
-        a in 1/(rad s), b_v and b_h in 1/s, c in rad/s.
-    """
-
-    frequency_hz: float
-    quadratic: float
-    viscous: float
-    hysteretic: float
-    coulomb: float
-
-    @property
-    def rates(self) -> dict[str, float]:
-        """What a fit should find."""
-        linear = self.viscous + self.hysteretic
-        found = (self.quadratic, linear, self.coulomb, self.frequency_hz)
-        return dict(zip(RATES, found, strict=True))
-
-
-def motion(law: Law, amplitude: float, time_s: Array) -> tuple[Array, Array]:
-    """Angle and amplitude r at the given times after a release from rest at ``amplitude``."""
-    omega = 2 * np.pi * law.frequency_hz
-    rates = (law.quadratic, law.viscous, law.hysteretic, law.coulomb)
-    moving = Motion(of_rates(omega, *rates) | {"step_phase": 0.08}, amplitude)
-    track = moving.run(np.r_[0.0, time_s])
-    angle, rate = track.angle_rad[1:], track.rate_rad_s[1:]
-    return angle, np.hypot(angle, rate / omega)
 
 
 # ---------------------------------------------------------------- the noise
@@ -225,12 +185,18 @@ TRUE_NAMES: Final = {"rounded": frozenset({"coarse-quantisation"})}
 
 @dataclass(frozen=True)
 class Null:
-    """A recording that lacks nothing, and its law."""
+    """A recording that lacks nothing, and the pendulum that made it."""
 
     time_s: Array
     angle_rad: Array
-    law: Law
-    noise_rms: float
+    scene: Scene
+
+    @property
+    def rates(self) -> dict[str, float]:
+        """What a fit should find."""
+        a, viscous, hysteretic, c = self.scene.rates
+        found = (a, viscous + hysteretic, c, self.scene.frequency_hz)
+        return dict(zip(RATES, found, strict=True))
 
 
 def draw(family: str, number: int) -> Null:
@@ -249,19 +215,23 @@ def draw(family: str, number: int) -> Null:
     pace = shares @ np.array([y**2, y, np.full_like(y, 0.2)])
     scale = -np.trapezoid(1 / pace, y) * frequency / cycles
     hysteretic = rng.choice([0.0, 0.0, 1.0, rng.uniform()])
-    law = Law(
-        frequency,
-        quadratic=float(scale * shares[0] / amplitude),
-        viscous=float(scale * shares[1] * (1 - hysteretic)),
-        hysteretic=float(scale * shares[1] * hysteretic),
-        coulomb=float(scale * shares[2] * 0.2 * amplitude),
+    linear = scale * shares[1]
+    rates = (scale * shares[0] / amplitude, linear * (1 - hysteretic), linear * hysteretic)
+    scene = Scene(
+        apparatus=family,
+        frequency_hz=frequency,
+        rates=(*map(float, rates), float(scale * shares[2] * 0.2 * amplitude)),
+        amplitude=float(amplitude),
+        lead_s=float(rng.uniform() / frequency),
+        offset=float(0.1 * amplitude * rng.uniform(-1, 1)),
+        noise_rms=float(amplitude / np.exp(rng.uniform(*np.log([200, 5000])))),
+        step=0.0,
+        time_s=np.arange(readings) / (in_cycle * frequency),
     )
-    first, offset = rng.uniform() / frequency, 0.1 * amplitude * rng.uniform(-1, 1)
-    time_s = np.arange(readings) / (in_cycle * frequency)
-    angle, level = motion(law, amplitude, first + time_s)
-    noise_rms = amplitude / float(np.exp(rng.uniform(*np.log([200, 5000]))))
-    read = FAMILIES[family](rng, Swing(time_s, angle + offset, level, noise_rms))
-    return Null(time_s, read, law, noise_rms)
+    angle, seen = scene.reading([])
+    level = np.hypot(seen.x, seen.v / scene.omega)
+    read = FAMILIES[family](rng, Swing(scene.time_s, angle, level, scene.noise_rms))
+    return Null(scene.time_s, read, scene)
 
 
 # ---------------------------------------------------------------- the answers
@@ -285,7 +255,7 @@ def answer(key: tuple[str, int]) -> dict[str, Any]:
         return kept | {"reason": content["reason"]}
     found = content["improved"]["parameters"]
     covers: dict[str, bool | None] = {}
-    for name, truth in null.law.rates.items():
+    for name, truth in null.rates.items():
         low, high = found[name]["interval95"] or (None, None)
         inside = (low is None or low <= truth) and (high is None or truth <= high)
         covers[name] = None if low is None and high is None else inside
@@ -298,7 +268,7 @@ def answer(key: tuple[str, int]) -> dict[str, Any]:
         ],
         "covers": covers,
         "chi2_per_dof": content["improved"]["chi2_per_dof"],
-        "noise_ratio": content["noise_rms_rad"] / null.noise_rms,
+        "noise_ratio": content["noise_rms_rad"] / null.scene.noise_rms,
     }
 
 
@@ -345,7 +315,7 @@ HEAD: Final = (
 
 SOURCES: Final = (
     *("src/pendpipe/**/*.py", "benchmarks/null_families.py"),
-    "challenge/src/pendpipe_challenge/[mt]o*.py",
+    "challenge/src/pendpipe_challenge/[mtw]o*.py",
 )
 
 

@@ -108,6 +108,19 @@ def test_the_other_families_are_counted_by_their_own_rules() -> None:
     assert counts["ties: a lone name without doubt"] == (1, 2)
 
 
+def test_intervals_hold_the_numbers_of_what_was_named_or_not() -> None:
+    hidden = truth("single", K3)
+    hidden["effects"][0] |= {"own_form": True, "parameters": {"cubic": 1.0}}
+    pairs = []
+    for interval in ([0.9, 1.3], [1.1, 1.3]):
+        said = answer(K3)
+        said["diagnosis"]["effects"][0]["parameters"] = {"k3": {"interval95": interval}}
+        pairs.append((hidden, said))
+    found = score(opened(*pairs, (hidden, answer("backlash"))))["others"]
+    held = found["numbers of a named effect: the 95 % interval holds"]
+    assert (held["hits"], held["of"]) == (1, 2)
+
+
 def test_places_are_held_by_the_answer_s_intervals_or_not() -> None:
     """An instant by its times, to a reading; a tone by its fitted frequency."""
     knock, tone = truth("single", "impulse"), truth("single", "tone-pickup")

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 from pendpipe.arrays import FloatArray
@@ -44,6 +45,19 @@ def change(effect: str, size: float, form: str = "", **other: object) -> tuple[F
     drawn = law_of(effect, form).draw(np.random.default_rng(4), there)
     plain, seen = there.reading([])
     return there.reading([Cause(effect, drawn, size)])[0] - plain, seen.x, seen.v
+
+
+def test_the_level_falls_as_eq_13_says_where_the_loss_is_small() -> None:
+    there = scene(frequency_hz=1.0, rates=(2e-3, 2e-4, 1e-4, 1e-5), amplitude=0.2, lead_s=0.0)
+    _, seen = there.reading([])
+    fall = solve_ivp(
+        *(lambda _, y: -(2e-3 * y**2 + 3e-4 * y + 1e-5), (0, 59.0), [0.2]),
+        rtol=1e-10,
+        atol=1e-12,
+    )
+    level = np.hypot(seen.x, seen.v / there.omega)
+    # Within a cycle it falls by steps.
+    assert level[59 * 50] == pytest.approx(fall.y[0, -1], rel=1e-5)
 
 
 def test_whitened_noise_is_white() -> None:

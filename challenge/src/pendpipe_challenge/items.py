@@ -11,7 +11,7 @@ and converters of pendulums that swing by sin x, up to 2.6 rad, or of torsion wh
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
@@ -33,7 +33,7 @@ from pendpipe_challenge.world import EVENT_EDGE, EVENT_JITTER_S, Bench, Cause, R
 Recipe = dict[str, Any]
 """``family``, ``apparatus``, ``effects`` and the ``delta_chi2`` wanted of each."""
 Noise = Callable[[Rng, Seen, Array, Array, float], Array]
-"""Adds noise of its own to a reading: from what is seen, the reading, the amplitude and an rms."""
+"""Adds noise of another kind to a reading, from its amplitude and an rms."""
 VOLTS_PER_RADIAN: Final = 3.85
 RANGES_VOLTS: Final = (1.25, 2.5, 5.0, 10.0)
 
@@ -228,17 +228,66 @@ def make_item(recipe: Recipe, rng: Rng, noise: Noise | None = None) -> Item:
 
 def _try(recipe: Recipe, rng: Rng, ease: float, noise: Noise | None) -> Item | None:
     """An item, unless the scene that is drawn can't show what is wanted of it."""
-    family = recipe["family"]
-    apparatus = recipe.get("apparatus", "laboratory")
-    scene = draw_scene(rng, apparatus)
+    family, apparatus = recipe["family"], recipe.get("apparatus", "laboratory")
+    scene, laboratory = draw_scene(rng, apparatus), apparatus == "laboratory"
+    effects = recipe["effects"] if "effects" in recipe else _effects(rng, family, scene)
+    if ONLY_VISCOUS.intersection(effects):
+        scene = replace(scene, baseline="viscous", rates=(0.0, scene.loss_rate, 0.0, 0.0))
     causes = []
     if apparatus not in ("laboratory", "wheel"):
         (sine,) = CATALOGUE["circular-error"]
         causes.append(Cause(sine.effect, sine.draw(rng, scene), 1.0))
     background = len(causes)
-    effects = recipe["effects"] if "effects" in recipe else _effects(rng, family, scene)
-    if ONLY_VISCOUS.intersection(effects):
-        scene = replace(scene, baseline="viscous", rates=(0.0, scene.loss_rate, 0.0, 0.0))
+    laws = _hide(recipe, rng, scene, causes, effects, ease)
+    if laws is None:
+        return None
+    bench = Bench(scene, causes)
+    if (
+        recipe.get("cancelling")
+        and laws[1].signed
+        and float(bench.columns.T[0] @ bench.columns.T[1]) > 0
+    ):
+        bench = Bench(scene, [causes[0], causes[1]._replace(size=-causes[1].size)])
+    left: dict[str, Any] = {}
+    if laboratory:
+        oracle = Oracle(bench, listed(scene), rng)
+        if family == "outside":
+            # Sized by what no listed effect takes up.
+            grown = (recipe["delta_chi2"][0] * ease / oracle.left_by_catalogue()[0]) ** 0.5
+            size = causes[0].size * min(grown, laws[0].most / abs(causes[0].size))
+            bench = Bench(scene, [causes[0]._replace(size=size)])
+            oracle = Oracle(bench, listed(scene), rng)
+            left = dict(
+                zip(("left_by_catalogue", "best_mimic"), oracle.left_by_catalogue(), strict=True)
+            )
+    columns = recorded(rng, scene, bench.causes, noise)
+    if columns is None:
+        return None
+    truth = truth_of(family, scene, laws, bench, background)
+    truth["wanted_delta_chi2"] = recipe["delta_chi2"]
+    if noise is not None:
+        truth["allowed"] = sorted({*truth["allowed"], "coloured-noise"})
+    if not laboratory:
+        return Item(columns, {}, truth)
+    if left:
+        truth["effects"][0] |= left
+    if not any(law.chance for law in laws):
+        truth["oracle"] = oracle.judge(columns["angle_rad"] - bench.there, rng)
+    full = scene.step * VOLTS_PER_RADIAN * 2.0 ** (scene.bits - 1)
+    stated = {"volts_per_radian": VOLTS_PER_RADIAN, "bits": scene.bits, "range_volts": full}
+    volts = {"time_s": columns["time_s"], "volts": VOLTS_PER_RADIAN * columns["angle_rad"]}
+    return Item(volts, {key: f"{value:.9g}" for key, value in stated.items()}, truth)
+
+
+def _hide(
+    recipe: Recipe,
+    rng: Rng,
+    scene: Scene,
+    causes: list[Cause],
+    effects: Sequence[str],
+    ease: float,
+) -> list[Law] | None:
+    """Add a cause for each effect, by one of its laws, of the size that is wanted."""
     laws = []
     for effect, wanted in zip(effects, recipe["delta_chi2"], strict=False):
         forms = [law for law in (CATALOGUE | OUTSIDE)[effect] if fits(law, scene)]
@@ -250,45 +299,7 @@ def _try(recipe: Recipe, rng: Rng, ease: float, noise: Noise | None) -> Item | N
         if cause is None:
             return None
         causes.append(cause)
-    bench = Bench(scene, causes) if causes or apparatus == "laboratory" else None
-    if bench and recipe.get("cancelling"):
-        one, two = bench.columns.T
-        if laws[1].signed and float(one @ two) > 0:
-            causes[1] = causes[1]._replace(size=-causes[1].size)
-            bench = Bench(scene, causes)
-    oracle = Oracle(bench, listed(scene), rng) if bench and apparatus == "laboratory" else None
-    beyond: dict[str, Any] = {}
-    if oracle and family == "outside":
-        # Sized by what no listed effect takes up.
-        left, _ = oracle.left_by_catalogue()
-        grown = (recipe["delta_chi2"][0] * ease / max(left, 1e-3)) ** 0.5
-        most = laws[0].most / abs(causes[0].size)
-        causes[0] = causes[0]._replace(size=causes[0].size * min(grown, most))
-        bench = Bench(scene, causes)
-        oracle = Oracle(bench, listed(scene), rng)
-        left, mimic = oracle.left_by_catalogue()
-        beyond = {"left_by_catalogue": left, "best_mimic": mimic}
-    columns = recorded(rng, scene, causes, noise)
-    if columns is None:
-        return None
-    truth = truth_of(family, scene, laws, bench, background)
-    truth["wanted_delta_chi2"] = recipe.get("delta_chi2")
-    if noise is not None:
-        truth["allowed"] = sorted({*truth["allowed"], "coloured-noise"})
-    if beyond:
-        truth["effects"][0] |= beyond
-    if oracle and bench and not any(law.chance for law in laws):
-        truth["oracle"] = oracle.judge(columns["angle_rad"] - bench.there, rng)
-    header: dict[str, str] = {}
-    if apparatus == "laboratory":
-        columns = {
-            "time_s": columns["time_s"],
-            "volts": VOLTS_PER_RADIAN * columns["angle_rad"],
-        }
-        full = scene.step * VOLTS_PER_RADIAN * 2.0 ** (scene.bits - 1)
-        stated = {"volts_per_radian": VOLTS_PER_RADIAN, "bits": scene.bits, "range_volts": full}
-        header = {key: f"{value:.9g}" for key, value in stated.items()}
-    return Item(columns, header, truth)
+    return laws
 
 
 def listed(scene: Scene) -> list[str]:
@@ -339,12 +350,13 @@ def worth_of(law: Law, bench: Bench, number: int) -> float:
 
 
 def truth_of(
-    family: str, scene: Scene, laws: list[Law], bench: Bench | None, background: int
+    family: str, scene: Scene, laws: list[Law], bench: Bench, background: int
 ) -> dict[str, Any]:
     """The truth in plain numbers."""
     effects = []
+    plain = scene.world([]).motion.parameters
     for number, law in enumerate(laws, background):
-        assert bench is not None
+        changed = scene.world([bench.causes[number]]).motion.parameters
         entry = {
             "effect": law.names[0],
             "also": list(law.names[1:]),
@@ -354,6 +366,7 @@ def truth_of(
             "delta_chi2": worth_of(law, bench, number),
             "alone_delta_chi2": float(bench.alone[number]),
             "size": bench.causes[number].size,
+            "parameters": {k: float(v) for k, v in changed.items() if v != plain.get(k)},
         }
         if law.effect == "tone-pickup":
             entry["tone_hz"] = scene.tone_hz
@@ -372,7 +385,7 @@ def truth_of(
         "apparatus": scene.apparatus + ", events" * scene.event_driven,
         "baseline": scene.baseline,
         "effects": effects,
-        "present": [cause.name for cause in (bench.causes if bench else [])[:background]],
+        "present": [cause.name for cause in bench.causes[:background]],
         "allowed": sorted(allowed),
         "nuisances": {
             "frequency_hz": scene.frequency_hz,
@@ -383,9 +396,7 @@ def truth_of(
             "red": scene.red,
             "readings": len(scene.time_s),
         },
-        "total_delta_chi2": float(np.sum(bench.columns[:, background:].sum(axis=1) ** 2))
-        if bench
-        else 0.0,
+        "total_delta_chi2": float(np.sum(bench.columns[:, background:].sum(axis=1) ** 2)),
         "oracle": None,
     }
 
@@ -397,13 +408,13 @@ def recorded(
     if scene.event_driven:
         columns = events(rng, scene, causes)
         return columns if 500 <= len(columns["time_s"]) <= 60_000 else None
-    y, seen = scene.reading(causes)
-    if noise:
-        y = noise(rng, seen, y, np.hypot(seen.x, seen.v / scene.omega), scene.noise_rms)
-    else:
-        y = y + scene.noise(rng)
-    for limit in scene.world(causes).limits:
-        y = limit(y)
+
+    def noisy(seen: Seen, y: Array) -> Array:
+        if noise is None:
+            return y + scene.noise(rng)
+        return noise(rng, seen, y, np.hypot(seen.x, seen.v / scene.omega), scene.noise_rms)
+
+    y, seen = scene.reading(causes, noise=noisy)
     if scene.step:
         y = scene.step * np.floor(y / scene.step + 0.5)
     return {"time_s": seen.time_s, "angle_rad": y}

@@ -283,6 +283,7 @@ def questions(items: Sequence[Solved]) -> dict[str, list[bool]]:
         "outside: confidently wrong": [any(p > CONFIDENT for p in i.false) for i in outside],
         "outside: a curve, or no name but true ones": [i.curve or not i.false for i in outside],
         "outside, large: unnamed, of the right kind": [i.holds(i.effect) for i in large],
+        "numbers of a named effect: the 95 % interval holds": covered(items),
         **{f"place: {what}": held for what, held in places(items).items()},
     }
 
@@ -346,10 +347,42 @@ def places(items: Sequence[Solved]) -> dict[str, list[bool]]:
                     held = ends[0] - slack <= effect["instant_s"] <= ends[1] + slack
                     found["instants"].append(held)
             elif "tone_hz" in effect:
-                hertz = [e for e in entry["parameters"].values() if e.get("unit") == "Hz"]
+                hertz = [
+                    e for e in (entry.get("parameters") or {}).values() if e.get("unit") == "Hz"
+                ]
                 if hertz and hertz[-1].get("interval95"):
                     low, high = hertz[-1]["interval95"]
                     found["tones"].append(low <= effect["tone_hz"] <= high)
+    return found
+
+
+OWN_NAMES: Final[dict[str, dict[str, tuple[str, float]]]] = {
+    "cubic-stiffness": {"k3": ("cubic", 1.0)},
+    "quadratic-stiffness": {"k2": ("square", 1.0)},
+    "stribeck-friction": {"f_s": ("stribeck", 1.0), "v_s": ("stribeck_speed", 1.0)},
+    "presliding-friction": {"k_d": ("dahl", 1.0), "z_c": ("dahl_reach", 1.0)},
+    "backlash": {"b": ("play", 2.0)},
+    "history-force": {"h": ("basset", 1.0)},
+    "release-transient": {"gamma": ("release", 0.5), "tau": ("release_time", 1.0)},
+    "equilibrium-step": {"J": ("rest_jump", 1.0), "time": ("rest_jump_at", 1.0)},
+    "amplitude-step": {"s": ("scaling", 1.0), "time": ("scaling_at", 1.0)},
+    "frequency-step": {"change": ("omega_jump", 1.0), "time": ("omega_jump_at", 1.0)},
+    "impulse": {"dv": ("impulse", 1.0), "time": ("impulse_at", 1.0)},
+}
+"""By effect and name in docs/effects.md: the parameter of the motion here, and a factor."""
+
+
+def covered(items: Sequence[Solved]) -> list[bool]:
+    """Whether intervals hold the numbers of effects that act by the catalogue's own law."""
+    found = []
+    for item in items:
+        if not (item.hidden and item.effect.get("own_form") and item.lead == item.effect["effect"]):
+            continue
+        fitted, true = item.effects[0].get("parameters") or {}, item.effect["parameters"]
+        for name, (own, factor) in OWN_NAMES.get(item.lead, {}).items():
+            interval = (fitted.get(name) or {}).get("interval95")
+            if interval and own in true:
+                found.append(interval[0] <= factor * true[own] <= interval[1])
     return found
 
 

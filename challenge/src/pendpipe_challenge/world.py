@@ -221,8 +221,9 @@ class Scene:
         causes: list[Cause],
         change: Callable[[World], None] | None = None,
         time_s: Array | None = None,
+        noise: Reading | None = None,
     ) -> tuple[Array, Seen]:
-        """What a sensor without noise and without steps reads, and what it sees.
+        """What a sensor without steps reads, and what it sees.
 
         Parameters
         ----------
@@ -232,6 +233,8 @@ class Scene:
             A last change of the world, by which parameters are varied.
         time_s
             Other times than those of the readings.
+        noise
+            What adds noise; without it there is none.
         """
         world = self.world(causes)
         if change:
@@ -248,7 +251,7 @@ class Scene:
         for column, values in zip(seen[1:], sampled, strict=True):
             column[order] = values[1:]
         y = seen.x + self.offset
-        for read in world.readings:
+        for read in [*world.readings, *([noise] if noise else [])]:
             y = read(seen, y)
         for limit in world.limits:
             y = limit(y)
