@@ -4,11 +4,11 @@
     python -m benchmarks.mutations [--number 30] [--commit HEAD] [--place DIR] [--all]
 
 Of all mutations of `src/pendpipe` that cosmic-ray lists some are drawn, for one commit always the
-same. Each is tried in a clone, by one test file after the other until a test fails with the
-mutation and passes without: first the files that import the module, then those of its folder, and
-with ``--all`` every other one. A mutation that leaves the syntax tree as it is but for annotations
-and texts changes no result: the next one replaces it, as it replaces those of
-``equivalent_mutations.tsv``, which stand there with the reason. A broken run goes on where it was.
+same. Each is tried in a clone until a test fails with the mutation and passes without: first by the
+test files that import the module, then by those of its folder, and with ``--all`` by the others.
+A mutation that leaves the syntax tree as it is but for annotations and texts changes no result: the
+next one replaces it, as it replaces those of ``equivalent_mutations.tsv``, which stand there with
+the reason. A broken run goes on where it was.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ import difflib
 import os
 import random
 import re
-import resource
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -31,8 +31,8 @@ from benchmarks.house import git
 from benchmarks.journal import KEPT, ROOT, answers, judge_parser
 
 EQUIVALENT: Final = Path(__file__).with_name("equivalent_mutations.tsv")
-CPU_S, CLOCK_S = 600, 3600.0
-"""What a test file may take; more counts as noticed."""
+TEST_S: Final = 900
+"""What a test may take, by the clock; more counts as noticed."""
 FOLDERS: Final = {"commands": "cli", "stages": "workflow", "configuration": "workflow"}
 """Tests of a folder whose name is another one."""
 
@@ -119,68 +119,63 @@ def clone(commit: str, place: Path) -> Path:
     return tree
 
 
-def test_files(tree: Path, path: str, *, every: bool) -> Iterator[str]:
-    """Test files that import a module, those of the folder of its name, and (if asked) the rest."""
+def test_files(tree: Path, path: str) -> list[list[str]]:
+    """Test files that import a module; others of the folder of its name; the rest."""
     parts = Path(path).with_suffix("").parts[1:]
     module, home = ".".join(parts).removesuffix(".__init__"), parts[1]
     parent, _, name = module.rpartition(".")
     wanted = re.compile(rf"\b{re.escape(module)}\b|from {re.escape(parent)} import .*\b{name}\b")
     folder = tree / "tests" / FOLDERS.get(home, home if len(parts) > 2 else "core")
-    order = {}
+    found: list[list[str]] = [[], [], []]
     for file in sorted((tree / "tests").rglob("test_*.py")):
-        order[file] = 2 - (folder in file.parents) - 2 * bool(wanted.search(file.read_text()))
-    for file in sorted(order, key=lambda each: order[each]):
-        if every or order[file] < 2:
-            yield file.relative_to(tree).as_posix()
+        place = 0 if wanted.search(file.read_text("utf-8")) else 2 - (folder in file.parents)
+        found[place].append(file.relative_to(tree).as_posix())
+    return found
 
 
 def run_tests(tree: Path, words: list[str]) -> tuple[int, str]:
-    """Status and output of pytest in a tree; it is ended where it exceeds its time."""
+    """Status and output of pytest in a tree, which ends where a test exceeds its time."""
     paths = os.pathsep.join([f"{tree / 'src'}", f"{tree / 'challenge/src'}", str(tree)])
     call = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "--tb=no"]
-    with subprocess.Popen(
-        [*call, *words],
-        cwd=tree,
-        env={**os.environ, "PYTHONPATH": paths, "OMP_NUM_THREADS": "1"},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        start_new_session=True,
-    ) as process:
-        resource.prlimit(process.pid, resource.RLIMIT_CPU, (CPU_S, CPU_S))
-        try:
-            output, _ = process.communicate(timeout=CLOCK_S)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
-            return -1, ""
-    return process.returncode, output
+    call += ["-o", f"faulthandler_timeout={TEST_S}", "-o", "faulthandler_exit_on_timeout=true"]
+    # What a test leaves running would hold a pipe open.
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as printed:
+        done = subprocess.run(
+            [*call, *words],
+            cwd=tree,
+            env={**os.environ, "PYTHONPATH": paths, "OMP_NUM_THREADS": "1"},
+            stdin=subprocess.DEVNULL,
+            stdout=printed,
+            stderr=subprocess.STDOUT,
+            check=False,
+        )
+        printed.seek(0)
+        return done.returncode, printed.read()
 
 
 def caught(key: tuple[str, str, Mutation], tree: Path) -> str:
     """The test that notices a mutation, or nothing."""
     _, tests, mutation = key
     path, (source, changed) = tree / mutation.path, mutation.applied(tree)
-    for file in test_files(tree, mutation.path, every=tests == "all"):
+    near, area, rest = test_files(tree, mutation.path)
+    for files in (near, area) if tests == "near" else (rest,):
         excused: list[str] = []
-        while True:
+        while files:
             path.write_text(changed, encoding="utf-8")
             try:
-                status, output = run_tests(tree, [file, *excused])
+                status, output = run_tests(tree, [*files, *excused])
             finally:
                 path.write_text(source, encoding="utf-8")
             if status in (0, 5):
                 break
-            if status < 0:
-                return f"the time of {file}"
+            if "Timeout (" in output:
+                return f"the time of one of {' '.join(files)}"
             names = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", output, re.M)[:1]
-            if run_tests(tree, names or [file])[0] == 0:
-                return names[0] if names else f"pytest's end in {file}"
+            if run_tests(tree, names or files)[0] == 0:
+                return names[0] if names else "pytest's end"
             # It fails without the mutation as well.
-            if not names or names[0] == file:
-                break
-            excused.append(f"--deselect={names[0]}")
+            excused += [f"--deselect={names[0]}"] if names else []
+            files = [file for file in files if names and file != names[0]]
     return ""
 
 
