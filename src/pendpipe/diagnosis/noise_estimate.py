@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -152,7 +152,7 @@ def _with_spectrum(
     filled = count / max(float(np.sum(noise.weight > 0.0)), 1.0)
     power = dct(residual * noise.scale, norm="ortho") ** 2 * filled
     known = noise_only & ~_about_lines(power, noise_only)
-    found = log_variance(Squares(power, known, starts, _SLOWEST_LINE), smooth)
+    found = log_variance(power, known, starts, smooth, lines_from=_SLOWEST_LINE)
     if found.constant > 0.5:
         width = np.diff(np.append(starts, count))
         variance = np.full(count, math.exp(float(found.mean @ width) / count))
@@ -226,9 +226,8 @@ def _change_of_level(
     middle = (np.arange(bins) + 0.5) / bins
     order = np.arange(1, _LEVEL_WAVES + 1)
     waves = np.cos(math.pi * np.outer(middle, order)) / order
-    found = log_variance(
-        Squares(square, used, starts, count, independent), [Smooth(waves, _LEVELS)]
-    )
+    smooth = [Smooth(waves, _LEVELS)]
+    found = log_variance(square, used, starts, smooth, lines_from=count, independent=independent)
     if found.constant > 0.5:
         return None, 0.0
     log = np.interp(np.arange(count) + 0.5, middle * count, found.mean)
@@ -285,30 +284,6 @@ def _smooth_spectra(count: int) -> tuple[Smooth, Smooth]:
     return Smooth(below / math.sqrt(_CORNERS), _SLOPES), Smooth(waves, _FILTERS)
 
 
-class Squares(NamedTuple):
-    """Squares of normal numbers, and the bins in which their variance is taken as constant.
-
-    Parameters
-    ----------
-    value
-        Shape (n,).
-    known
-        Which of them are noise, as far as is known beforehand; shape (n,).
-    starts
-        The index of each bin's first square, shape (m,).
-    lines_from
-        The first square that may be a line and no noise.
-    independent
-        Independent numbers in each square: less than one where they are not normal.
-    """
-
-    value: FloatArray
-    known: BoolArray
-    starts: IntArray
-    lines_from: int = 0
-    independent: float = 1.0
-
-
 class Smooth(NamedTuple):
     """A smooth random function of unit strength, and the strengths that are tried.
 
@@ -324,8 +299,7 @@ class Smooth(NamedTuple):
     strengths: tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class LogVariance:
+class LogVariance(NamedTuple):
     """What is known of ln S in each bin.
 
     Parameters
@@ -347,31 +321,51 @@ class LogVariance:
     charge: float
 
 
-class _Found(NamedTuple):
-    mean: FloatArray
-    spread: FloatArray
-    cost: float
-    charge: float
+def log_variance(
+    value: FloatArray,
+    known: BoolArray,
+    starts: IntArray,
+    smooth: Sequence[Smooth],
+    *,
+    lines_from: int,
+    independent: float = 1.0,
+) -> LogVariance:
+    """Estimate ln S: a weighted mean over all strengths, each by Laplace's approximation.
 
-
-def log_variance(squares: Squares, smooth: Sequence[Smooth]) -> LogVariance:
-    """Estimate ln S: a weighted mean over all strengths, each by Laplace's approximation."""
+    Parameters
+    ----------
+    value
+        Squares of normal numbers, shape (n,).
+    known
+        Which of them are noise, as far as is known beforehand; shape (n,).
+    starts
+        The index of the first square of each bin, in which S is taken as constant; shape (m,).
+    smooth
+        How ln S may change.
+    lines_from
+        The first square that may be a line and no noise.
+    independent
+        Independent numbers in each square: less than one where they are not normal.
+    """
     strengths = list(product(*(each.strengths for each in smooth)))
-    found = [_at_strengths(squares, smooth, each) for each in strengths]
-    cost = np.array([each.cost for each in found]) - 2.0 * np.log(_prior(smooth))
+    value, may_be_line = np.maximum(value, 1e-300), known & (np.arange(len(value)) >= lines_from)
+    found = []
+    for sizes in strengths:
+        parts = [size * each.columns for each, size in zip(smooth, sizes, strict=True) if size]
+        columns = np.concatenate([np.full((len(starts), 1), _LEVEL_SD), *parts], axis=1)
+        found.append(_at_strengths(value, known, may_be_line, starts, columns, independent))
+    means, spreads, costs, charges = zip(*found, strict=True)
+    cost = np.array(costs) - 2.0 * np.log(_prior(smooth))
     weight = np.exp(-0.5 * (cost - cost.min()))
     total = float(weight.sum())
-    constant = float(weight[0]) / total
     weight /= total
-    mean = np.einsum("j,jm->m", weight, np.array([each.mean for each in found]))
+    mean, best = weight @ np.array(means), int(np.argmin(cost))
     covariance = np.zeros((len(mean), len(mean)))
-    for share, each in zip(weight.tolist(), found, strict=True):
+    for share, each, spread in zip(weight.tolist(), means, spreads, strict=True):
         if share > 1e-4:
-            off = each.mean - mean
-            covariance += share * (each.spread @ each.spread.T + np.outer(off, off))
-    best = found[int(np.argmin(cost))]
-    averaged = float(cost.min()) - 2.0 * math.log(total) - best.cost
-    return LogVariance(mean, covariance, constant, best.charge + averaged)
+            covariance += share * (spread @ spread.T + np.outer(each - mean, each - mean))
+    averaged = float(cost.min()) - 2.0 * math.log(total) - costs[best]
+    return LogVariance(mean, covariance, float(weight[0]), charges[best] + averaged)
 
 
 def stands_out(ratio: FloatArray | float) -> BoolArray:
@@ -386,38 +380,36 @@ def _prior(smooth: Sequence[Smooth]) -> FloatArray:
     return np.array([math.prod(shares) for shares in product(*parts)])
 
 
-def _at_strengths(squares: Squares, smooth: Sequence[Smooth], strengths: Sequence[float]) -> _Found:
-    """Return mean and covariance (as a root) of ln S for given strengths."""
-    starts, bins = squares.starts, len(squares.starts)
-    parts = [size * each.columns for each, size in zip(smooth, strengths, strict=True) if size]
-    columns = np.concatenate([np.full((bins, 1), _LEVEL_SD), *parts], axis=1)
-    width = np.diff(np.append(starts, len(squares.value)))
-    value = np.maximum(squares.value, 1e-300)
-    noise = squares.known
-    may_be_line = noise & (np.arange(len(value)) >= squares.lines_from)
+def _at_strengths(
+    value: FloatArray,
+    known: BoolArray,
+    may_be_line: BoolArray,
+    starts: IntArray,
+    columns: FloatArray,
+    share: float,
+) -> tuple[FloatArray, FloatArray, float, float]:
+    """Return mean and root of the covariance of ln S for given strengths, cost and charge."""
+    width, noise = np.diff(np.append(starts, len(value))), known
     number, total = _binned(noise, value, starts)
-    share = squares.independent
     middle = math.log(max(float(total.sum()) / max(float(number.sum()), 1.0), 1e-300))
     # A start that single lines don't move: the mean of ln P in each bin is 1.27 too low.
     logs = np.add.reduceat(np.where(noise, np.log(value) - middle + 1.27, 0.0), starts)
     normal = columns.T @ (columns * (0.2 * number)[:, None]) + np.eye(columns.shape[1])
     at = np.asarray(np.linalg.solve(normal, columns.T @ (0.2 * logs)), dtype=np.float64)
     for _ in range(_CLEANINGS):
-        log = columns @ at
-        ratio = value / np.exp(np.repeat(log, width) + middle)
+        ratio = value / np.exp(np.repeat(columns @ at, width) + middle)
         lines = may_be_line & stands_out(ratio)
-        clean = squares.known & ~lines
-        changed = not np.array_equal(clean, noise)
-        noise = clean
+        before, noise = noise, known & ~lines
         number, total = _binned(noise, value, starts)
         at, root = _maximised(columns, share * number, share * total / math.exp(middle), at)
-        if not changed:
+        if np.array_equal(before, noise):
             break
-    log = columns @ at
-    cost = share * float(np.sum(number * (log + middle) + total / np.exp(log + middle)))
+    log = columns @ at + middle
+    cost = share * float(np.sum(number * log + total / np.exp(log)))
     cost += float(np.sum(np.log(value[lines]))) + np.count_nonzero(lines) * _NOT_NOISE
     charge = float(at @ at) + 2.0 * float(np.sum(np.log(np.diag(root))))
-    return _Found(log + middle, np.linalg.solve(root, columns.T).T, cost + charge, charge)
+    spread = np.asarray(np.linalg.solve(root, columns.T).T, dtype=np.float64)
+    return log, spread, float(cost) + charge, charge
 
 
 def _binned(noise: BoolArray, value: FloatArray, starts: IntArray) -> tuple[FloatArray, FloatArray]:
