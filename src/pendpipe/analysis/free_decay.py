@@ -139,10 +139,8 @@ def _follows(cycles: HalfCycles) -> BoolArray:
 def _running_median(values: FloatArray) -> FloatArray:
     """The median of each value and its two neighbours to each side, fewer at the ends."""
     padded = np.pad(values, 2, constant_values=np.nan)
-    ascending = np.sort(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
-    last = 4 - np.count_nonzero(np.isnan(ascending), axis=1)
-    row = np.arange(len(values))
-    return np.asarray(0.5 * (ascending[row, last // 2] + ascending[row, (last + 1) // 2]))
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 5)
+    return np.asarray(np.nanmedian(windows, axis=1))
 
 
 def _trimmed(run: Run) -> Run:

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple, Self
 
 import numpy as np
 
-from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.arrays import FloatArray
 
 _SLACK: Final = 1e-9
 """Rounding error of the gradient."""
@@ -86,33 +86,22 @@ def bounded_least_squares(
         goal = x.copy()
         rest = right - matrix[:, held] @ x[held]
         goal[~held] = np.linalg.lstsq(matrix[:, ~held], rest, rcond=1e-11)[0]
-        met, share = _first_met(x, goal, floor, ceiling, ~held)
-        x = np.clip(x + share * (goal - x), floor, ceiling)
-        if met is not None:
-            x[met] = floor[met] if goal[met] < x[met] else ceiling[met]
-            held[met] = True
+        within = np.clip(goal, floor, ceiling)
+        out = within != goal
+        if out.any():
+            share = np.full(len(x), np.inf)
+            np.divide(within - x, goal - x, out=share, where=out)
+            met = int(np.argmin(share))
+            x = np.clip(x + max(float(share[met]), 0.0) * (goal - x), floor, ceiling)
+            x[met], held[met] = within[met], True
             continue
-        pull = matrix.T @ (right - matrix @ x)
+        x, pull = goal, matrix.T @ (right - matrix @ goal)
         inwards = np.where(x <= floor, pull, -pull) * held
         released = int(np.argmax(inwards))
         if inwards[released] <= _SLACK * (1.0 + float(np.abs(right).max())):
             break
         held[released] = False
     return x
-
-
-def _first_met(
-    x: FloatArray, goal: FloatArray, floor: FloatArray, ceiling: FloatArray, free: BoolArray
-) -> tuple[int | None, float]:
-    """Return the first free value that meets its bound, and the fraction of the way to it."""
-    out = free & ((goal < floor) | (goal > ceiling))
-    if not out.any():
-        return None, 1.0
-    wall = np.where(goal < floor, floor, ceiling)
-    share = np.full(len(x), np.inf)
-    share[out] = (wall[out] - x[out]) / (goal[out] - x[out])
-    met = int(np.argmin(share))
-    return met, max(float(share[met]), 0.0)
 
 
 def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
