@@ -83,31 +83,12 @@ class BlockNoise(Noise):
         return np.asarray(np.diff(sums[:, edges], axis=1))
 
 
-@dataclass(frozen=True)
-class Blocks:
-    """What effects are compared with: blocks of a long record, the readings of another.
-
-    Parameters
-    ----------
-    fit, noise
-        Its residual and derivatives in these numbers, and their noise.
-    """
-
-    fit: Fit
-    noise: Noise
-
-    def numbers_of(self, residual: FloatArray) -> FloatArray:
-        """Return the numbers of a whitened residual of all readings."""
-        noise = self.noise
-        return noise.numbers_of(residual) if isinstance(noise, BlockNoise) else residual
-
-
-def blocks_of(fit: Fit, noise: Noise) -> Blocks:
-    """Divide a long record into blocks."""
+def blocks_of(fit: Fit, noise: Noise) -> tuple[Fit, Noise]:
+    """Divide a long record into blocks: a fit with residual and derivatives in their numbers."""
     sampled = fit.at.sampled
     cycle = sampled.half_cycle // 2
     if fit.at.parts or len(cycle) < _MANY:
-        return Blocks(fit, noise)
+        return fit, noise
     counts = np.bincount(cycle)
     every = 2 * int(0.5 * math.sqrt(len(counts) / _SHORTEST)) + 1
     middle = np.arange(every // 2, len(counts) - every // 2, every)
@@ -116,7 +97,7 @@ def blocks_of(fit: Fit, noise: Noise) -> Blocks:
     # At the ends of the record a cycle is not whole.
     middle = middle[counts[middle] >= length]
     if most < 1 or len(middle) < 2:
-        return Blocks(fit, noise)
+        return fit, noise
     first = np.searchsorted(cycle, middle)
     rows = first[:, None] + np.arange(length)
     edges = np.searchsorted(cycle, [middle - every // 2, middle + every // 2 + 1])
@@ -143,7 +124,7 @@ def blocks_of(fit: Fit, noise: Noise) -> Blocks:
     model, value = fit.model, fit.value
     at = fit.at.thinned(every, rows.reshape(-1), lambda motion: model.acceleration(motion, value))
     compared = replace(fit.evaluation, at=at, residual=own.numbers_of(fit.residual), noise=own)
-    return Blocks(replace(fit, evaluation=compared), own)
+    return replace(fit, evaluation=compared), own
 
 
 def _harmonic_sums(

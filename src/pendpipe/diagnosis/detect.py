@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.blocks import Blocks, blocks_of
+from pendpipe.diagnosis.blocks import blocks_of
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.projection import local_p_values, tangent_basis, whitened
@@ -64,19 +64,19 @@ class Bank:
         The effects and shapes to which the columns belong.
     log_scale_variance
         Variance of the logarithm of the noise that each candidate meets, shape (candidates,).
-    blocks
-        Of the fit whose m whitened numbers are compared; None where they are given as such.
+    noise
+        Of the m numbers that are compared; None where they are given as such.
     """
 
     basis: FloatArray
     columns: NDArray[np.float32]
     candidates: tuple[Candidate, ...]
     log_scale_variance: FloatArray
-    blocks: Blocks | None = None
+    noise: Noise | None = None
 
     def compared(self, residual: FloatArray) -> FloatArray:
         """Return what is compared of a whitened residual, less what the model can reproduce."""
-        numbers = residual if self.blocks is None else self.blocks.numbers_of(residual)
+        numbers = residual if self.noise is None else self.noise.numbers_of(residual)
         return np.asarray(numbers - self.basis @ (self.basis.T @ numbers))
 
     def scores(self, residual: FloatArray) -> FloatArray:
@@ -113,8 +113,7 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
 
     A few shapes at a time, stored in single precision, and of a long record in blocks.
     """
-    blocks = blocks_of(fit, noise)
-    fit, noise = blocks.fit, blocks.noise
+    fit, noise = blocks_of(fit, noise)
     shapes = [_shapes(effect, fit.at.span) for effect in effects]
     most = sum(max(e.sizes, 1) * len(rows) for e, rows in zip(effects, shapes, strict=True))
     basis, filled = tangent_basis(fit), 0
@@ -137,7 +136,7 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
             for shape in own:
                 candidates.append(Candidate(seen, shape, filled, units.shape[1]))
                 filled += units.shape[1]
-    return Bank(basis, columns[:filled].T, tuple(candidates), np.concatenate(unsure), blocks)
+    return Bank(basis, columns[:filled].T, tuple(candidates), np.concatenate(unsure), noise)
 
 
 def _beside(

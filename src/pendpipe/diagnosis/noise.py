@@ -68,6 +68,10 @@ class Noise:
         rows = np.multiply(columns.T, scale, order="C")
         return np.asarray((idct(rows, norm="ortho") * self.scale).T)
 
+    def numbers_of(self, residual: FloatArray) -> FloatArray:
+        """Return what columns are compared with, of a whitened residual: here the residual."""
+        return residual
+
     @property
     def scale(self) -> FloatArray:
         """What each reading is multiplied by before its cosines are taken, shape (n,)."""

@@ -220,8 +220,8 @@ def _fluctuations(evidence: Evidence) -> tuple[Shapes, Shapes, float]:
     data, whole = evidence.data, evidence.fit
     edges = np.linspace(data.time_s[0], data.time_s[-1], _KICKS + 1)
     residual = np.append(evidence.noise.whiten(evidence.residual), whole.residual[-1])
-    blocks = blocks_of(whole, evidence.noise)
-    fit, noise, residual = blocks.fit, blocks.noise, blocks.numbers_of(residual)
+    fit, noise = blocks_of(whole, evidence.noise)
+    residual = noise.numbers_of(residual)
     sampled = fit.at.sampled
     time = sampled.time_s
     spacing = float(edges[1] - edges[0])
