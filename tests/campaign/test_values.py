@@ -85,8 +85,9 @@ def test_pulls_of_every_number_are_normal() -> None:
         moved = np.random.default_rng([7, seed]).standard_normal(len(design.nuisances))
         moved[0] = 0.0
         found = values_of(design, data(design, seed=seed, moved=moved))
-        truth = values_of(design, data(design, moved=moved)).fit
-        exact = Values(replace(truth, unknowns=_with(moved, truth.unknowns)), found.benchmark)
+        unknowns = _with(moved, found.fit.unknowns)
+        truth = replace(found.fit, data=data(design, moved=moved), unknowns=unknowns)
+        exact = Values(truth, found.benchmark)
         water = 4.0 * np.pi**2 * 0.1 / 3940.0 * np.exp(0.05 * moved[design.index[LOSS]])
         pairs = {
             "k": (found.coefficient, 3940.0),
