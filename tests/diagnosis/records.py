@@ -109,8 +109,7 @@ def hypothesis_of(
     fit: Fit, data: Data, noise: Noise, held: tuple[int, ...], *more: Any, **names: Any
 ) -> Hypothesis:
     """What may be true of readings that were chosen as they are; then the fields as they come."""
-    points: Any = None
-    begun = Beginning(data, fit.model.bare(), fit.value[: len(TRUTH)], held, NOISE_RAD, points)
+    begun = Beginning(data, fit.model.bare(), fit.value[: len(TRUTH)], held)
     return Hypothesis(begun, fit, data, noise, held, *more, **names)
 
 

@@ -7,7 +7,7 @@ from pendpipe.analysis.fit import fit_recording
 from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.hypothesis import first_noise
-from pendpipe.diagnosis.refine import misfit, refine
+from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.eq8 import Restoring
@@ -34,7 +34,7 @@ def test_a_diagnosis_begins_with_the_fit_that_is_printed() -> None:
     fit, begun = fit_recording(part, points=points), beginning_of(record)
     assert fit.restoring == begun.model.restoring == "sine"
     noise = first_noise(begun)
-    there = misfit(begun.model, begun.data, noise, begun.value)
+    there = refine(begun.model, begun.data, noise, begun.value, rounds=0).chi2
     best = refine(begun.model, begun.data, noise, begun.value, held=begun.held)
     # Other than the fit, the diagnosis has a prior on the share of b: it has yet to move a little.
     assert there - best.chi2 < 1.0

@@ -18,7 +18,7 @@ from pendpipe.diagnosis.neighbours import describing, shares_a_misfit, simpler
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import Finding
-from pendpipe.diagnosis.rivals import NO_SCAN, Rival, Scale, lines, off_harmonics
+from pendpipe.diagnosis.rivals import NO_SCAN, Rival, Scale, off_harmonics
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.search import run_search
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
@@ -183,55 +183,6 @@ def test_a_line_between_the_harmonics_stands_apart(order: float, apart: bool) ->
     """At a harmonic it may be a part of the motion that the model lacks."""
     fit = tone_at(order * FREQUENCY_HZ)
     assert off_harmonics(fit, by_identifier("tone-pickup")) == apart
-
-
-@pytest.mark.parametrize(("order", "against_noise"), [(3.4, True), (3.0, False)])
-def test_a_line_off_the_harmonics_counts_against_the_noise(
-    order: float, against_noise: bool
-) -> None:
-    """Whatever else is left: here three numbers of a hundred standard deviations."""
-    fit = tone_at(order * FREQUENCY_HZ)
-    (tone,) = fit.model.effects
-    taken = sum(lines(fit).values())
-    gain = taken if against_noise else 100.0
-    worth = Scale(fit.chi2 + taken, 1e4, 3.0).worth(fit.chi2 + gain, fit, tone)
-    assert worth == pytest.approx(gain if against_noise else 0.01, rel=1e-2)
-    assert (gain > 1000.0) == against_noise
-
-
-def test_lines_that_nearly_cancel_take_little() -> None:
-    """A tone of one unit, told as one of 21 and a second mode of -20 that lasts as long."""
-    fit = tone_at(3.4 * FREQUENCY_HZ)
-    (alone,) = lines(fit).values()
-    bare, tone = fit.value[: len(TRUTH)], fit.value[len(TRUTH) :]
-    lasting = [*(-20.0 * tone[:2]), 1.0001 * tone[2], 100.0 * TIME_S[-1]]
-    value = np.concatenate([bare, 21.0 * tone[:2], tone[2:], lasting])
-    names = (by_identifier("tone-pickup"), by_identifier("second-mode"))
-    data, noise = prepared(other_engine(TRUTH))
-    both = refine(Model(TIME_S, INTERVAL_S, names), data, noise, value, rounds=0)
-    assert sum(lines(both).values()) < alone
-
-
-def test_a_line_that_takes_up_misfit_is_no_better_for_it() -> None:
-    """The credit of a line is what it takes in the best set."""
-    fit = tone_at(3.4 * FREQUENCY_HZ)
-    larger = tone_at(3.4 * FREQUENCY_HZ, 8e-4)
-    scale = Scale(fit.chi2 + sum(lines(fit).values()), 1e4, 3.0, lines(fit))
-    assert sum(lines(larger).values()) > 3.0 * sum(lines(fit).values())
-    worse = replace(larger, evaluation=replace(larger.evaluation, residual=100.0 * larger.residual))
-    assert scale.lost_by(worse) > scale.lost_by(fit)
-
-
-def test_what_another_line_takes_is_no_worth_of_a_law() -> None:
-    """A tone of 4e-4, and one of 8e-4, beside a law that lowers chi^2 by as much."""
-    fit, larger = tone_at(3.4 * FREQUENCY_HZ), tone_at(3.4 * FREQUENCY_HZ, 8e-4)
-    scale = Scale(fit.chi2 + sum(lines(fit).values()), 1.0, 3.0, lines(fit))
-    as_good = replace(
-        larger, evaluation=replace(larger.evaluation, residual=fit.evaluation.residual)
-    )
-    law, before = by_identifier("sensor-quadratic"), fit.chi2 + 1000.0
-    assert sum(lines(as_good).values()) > 3.0 * sum(lines(fit).values())
-    assert scale.worth(before, as_good, law) == scale.worth(before, fit, law)
 
 
 def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from pendpipe.diagnosis.result import FittedModel, FoundEffect, Location
-from pendpipe.diagnosis.statement import statement
+from pendpipe.diagnosis.summary import statement
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.estimate import Estimate
 

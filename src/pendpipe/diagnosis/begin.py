@@ -59,12 +59,6 @@ class Beginning:
         Its start values.
     held
         Indices of values that are not fitted.
-    noise_rms
-        First estimate of one reading's noise.
-    points
-        The turning points.
-    fit
-        What ``pendpipe fit`` prints of the same readings; None where it refuses.
     starts
         What effects declare where the turning points beat.
     """
@@ -73,9 +67,6 @@ class Beginning:
     model: Model
     value: FloatArray
     held: tuple[int, ...]
-    noise_rms: float
-    points: TurningPoints
-    fit: FitResult | None = None
     starts: tuple[Start, ...] = ()
 
 
@@ -152,7 +143,7 @@ def begin(
     held = held_places(held_rates, fixed, parts, baseline)
     # Held parts of b are handled by the model.
     held = tuple(place for place in held if not parts or place not in (B, SHARE))
-    return Beginning(data, model, value, held, data.noise_rms, points, fit, starts)
+    return Beginning(data, model, value, held, starts)
 
 
 def _far_from_the_stop(data: Data, value: FloatArray) -> Data:

@@ -21,9 +21,7 @@ from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Task, is_further, 
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import SETTLED, Fit, refine
-from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.result import Finding
-from pendpipe.diagnosis.rivals import Rival
 from pendpipe.dynamics.any_law import NoMotionError
 
 _ANY: Final = 7
@@ -42,10 +40,7 @@ class Applied(NamedTuple):
 
 def correct(state: Hypothesis, task: Task) -> Hypothesis:
     """Correct what corrupts the fit: time stamps, lost samples, clipping, glitches."""
-    if state.tested is state.fit:
-        return state
-    state = _with_findings(state, task, last=False)
-    return replace(state, tested=state.fit)
+    return _with_findings(state, task, last=False)
 
 
 def examine(state: Hypothesis, task: Task) -> Hypothesis:
@@ -214,15 +209,9 @@ def _measured_anew(found: list[Finding], state: Hypothesis, task: Task) -> Hypot
     return replace(state, faults=tuple(faults), quiet=quiet, notes=notes)
 
 
-def random_torque(state: Hypothesis, rival: Rival, task: Task) -> Hypothesis | None:
-    """Test whether random kicks explain more than an effect that leaves more than noise."""
-    if state.samples is None or not remainder_of(rival.fit, state.data, state.noise).systematic:
+def random_torque(state: Hypothesis, task: Task) -> Applied | None:
+    """Apply the test for random kicks, whatever the model leaves."""
+    if state.samples is None:
         return None
     finding = _asked(RANDOM_TORQUE, _evidence(state), state)
-    if finding is None or finding.delta_chi2 < rival.gain - rival.charge:
-        return None
-    after = _applied(finding, state, task)
-    if after is None:
-        return None
-    task.progress(after.said)
-    return after.state
+    return _applied(finding, state, task) if finding else None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -115,14 +114,12 @@ class Hypothesis:
         Of the measurement, found by their own tests; their p-values are global.
     quiet
         By name, the p-values of the tests that found nothing.
-    tested
-        The fit with which the measurement was tested.
     notes
         What the tests of the measurement say that is no fault, a clause each, by test.
     first, now
         The scans of the baseline's residual and of the present one.
-    scanned
-        Fit, data and noise of the last scan, and the effects that it asked.
+    asked
+        The effects of the last scan.
     without_curve
         The fit without the curve at the end: probabilities of names refer to it. None where there
         is no such curve, or no name beside it.
@@ -138,11 +135,10 @@ class Hypothesis:
     steps: tuple[Step, ...] = ()
     faults: tuple[Finding, ...] = ()
     quiet: Mapping[str, float] = field(default_factory=dict)
-    tested: Fit | None = None
     notes: Mapping[str, str] = field(default_factory=dict)
     first: Detection | None = None
     now: Detection | None = None
-    scanned: tuple[Fit, Data, Noise, list[Effect]] | None = None
+    asked: tuple[Effect, ...] = ()
     without_curve: Fit | None = None
 
     def settle(self, fit: Fit, data: Data | None = None, noise: Noise | None = None) -> Hypothesis:
@@ -211,7 +207,7 @@ def first_noise(beginning: Beginning) -> Noise:
     slope = None
     if data.time_noise:
         slope = beginning.model.evaluate(beginning.value).sampled.velocity
-    return white_noise(data, beginning.noise_rms, slope)
+    return white_noise(data, data.noise_rms, slope)
 
 
 def noise_of_residual(fit: Fit, data: Data, *, red: bool = True) -> Noise:
@@ -342,15 +338,12 @@ class Task:
         return applicable(self.catalogue, state.fit, self.baseline, state.data.unit, rare=True)
 
     def scanned(self, state: Hypothesis) -> Hypothesis:
-        """Score all that may be missing on a hypothesis's residual (into `now`), once."""
-        asked = state.fit, state.data, state.noise
-        if state.scanned is not None and all(map(operator.is_, asked, state.scanned)):
-            return state
-        effects = [
+        """Score all that may be missing on a hypothesis's residual (into `now`)."""
+        effects = (
             *applicable(self.catalogue, state.fit, self.baseline, state.data.unit),
             *(entry for entry in self.released if entry not in state.fit.model.effects),
-        ]
+        )
         self.progress(f"scanning {len(effects)} effects")
         scanner = prepare(state.fit, state.data, state.noise, effects)
         now = detect(scanner, state.fit, seed=self.seed, known=state.now)
-        return replace(state, now=now, first=state.first or now, scanned=(*asked, effects))
+        return replace(state, now=now, first=state.first or now, asked=effects)

@@ -10,7 +10,6 @@ sizes, less its prior (`rivals.Rival.charge`), with what its set predicts worse 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import combinations
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -30,7 +29,6 @@ from pendpipe.diagnosis.detect import (
 from pendpipe.diagnosis.held_out import predicted_worse
 from pendpipe.diagnosis.hypothesis import (
     CHOICE,
-    FURTHER,
     Hypothesis,
     Step,
     Task,
@@ -47,7 +45,6 @@ from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.rivals import (
     NO_SCAN,
-    SIZE_CHARGE,
     Rival,
     Scale,
     off_harmonics,
@@ -56,84 +53,8 @@ from pendpipe.diagnosis.rivals import (
 )
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
-from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
+from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES
 from pendpipe.quantities import compact
-
-
-def prefer_parameters(state: Hypothesis, rivals: Sequence[Rival]) -> list[Rival]:
-    """Put a held parameter first if such parameters alone explain as much as any effect.
-
-    Parameters
-    ----------
-    state
-        The model to which the effects would be added.
-    rivals
-        Refitted effects, every held parameter among them; the best first.
-
-    Returns
-    -------
-    list
-        The same rivals; of the fewest held parameters needed, the one that gains most leads.
-    """
-    released = [rival for rival in rivals if isinstance(rival.lead.effect, ReleasedParameter)]
-    if not released or (len(released) == 1 and rivals[0] is released[0]):
-        return list(rivals)
-    most = _together(state, released)
-    if most is None or not _do_as_well(state, most, released[:1], rivals):
-        return list(rivals)
-    needed, fit = _fewest(state, released, most)
-    if not _do_as_well(state, fit, needed, rivals):
-        return list(rivals)
-    first = max(needed, key=lambda rival: rival.gain)
-    return [first, *(rival for rival in rivals if rival is not first)]
-
-
-def _fewest(state: Hypothesis, released: Sequence[Rival], most: Fit) -> tuple[Sequence[Rival], Fit]:
-    """Return the fewest parameters to which no other adds more than chance, and their fit."""
-    for number in range(1, len(released)):
-        tried = [(some, _together(state, some)) for some in combinations(released, number)]
-        fits = [(some, fit) for some, fit in tried if fit is not None]
-        some, best = min(fits, key=lambda each: each[1].chi2, default=(released, most))
-        if best.chi2 - most.chi2 < SIZE_CHARGE * _unit(released[0]) * (len(released) - number):
-            return some, best
-    return released, most
-
-
-def _together(state: Hypothesis, released: Sequence[Rival]) -> Fit | None:
-    """Fit the model with some held parameters released."""
-    if len(released) == 1:
-        return released[0].fit
-    model, held = state.fit.model, state.held
-    for rival in released:
-        effect = rival.lead.effect
-        assert isinstance(effect, ReleasedParameter)
-        model, held = model.adding(effect), effect.without(held)
-    best = min(released, key=lambda rival: rival.fit.chi2)
-    return best_fit(model, state.data, state.noise, [best.fit.value], held=held)
-
-
-def _do_as_well(
-    state: Hypothesis, fit: Fit, needed: Sequence[Rival], rivals: Sequence[Rival]
-) -> bool:
-    """Whether wrong parameters explain as much as each effect and curve.
-
-    A single wrong parameter has a high prior. Several must be better than one effect that does as
-    well alone, by the margin that two effects need.
-    """
-    one, more = needed[0], len(needed) - 1
-    worth = (
-        (state.fit.chi2 - fit.chi2) / _unit(one) - SIZE_CHARGE * more + (0.0 if more else one.prior)
-    )
-    return all(
-        worth >= rival.evidence + (FURTHER if more and not rival.drawn else 0.0)
-        for rival in rivals
-        if not isinstance(rival.lead.effect, ReleasedParameter)
-    )
-
-
-def _unit(rival: Rival) -> float:
-    """Return the chi^2 that counts as 1."""
-    return rival.gain / rival.worth if rival.worth > 0.0 else 1.0
 
 
 def with_other_noise(state: Hypothesis, task: Task) -> Hypothesis:
@@ -152,8 +73,7 @@ def with_other_noise(state: Hypothesis, task: Task) -> Hypothesis:
     level, seed = task.level, task.seed
     share = level * RED_NOISE_SHARE
     task.progress("testing whether the red noise is a drift or a step")
-    assert state.scanned is not None
-    effects = [each for each in state.scanned[-1] if each.kind != "unnamed" and not each.spectral]
+    effects = [each for each in state.asked if each.kind != "unnamed" and not each.spectral]
     fit, data, noise = settled(state.fit, state.data, state.noise, state.held, red=False)
     other = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.scan)
     if other.p_value > level * CATALOGUE_SHARE:
@@ -189,10 +109,10 @@ def _charge(state: Hypothesis, rivals: Sequence[Rival]) -> float:
     return 2.0 * math.log(tried) + effect.sizes * math.log(gain)
 
 
-_MOST_RARE: Final = 2
-"""Rare names that may take the place of one curve."""
 _GOOD_PART: Final = 1.0 / 3.0
 """Of a misfit, that one of a few laws takes which share it."""
+_MOST_RARE: Final = 2
+"""Rare names that may take the place of one curve."""
 
 
 class Neighbour(NamedTuple):
@@ -218,7 +138,7 @@ def compared(state: Hypothesis, here: Proposed, there: Sequence[Proposed]) -> It
     scale = Scale.of(best.fit, state.data, state.noise)
 
     def score(each: Proposed) -> float:
-        return scale.lost_by(each.fit) + price(each.steps)
+        return scale.lost(each.fit.chi2) + price(each.steps)
 
     for each in there:
         other = replace(state, fit=each.fit, steps=each.steps)
@@ -226,9 +146,9 @@ def compared(state: Hypothesis, here: Proposed, there: Sequence[Proposed]) -> It
 
 
 def simpler(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
-    """Drop an effect, or exchange several for a curve, or a curve for rare names."""
+    """Drop an effect, or exchange all names for a curve, or a curve for rare names."""
     rare = task.rare(state)
-    there = [*_drops(state), *_curves_for_names(state), *_rare_for_a_curve(state, rare)]
+    there = [*_drops(state), *_curve_for_names(state), *_rare_for_a_curve(state, rare)]
     return compared(state, Proposed(state.fit, state.steps), there)
 
 
@@ -248,7 +168,7 @@ def leading(state: Hypothesis, task: Task, *, names_first: bool) -> Step | None:
     if not rivals:
         return None
     # A rare name is a rival of what it looks like, and leads where `prefer_rare` says so.
-    rivals = prefer_parameters(state, sorted(rivals, key=lambda rival: rival.lead.effect.rare))
+    rivals.sort(key=lambda rival: rival.lead.effect.rare)
     if names_first:
         rivals.sort(key=lambda rival: rival.drawn)
     return Step(tuple(prefer_rare(state, rivals, task)), state.unexplained, state.fit)
@@ -257,15 +177,14 @@ def leading(state: Hypothesis, task: Task, *, names_first: bool) -> Step | None:
 def adding(state: Hypothesis, step: Step) -> Neighbour:
     """Add a step's leader. What its set predicts worse of cycles left out counts against it.
 
-    Where it does not pay that is not asked; nor in a gross misfit, where it is what is still
-    missing that decides how well cycles are predicted.
+    Where it does not pay that is not asked.
     """
     winner, steps = step.winner, (*state.steps, step)
     effect, held = winner.lead.effect, state.held
     if isinstance(effect, ReleasedParameter):
         held = tuple(effect.without(held))
     lower = winner.worth - (price(steps) - price(state.steps))
-    if lower >= 0.0 and not is_gross(state.fit, state.data):
+    if lower >= 0.0:
         worse = predicted_worse(
             state.fit,
             winner.fit,
@@ -308,36 +227,21 @@ def _drops(state: Hypothesis) -> Iterator[Proposed]:
             yield Proposed(without, others, f"{effect.name} is no longer needed")
 
 
-def _curves_for_names(state: Hypothesis) -> Iterator[Proposed]:
-    """Put one curve in the place of several names: all, or all but what is sudden or a line.
-
-    Where more than noise is left, the name that gains most stays: a curve competes for the rest. A
-    line off the harmonics, which no curve makes, stays too.
-    """
-    further = [step for step in state.steps if is_further(step)]
-    own = [step for step in further if not off_harmonics(state.fit, step.winner.lead.effect)]
-    if own and not Scale.of(state.fit, state.data, state.noise).clean:
-        own.remove(max(own, key=lambda step: step.winner.gain))
-    effects = [(step, step.winner.lead.effect) for step in own]
-    steady = [step for step, effect in effects if not (effect.local or effect.spectral)]
-    tried: list[list[Step]] = []
-    for replaced in (own, steady):
-        if len(replaced) < 2 or replaced in tried or any(s.winner.drawn for s in state.steps):
-            continue
-        tried.append(replaced)
-        bare = refit_without(state, replaced)
-        if bare is None:
-            continue
-        curves = [(curve, np.zeros(curve.count)) for curve in _curves(bare, state)]
-        fits = [fit for pair in curves if (fit := _with(bare, *pair, state))]
-        if not fits:
-            continue
-        scale = Scale.of(min((*fits, state.fit), key=lambda fit: fit.chi2), state.data, state.noise)
-        rivals = ranked([_rival(bare, fit, scale) for fit in fits])
-        step = Step(tuple(rivals), replaced[0].p_value, bare)
-        kept = [other for other in state.steps if other not in replaced]
-        words = f"{rivals[0].name} alone does as well as {len(replaced)} effects"
-        yield Proposed(rivals[0].fit, (*kept, step), words)
+def _curve_for_names(state: Hypothesis) -> Iterator[Proposed]:
+    """Put one curve in the place of several names."""
+    names = [step for step in state.steps if is_further(step)]
+    if len(names) < 2 or any(step.winner.drawn for step in state.steps):
+        return
+    bare = refit_without(state, names)
+    fits = _with_curves(bare, state) if bare else []
+    if bare is None or not fits:
+        return
+    scale = Scale.of(min((*fits, state.fit), key=lambda fit: fit.chi2), state.data, state.noise)
+    rivals = ranked([_rival(bare, fit, scale) for fit in fits])
+    kept = [step for step in state.steps if step not in names]
+    words = f"{rivals[0].name} alone does as well as {len(names)} effects"
+    step = Step(tuple(rivals), names[0].p_value, bare)
+    yield Proposed(rivals[0].fit, (*kept, step), words)
 
 
 def _rare_for_a_curve(state: Hypothesis, rare: Sequence[Effect]) -> Iterator[Proposed]:
@@ -384,8 +288,7 @@ def describing(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
 
     Where nothing was found in what chance does not explain, a curve says so, whatever it is worth.
     """
-    curves = [(curve, np.zeros(curve.count)) for curve in _curves(state.fit, state, in_time=True)]
-    fits = [fit for pair in curves if (fit := _with(state.fit, *pair, state))]
+    fits = _with_curves(state.fit, state, in_time=True)
     if not fits:
         return
     scale = Scale.of(min(fits, key=lambda fit: fit.chi2), state.data, state.noise)
@@ -428,12 +331,13 @@ def _rival(bare: Fit, fit: Fit, scale: Scale) -> Rival:
     return Rival.of(lead, fit, bare.chi2, scale, NO_SCAN)
 
 
-def _curves(bare: Fit, state: Hypothesis, *, in_time: bool = False) -> list[Curve]:
-    """Return the curves with the coefficients that the recording resolves."""
+def _with_curves(bare: Fit, state: Hypothesis, *, in_time: bool = False) -> list[Fit]:
+    """Fit each curve with the coefficients that the recording resolves; or those in time, too."""
     curves = undrawn((*CURVES, *FOLLOW_UP_CURVES), bare)
     drawn = [curve for curve in curves if in_time >= curve.in_time]
-    seen = build_bank(bare, state.noise, drawn).candidates
-    return [candidate.effect for candidate in seen if isinstance(candidate.effect, Curve)]
+    resolved = build_bank(bare, state.noise, drawn).candidates
+    starts = [(each.effect, np.zeros(each.effect.count)) for each in resolved]
+    return [fit for pair in starts if (fit := _with(bare, *pair, state))]
 
 
 def _with(bare: Fit, effect: Effect, own: FloatArray, state: Hypothesis) -> Fit | None:

@@ -86,69 +86,6 @@ class Evaluation:
         return scaled_qr(self.columns)
 
 
-class GaussNewton:
-    """Gauss-Newton steps of one model on one set of readings."""
-
-    def __init__(self, model: Model, data: Data, noise: Noise) -> None:
-        self._model, self._data, self._noise = model, data, noise
-        self._low, self._high = model.bounds()
-        self._shapes = np.array(_shapes(model), dtype=np.int64)
-        # A shape that must be positive is a scale: a speed, a time or a length.
-        self._scales = self._shapes[self._low[self._shapes] > 0.0]
-
-    def without_places(self, free: IntArray) -> IntArray:
-        """Return the values without those along which chi^2 has many minima.
-
-        These are the shapes that are no scales: the frequency of a line, an instant.
-        """
-        return free[~np.isin(free, np.setdiff1d(self._shapes, self._scales))]
-
-    def evaluate_within_bounds(self, value: FloatArray) -> Evaluation:
-        """Evaluate the model at values, clipped to the bounds."""
-        return self.evaluate(self._model.settled(np.clip(value, self._low, self._high)))
-
-    def evaluate(self, value: FloatArray) -> Evaluation:
-        """Evaluate the model at exactly these values.
-
-        Raises
-        ------
-        NoMotionError
-            If the model has no motion there, or its chi^2 is not finite.
-        """
-        at = self._model.evaluate(value)
-        residual, slip = _residual(self._data, self._noise, at, value)
-        if not math.isfinite(float(residual @ residual)):
-            raise NoMotionError("its chi^2 is not finite")
-        return Evaluation(value, at, residual, slip, self._model, self._noise)
-
-    def step(
-        self,
-        here: Evaluation,
-        free: IntArray,
-        radius: float = math.inf,
-        origin: Evaluation | None = None,
-    ) -> tuple[FloatArray, float]:
-        """Return the best step of a linear model, with the derivatives at `origin` or here.
-
-        The length, at most `radius`, is that of the changes that each value makes by itself in the
-        whitened readings (More 1978): values that compensate each other have long steps.
-        """
-        low, high = self._low.copy(), self._high.copy()
-        # The readings are linear in a scale over a fraction of it at most, and while the effect
-        # is still small the step in its scale is arbitrary.
-        scales = self._scales
-        low[scales] = np.maximum(low[scales], here.value[scales] / _LARGEST_RATIO)
-        high[scales] = np.minimum(high[scales], here.value[scales] * _LARGEST_RATIO)
-        return _step(origin or here, free, here.residual, here.value, low, high, radius)
-
-    def moved(self, here: Evaluation, step: FloatArray) -> Evaluation | None:
-        """Evaluate the model a step away, within the bounds; None where it has no motion."""
-        try:
-            return self.evaluate_within_bounds(here.value + step)
-        except NoMotionError:
-            return None
-
-
 def _shapes(model: Model) -> list[int]:
     """Return the indices of the values on which the readings do not depend linearly."""
     return [
@@ -158,15 +95,6 @@ def _shapes(model: Model) -> list[int]:
             position.start + (1 if effect.parameter_free else effect.sizes), position.stop
         )
     ]
-
-
-def _residual(
-    data: Data, noise: Noise, at: Evaluated, value: FloatArray
-) -> tuple[FloatArray, float]:
-    """Return the whitened residual with the prior's entry, and the largest phase error."""
-    difference, slip = unwrapped(data, at)
-    prior = (0.5 - value[SHARE]) / _SHARE_SD
-    return np.append(noise.whiten(difference), prior), slip
 
 
 def _step(
@@ -410,12 +338,62 @@ class Refining:
     ) -> None:
         fixed = {*held, *model.held()}
         self._free = np.array([k for k in range(model.size) if k not in fixed])
-        self._steps = GaussNewton(model, data, noise)
-        self._here = self._steps.evaluate_within_bounds(start)
+        self._model, self._data, self._noise = model, data, noise
+        self._low, self._high = model.bounds()
+        shapes = np.array(_shapes(model), dtype=np.int64)
+        # A shape that must be positive is a scale: a speed, a time or a length.
+        self._scales = shapes[self._low[shapes] > 0.0]
+        # Along the others, the frequency of a line or an instant, chi^2 has many minima.
+        self._places = np.setdiff1d(shapes, self._scales)
+        self._here = self._evaluate(start)
         self._gains: list[float] = []
         self._radius = math.inf
         self._stalled = ((2, little), (3, max(little, _SLOW_GAIN)))
         self._ended = self._converged = self.hopeless = False
+
+    def _evaluate(self, value: FloatArray) -> Evaluation:
+        """Evaluate the model at values, clipped to the bounds.
+
+        Raises
+        ------
+        NoMotionError
+            If the model has no motion there, or its chi^2 is not finite.
+        """
+        value = self._model.settled(np.clip(value, self._low, self._high))
+        at = self._model.evaluate(value)
+        difference, slip = unwrapped(self._data, at)
+        prior = (0.5 - value[SHARE]) / _SHARE_SD
+        residual = np.append(self._noise.whiten(difference), prior)
+        if not math.isfinite(float(residual @ residual)):
+            raise NoMotionError("its chi^2 is not finite")
+        return Evaluation(value, at, residual, slip, self._model, self._noise)
+
+    def _moved(self, here: Evaluation, step: FloatArray) -> Evaluation | None:
+        """Evaluate the model a step away, within the bounds; None where it has no motion."""
+        try:
+            return self._evaluate(here.value + step)
+        except NoMotionError:
+            return None
+
+    def _step(
+        self,
+        here: Evaluation,
+        free: IntArray,
+        radius: float = math.inf,
+        origin: Evaluation | None = None,
+    ) -> tuple[FloatArray, float]:
+        """Return the best step of a linear model, with the derivatives at `origin` or here.
+
+        The length, at most `radius`, is that of the changes that each value makes by itself in the
+        whitened readings (More 1978): values that compensate each other have long steps.
+        """
+        low, high = self._low.copy(), self._high.copy()
+        # The readings are linear in a scale over a fraction of it at most, and while the effect
+        # is still small the step in its scale is arbitrary.
+        scales = self._scales
+        low[scales] = np.maximum(low[scales], here.value[scales] / _LARGEST_RATIO)
+        high[scales] = np.minimum(high[scales], here.value[scales] * _LARGEST_RATIO)
+        return _step(origin or here, free, here.residual, here.value, low, high, radius)
 
     @property
     def chi2(self) -> float:
@@ -457,16 +435,16 @@ class Refining:
 
     def _round(self) -> None:
         """Go one step: the whole one if chi^2 falls by what it promises, else a shorter one."""
-        here, steps, free = self._here, self._steps, self._free
-        settled, still = SETTLED * self._unit, steps.without_places(self._free)
+        here, free = self._here, self._free
+        settled, still = SETTLED * self._unit, free[~np.isin(free, self._places)]
         tries = 0
         while True:
-            step, length = steps.step(here, free, self._radius)
+            step, length = self._step(here, free, self._radius)
             expected = _expected(here, here.columns, step)
-            there = steps.moved(here, step)
+            there = self._moved(here, step)
             if tries == 0 and len(still) < len(free) and (not there or there.chi2 > here.chi2):
                 # Along a place chi^2 has many minima: it stays, unless the gain is its own.
-                shorter, _ = steps.step(here, still, self._radius)
+                shorter, _ = self._step(here, still, self._radius)
                 if _expected(here, here.columns, shorter) > _POOR * expected:
                     tries, free = 1, still
                     continue
@@ -507,8 +485,8 @@ class Refining:
             missing = expected - (here.chi2 - there.chi2)
             if missing <= (1.0 - _POOR) * max(expected, 0.0):
                 break
-            step, _ = self._steps.step(there, free, math.sqrt(missing), here)
-            nearer = self._steps.moved(there, step)
+            step, _ = self._step(there, free, math.sqrt(missing), here)
+            nearer = self._moved(there, step)
             if nearer is None or expected - (here.chi2 - nearer.chi2) > _POOR * missing:
                 break
             there = nearer
@@ -534,10 +512,10 @@ class Refining:
         if not np.all(np.any(before.columns[:, self._free], axis=0)):
             # The shape of an effect had no influence while its size was zero.
             return
-        step, _ = self._steps.step(here, self._free, origin=before)
+        step, _ = self._step(here, self._free, origin=before)
         expected = _expected(here, before.columns, step)
         if expected < SETTLED * self._unit:
-            there = self._steps.moved(here, step)
+            there = self._moved(here, step)
             if there and there.chi2 < here.chi2 + 0.5 * SETTLED:
                 self._here = there
             self._ended = self._converged = True
@@ -546,17 +524,6 @@ class Refining:
 def _expected(here: Evaluation, columns: FloatArray, step: FloatArray) -> float:
     """Return the fall of chi^2 along a step of a linear model."""
     return here.chi2 - float(np.sum((here.residual - columns @ step) ** 2))
-
-
-def misfit(model: Model, data: Data, noise: Noise, value: FloatArray) -> float:
-    """Return chi^2 at given values.
-
-    Raises
-    ------
-    NoMotionError
-        If the model can't be evaluated there.
-    """
-    return GaussNewton(model, data, noise).evaluate(value).chi2
 
 
 _FIRST_CYCLES: Final = 4

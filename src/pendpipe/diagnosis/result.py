@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.diagnosis.summary import Summary, html_of, summarise
+from pendpipe.diagnosis.summary import BASELINES, Summary, html_of, summarise
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.estimate import Estimate
 
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from pendpipe.diagnosis.remainder import Remainder
 
 FILE_NAME: Final = "diagnosis.json"
-BASELINES: Final = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
-"""The baselines in words."""
 
 
 def swinging(baseline: str, restoring: str, drag_form: str) -> str:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -70,24 +70,19 @@ class Scale:
         The chi^2 that small differences are counted in.
     numbers
         The independent numbers m of what it leaves; inf where that is noise alone.
-    lines
-        What each line off the harmonics takes in the best set: in a worse one it takes up misfit as
-        well, which is no credit to it.
     """
 
     least: float
     unit: float = 1.0
     numbers: float = math.inf
-    lines: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, best: Fit, data: Data, noise: Noise) -> Scale:
         """Return the scale that a set's best model gives."""
-        rest, taken = remainder_of(best, data, noise), lines(best)
-        least = best.chi2 + sum(taken.values())
+        rest = remainder_of(best, data, noise)
         if not rest.systematic:
-            return cls(least, lines=taken)
-        return cls(least, 1.0 + rest.excess / rest.numbers, rest.numbers, taken)
+            return cls(best.chi2)
+        return cls(best.chi2, 1.0 + rest.excess / rest.numbers, rest.numbers)
 
     @property
     def clean(self) -> bool:
@@ -101,26 +96,15 @@ class Scale:
             return behind
         return self.numbers * math.log1p(behind / self.numbers)
 
-    def lost_by(self, fit: Fit) -> float:
-        """Return what a set of effects is worse than the best."""
-        apart = sum(min(taken, self.lines.get(key, taken)) for key, taken in lines(fit).items())
-        return self.lost(fit.chi2 + apart) - apart
-
     def within(self, lost: float) -> float:
         """Return the chi^2 of a model that is worse than the best by `lost`."""
         if not self.clean:
             lost = self.numbers * math.expm1(min(lost / self.numbers, 50.0))
         return self.least + self.unit * lost
 
-    def worth(self, before: float, fit: Fit, effect: Effect) -> float:
-        """Return what the fall of chi^2 from `before` by an effect of a fit is worth.
-
-        Its other lines take as much before as after, whatever they take beside this effect.
-        """
-        taken = lines(fit)
-        own = taken.pop(effect.key, 0.0)
-        apart = sum(self.lines.get(key, 0.0) for key in taken)
-        return self.lost(before + apart) - self.lost(fit.chi2 + apart + own) + own
+    def worth(self, before: float, after: float) -> float:
+        """Return what a fall of chi^2 is worth."""
+        return self.lost(before) - self.lost(after)
 
 
 def off_harmonics(fit: Fit, effect: Effect) -> bool:
@@ -157,23 +141,6 @@ def from_harmonic(fit: Fit, effect: Effect, about_hz: float = 0.0) -> Estimate |
     return Estimate(off / motion, tone.sd / motion, "")
 
 
-def lines(fit: Fit) -> dict[str, float]:
-    """Return the chi^2 that each line off the harmonics takes, by its effect's key.
-
-    No misfit of the motion makes such a line, so that its chi^2 counts against the noise. It is
-    what the rest of the model cannot take: two lines that nearly cancel take little, however
-    large each is.
-    """
-    found = {}
-    for effect, place in fit.model.places():
-        if off_harmonics(fit, effect):
-            sizes = slice(place.start, place.start + effect.sizes)
-            taken = fit.jacobian[:, sizes] @ fit.value[sizes]
-            taken = fit.beside(taken, range(place.start, place.stop))
-            found[effect.key] = float(taken @ taken)
-    return found
-
-
 @dataclass(frozen=True)
 class Rival:
     """A refitted effect.
@@ -202,7 +169,7 @@ class Rival:
     @classmethod
     def of(cls, lead: Lead, fit: Fit, before: float, scale: Scale, chance: Chance) -> Rival:
         """Return the rival whose fit lowers chi^2 from `before`."""
-        worth = scale.worth(before, fit, lead.effect)
+        worth = scale.worth(before, fit.chi2)
         found = evidence(lead, fit, worth, chance, scale.unit)
         return cls(lead, fit, before - fit.chi2, worth, found)
 
@@ -213,7 +180,7 @@ class Rival:
         """
         if self.drawn:
             return Rival.of(self.lead, fit, before, scale, NO_SCAN)
-        worth = scale.worth(before, fit, self.lead.effect)
+        worth = scale.worth(before, fit.chi2)
         return Rival(self.lead, fit, before - fit.chi2, worth, worth - self.charge)
 
     @property
@@ -401,8 +368,6 @@ _STALLED_GAIN: Final = 0.3
 _LARGEST_DISPLACEMENT: Final = 0.5
 """Largest displacement that an effect may add to the reading, over the first amplitude."""
 _MOST_REFITTED: Final = 9
-_MORE_AT_BOUND: Final = 3
-"""More named effects to refit where a value at its bound lowers the scores."""
 _SCORE_MARGIN: Final = 0.3
 """Part of the best score that a refit may catch up."""
 _SCORE_MARGIN_AT_BOUND: Final = 0.6
@@ -428,27 +393,7 @@ def refit_leads(
     if not fits:
         return []
     scale = Scale.of(min((fit for _, fit in fits), key=lambda fit: fit.chi2), data, noise)
-    rivals = ranked([Rival.of(lead, fit, base.chi2, scale, detection.chance) for lead, fit in fits])
-    return rivals if scale.clean else _names_first(rivals)
-
-
-def _names_first(rivals: list[Rival]) -> list[Rival]:
-    """Rank names that explain most of a misfit before curves, which may follow the rest.
-
-    Where even the best leaves a misfit, names and curves will be needed together, and a curve that
-    was drawn first would hide the names. What is not needed beside the curve is dropped again.
-    Among names that the record can't distinguish the prior decides; then a law that acts throughout
-    comes before an event, which takes a part of any misfit.
-    """
-    half = 0.5 * max(rival.gain for rival in rivals)
-    best = max(rivals, key=lambda rival: -math.inf if rival.drawn else rival.evidence)
-    near = best.evidence - class_width(best)
-
-    def order(rival: Rival) -> tuple[bool, float, bool, float]:
-        prior = rival.prior if rival.evidence > near else -math.inf
-        return rival.drawn or rival.gain < half, -prior, rival.lead.effect.local, -rival.evidence
-
-    return sorted(rivals, key=order)
+    return ranked([Rival.of(lead, fit, base.chi2, scale, detection.chance) for lead, fit in fits])
 
 
 def _worth_refitting(found: Sequence[Lead], phase_lost: bool, most: int, wide: bool) -> list[Lead]:
@@ -467,8 +412,7 @@ def _worth_refitting(found: Sequence[Lead], phase_lost: bool, most: int, wide: b
         near = near[: most + 2]
     else:
         # Curves lead in many misfits; they don't count in the number of named effects.
-        names = [lead for lead in near if lead.effect.kind != "unnamed"]
-        names = names[: most + _MORE_AT_BOUND if wide else most]
+        names = [lead for lead in near if lead.effect.kind != "unnamed"][:most]
         near = [lead for lead in near if lead.effect.kind == "unnamed" or lead in names]
     # Always refitted: parameters that the user holds (few), and where the phase is lost bearing
     # friction and drag, which every pendulum has.

@@ -24,7 +24,7 @@ from pendpipe.diagnosis.forensics.codes import with_true_step
 from pendpipe.diagnosis.forensics.lost_samples import loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.held_out import held_out
-from pendpipe.diagnosis.hypothesis import Hypothesis, catalogue_beside
+from pendpipe.diagnosis.hypothesis import Hypothesis, Task, catalogue_beside
 from pendpipe.diagnosis.projection import whitened
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
@@ -36,9 +36,8 @@ from pendpipe.diagnosis.result import (
     Location,
     swinging,
 )
-from pendpipe.diagnosis.search import search
-from pendpipe.diagnosis.statement import statement
-from pendpipe.diagnosis.summary import COLOURED_NOISE
+from pendpipe.diagnosis.search import baseline_fitted, run_search
+from pendpipe.diagnosis.summary import COLOURED_NOISE, statement
 from pendpipe.diagnosis.values import parameters_of
 from pendpipe.diagnosis.weighing import (
     Weighed,
@@ -196,16 +195,11 @@ def diagnose_decay(
         beginning = begin(
             samples, points, fit, baseline=baseline, fixed=fixed, stated=part.unit_is_stated
         )
-        found, weighed = search(
-            beginning,
-            samples,
-            catalogue_beside(restoring),
-            baseline=baseline,
-            level=level,
-            seed=seed,
-            released=[ReleasedParameter(name) for name in fixed],
-            progress=progress,
-        )
+        released = [ReleasedParameter(name) for name in fixed]
+        catalogue = catalogue_beside(restoring)
+        task = Task(catalogue, released, baseline, level, seed, progress, samples)
+        # No name holds a fit that is left behind: of a long recording it is large.
+        found, weighed = run_search(baseline_fitted(beginning, task), task)
         found = _with_scatter(found, samples)
     except NoMotionError as error:
         remedy = "cut it with --start and --stop, or change what is held with --fix"

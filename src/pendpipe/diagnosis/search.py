@@ -1,13 +1,11 @@
 """From the baseline to the answer: go to a neighbour of a smaller score, until there is none."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.turning_points.measure import Samples
-from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.faults import correct, examine, random_torque
@@ -25,13 +23,11 @@ from pendpipe.diagnosis.neighbours import (
     with_other_noise,
 )
 from pendpipe.diagnosis.refine import Fit, best_fit, fitted_from, refine
-from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.remainder import with_errors
-from pendpipe.diagnosis.result import BASELINES
+from pendpipe.diagnosis.remainder import remainder_of, with_errors
 from pendpipe.diagnosis.rivals import NO_SCAN, Rival, Scale
-from pendpipe.diagnosis.weighing import Weighed, likelier, weigh
+from pendpipe.diagnosis.summary import BASELINES
+from pendpipe.diagnosis.weighing import Weighed, weigh
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects import Effect
 from pendpipe.effects.baseline import C
 
 _MOST_EFFECTS: Final = 4
@@ -39,51 +35,14 @@ LESS_FRICTION: Final = (1.0, 0.9, 0.7, 0.4)
 """Fractions of the Coulomb friction to try if the baseline stops before the last reading."""
 
 
-def search(
-    beginning: Beginning,
-    samples: Samples,
-    catalogue: Sequence[Effect],
-    *,
-    baseline: str,
-    level: float,
-    seed: int,
-    released: Sequence[ReleasedParameter] = (),
-    progress: Progress = silent,
-) -> tuple[Hypothesis, tuple[Weighed, ...]]:
-    """Fit the baseline, and run the search from there.
+def baseline_fitted(beginning: Beginning, task: Task) -> Hypothesis:
+    """Fit the baseline: where a search begins.
 
-    Parameters
-    ----------
-    beginning
-        Readings, baseline and start values.
-    samples
-        The readings as they were recorded.
-    catalogue
-        The effects that may be missing.
-    baseline
-        Its name.
-    level
-        The significance level (global p-value).
-    seed
-        Of the random draws that count trials.
-    released
-        The held parameters that may be wrong.
-    progress
-        Receives one line for each step.
-
-    Returns
-    -------
-    Hypothesis
-        To which there is no better neighbour.
-    tuple of Weighed
-        One for each of its steps.
+    Raises
+    ------
+    NoMotionError
+        If it has no motion that reaches the last reading.
     """
-    task = Task(catalogue, released, baseline, level, seed, progress, samples)
-    # No name holds a fit that is left behind: of a long recording it is large.
-    return run_search(_baseline_fitted(beginning, task), task)
-
-
-def _baseline_fitted(beginning: Beginning, task: Task) -> Hypothesis:
     data, held = beginning.data, beginning.held
     task.progress(f"fitting {BASELINES.get(task.baseline, task.baseline)} to {data.used} readings")
     white = first_noise(beginning)
@@ -96,8 +55,7 @@ def _baseline_fitted(beginning: Beginning, task: Task) -> Hypothesis:
 def run_search(state: Hypothesis, task: Task) -> tuple[Hypothesis, tuple[Weighed, ...]]:
     """Go to a neighbour of a smaller score, until there is none that was not seen.
 
-    Cheap neighbours come first, and the first kind that has a better one is taken. Last comes a
-    rival in the place of what it looks like, for which all are weighed.
+    Cheap neighbours come first, and the first kind that has a better one is taken.
     """
     seen = set()
     while True:
@@ -112,12 +70,7 @@ def run_search(state: Hypothesis, task: Task) -> tuple[Hypothesis, tuple[Weighed
                 break
         else:
             state = _judged(examine(state, task))
-            weighed = tuple(weigh(state, step) for step in state.steps)
-            other = likelier(state, weighed, seen)
-            if other is None:
-                return state, weighed
-            task.progress(f"{' and '.join(step.winner.name for step in other.steps)} is likelier")
-            state = other
+            return state, tuple(weigh(state, step) for step in state.steps)
 
 
 def _starts(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
@@ -140,24 +93,35 @@ def _starts(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
 
 
 def _additions(state: Hypothesis, task: Task, *, names_first: bool = False) -> Iterator[Neighbour]:
-    """Add the effect that leads, or several of which none pays its price before the others."""
+    """Add the effect that leads, or random kicks; or two names that share a misfit."""
     drawn, chance = _ends_with_curve(state), state.scan.p_value > task.threshold
     if chance or drawn or len(state.steps) >= _MOST_EFFECTS:
         return
     step = leading(state, task, names_first=names_first)
     if step is None:
         return
-    if not is_gross(state.fit, state.data) and (kicked := random_torque(state, step.winner, task)):
-        yield Neighbour(kicked, 1.0, "random kicks explain more")
-        return
     one = adding(state, step)
+    yield one
+    yield from _kicks(state, task, one)
     # Of two laws that share a misfit neither may pay its price before the other is there.
-    if one.lower >= -one.state.steps[-1].predicted_worse or not shares_a_misfit(step, state):
-        yield one
-        return
-    trial = task.scanned(correct(one.state.settle(one.state.fit), task))
-    for more in _additions(trial, task, names_first=True):
-        yield _from(state, more)
+    if one.lower < -one.state.steps[-1].predicted_worse and shares_a_misfit(step, state):
+        trial = task.scanned(correct(one.state.settle(one.state.fit), task))
+        for more in _additions(trial, task, names_first=True):
+            yield _from(state, more)
+
+
+def _kicks(state: Hypothesis, task: Task, instead: Neighbour) -> Iterator[Neighbour]:
+    """Let random kicks explain the residual, instead of an effect that leaves more than noise.
+
+    They leave none of it: both gains count against the noise.
+    """
+    winner = instead.state.steps[-1].winner
+    left = remainder_of(winner.fit, state.data, state.noise)
+    if left.systematic and not is_gross(state.fit, state.data):
+        kicked = random_torque(state, task)
+        if kicked is not None:
+            ahead = kicked.gain - (winner.gain - winner.charge)
+            yield Neighbour(kicked.state, instead.lower + ahead, kicked.said)
 
 
 def _from(state: Hypothesis, more: Neighbour) -> Neighbour:

@@ -44,8 +44,7 @@ from pendpipe.diagnosis.result import (
 )
 from pendpipe.diagnosis.rivals import Scale
 from pendpipe.diagnosis.search import LESS_FRICTION, run_search
-from pendpipe.diagnosis.statement import DOUBTFUL, statement
-from pendpipe.diagnosis.summary import COLOURED_NOISE
+from pendpipe.diagnosis.summary import COLOURED_NOISE, DOUBTFUL, statement
 from pendpipe.diagnosis.values import constants_of
 from pendpipe.diagnosis.weighing import (
     Weighed,
@@ -377,9 +376,7 @@ def search_together(
     fit = _fitted(model, data, noise, searches, held)
     if fit is None:
         raise NoMotionError("the recordings have no motion in common")
-    begun = [found.beginning for found in searches]
-    rms = float(np.sqrt(np.mean([each.noise_rms**2 for each in begun])))
-    beginning = Beginning(data, model, fit.value, tuple(held), rms, begun[0].points)
+    beginning = Beginning(data, model, fit.value, tuple(held))
     differing = [
         Differs(name, number)
         for name in MAY_DIFFER

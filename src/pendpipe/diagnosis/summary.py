@@ -1,7 +1,7 @@
 """The answer in a dozen lines: what is missing, how much it matters, and what to quote.
 
 A name is given from a probability of one half on, its class counted together; from a fifth on
-it stands in one line of candidates. Everything below is in the details.
+it stands in one line of candidates. Everything below is in the details (`statement`).
 """
 
 from __future__ import annotations
@@ -13,15 +13,23 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendpipe.analysis.fit.printed import short_size
 from pendpipe.analysis.fit.quality import period_of_frequency, seen_qualities
-from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, in_columns, with_error
 
 if TYPE_CHECKING:
-    from pendpipe.diagnosis.result import Diagnosis, FoundEffect
+    from pendpipe.diagnosis.cycles import SmallSwings
+    from pendpipe.diagnosis.remainder import Remainder
+    from pendpipe.diagnosis.result import Diagnosis, FittedModel, FoundEffect
 
+BASELINES: Final = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
+"""The baselines in words."""
 NAMED: Final = 0.5
 """Probability from which a cause is named, its class counted together."""
+DOUBTFUL: Final = 0.05
+"""Probability up to which a name only describes and is not to be quoted."""
+_CONFIRMED: Final = 0.01
+"""p-value of a second test below which it confirms."""
 CANDIDATE: Final = 0.2
 """Probability from which it is a candidate."""
 _MOVED: Final = 2.0
@@ -75,12 +83,12 @@ _WORDS: Final = {
     "kappa": "coefficient",
 }
 """What the parameters of the effects are, in words; the others are in the details."""
-_WHERE: Final = {
-    "offset": "the offset",
-    "amplitude": "the amplitude",
-    "phase": "the phase",
-    "harmonics": "the higher harmonics",
-    "between": "frequencies between the harmonics",
+PARTS: Final = {
+    "offset": "in the offset",
+    "amplitude": "in the amplitude",
+    "phase": "in the phase",
+    "harmonics": "in the higher harmonics",
+    "between": "between the harmonics",
 }
 _LOOKED_FOR: Final = (
     *("second-mode", "plane-coupling", "frequency-drift", "damping-drift", "sensor-cubic"),
@@ -192,15 +200,8 @@ class Summary:
 
     def table(self) -> str:
         """Return *as fitted* and *with what is missing* side by side."""
-        if not self.consequence:
-            return ""
-        heads, old, new = [""], ["as fitted"], ["with what is missing"]
-        for each in self.consequence:
-            unit = each.fitted.unit
-            heads.append(_title(each))
-            old.append(_short(each.fitted, unit))
-            new.append(_short(each.with_missing, unit))
-        return in_columns([heads, old, new])
+        rows = [("", "as fitted", "with what is missing"), *self.rows()]
+        return in_columns(list(zip(*rows, strict=True))) if self.consequence else ""
 
     def rows(self) -> list[tuple[str, str, str]]:
         """Return the table as rows: quantity, as fitted, with what is missing."""
@@ -438,7 +439,7 @@ def _where(diagnosis: Diagnosis, found: Sequence[FoundEffect]) -> str:
     remainder = diagnosis.remainder
     if remainder is not None and remainder.systematic and remainder.shares:
         name, share = max(remainder.shares.items(), key=lambda item: item[1])
-        text += f"; what is left lies in {_WHERE[name]} ({percent(share)})"
+        text += f"; what is left lies {PARTS[name]} ({percent(share)})"
     return text
 
 
@@ -563,3 +564,111 @@ def html_of(summary: Summary, name: str = "") -> str:
     if summary.sentence:
         parts.append(f"<p>{escape(summary.sentence)}</p>")
     return "".join(parts)
+
+
+def statement(
+    baseline: str,
+    before: FittedModel,
+    effects: Sequence[FoundEffect],
+    noise_rms: float,
+    p_value: float,
+    unexplained: float,
+    level: float,
+    *,
+    unit: str = "rad",
+    remainder: Remainder | None = None,
+    swings: SmallSwings | None = None,
+    notes: Sequence[str] = (),
+    rounded: bool = False,
+) -> str:
+    """Write the lines: whether the baseline holds, each effect, and what is left.
+
+    Parameters
+    ----------
+    baseline
+        ``"eq8"`` or ``"viscous"``.
+    before
+        The baseline.
+    effects
+        What was found.
+    noise_rms
+        Of one reading.
+    p_value, unexplained
+        Global p-values of the baseline and of what the extended model leaves.
+    level
+        The significance level.
+    unit
+        Of the readings.
+    remainder, swings
+        What the extended model leaves, and the frequency at the smallest amplitudes.
+    notes
+        Properties of the time stamps, a clause each.
+    rounded
+        Whether the noise is that of the rounding.
+    """
+    model = _capital(BASELINES.get(baseline, baseline))
+    left, noise_is = compact(before.residual_rms_rad, unit), compact(noise_rms, unit)
+    times = factor(before.residual_rms_rad / noise_rms)
+    lines = [
+        f"{model} does not describe this recording ({printed(p_value)}): the residual is"
+        f" {left} rms, {times} times the noise of {noise_is}.",
+        *map(_effect, effects),
+        _rest(unexplained, level, remainder),
+        *([swings.sentence(unit)] if swings is not None else []),
+    ]
+    noise = [each.location.summary for each in effects if each.identifier == COLOURED_NOISE]
+    if len(noise) == len(effects):
+        wanders = any("the zero wanders" in note for note in notes)
+        what = "the motion of this recording, whose zero wanders" if wanders else "this recording"
+        agrees = f"the residual of {left} rms agrees with the noise ({noise_is})"
+        if rounded and before.residual_rms_rad < noise_rms:
+            agrees = f"it leaves {left} rms, less than the rounding adds ({noise_is})"
+        nothing = (
+            f"{model} describes {what}: {agrees}, and no effect of the catalogue"
+            f" improves the fit more than chance would ({printed(unexplained)})."
+        )
+        lines = [nothing, *(f"{_capital(said)}." for said in noise)]
+    return "\n".join([*lines, *([f"Note: {'; '.join(notes)}."] if notes else [])])
+
+
+def _effect(effect: FoundEffect) -> str:
+    """What one effect is, how sure that is, where it shows, and what would decide."""
+    known = {each.identifier: {p.name for p in each.parameters} for each in CATALOGUE}
+    # What a test has counted, its location says.
+    wanted = known.get(effect.identifier, set(effect.parameters))
+    members = class_of(effect)
+    parts = [
+        ", ".join(f"{name} {percent(p)}" for p, name in members)
+        + (" (not told apart)" if len(members) > 1 else ""),
+        *(
+            f"{name} = {each}"
+            for name, each in effect.parameters.items()
+            if name in wanted and each.sd > 0.0
+        ),
+        effect.location.summary,
+    ]
+    if effect.confirmed is not None:
+        sure = "confirmed" if effect.confirmed.p_value < _CONFIRMED else "not confirmed"
+        parts.append(f"{sure} without the fit: {effect.confirmed.summary}")
+    decide = f"decide by: {effect.discriminating_test}"
+    text = f"{_capital('; '.join(part for part in (*parts, decide) if part))}"
+    return text if text.endswith("?") else f"{text}."
+
+
+def _rest(unexplained: float, level: float, remainder: Remainder | None) -> str:
+    """What is left, and what that means for probabilities and errors."""
+    if remainder is None or not remainder.systematic:
+        if unexplained > level:
+            return f"The remaining residual is consistent with noise ({printed(unexplained)})."
+        return f"A small misfit remains unexplained ({printed(unexplained)})."
+    shares = sorted(remainder.shares.items(), key=lambda item: -item[1])
+    where = ", ".join(f"{percent(share)} {PARTS[name]}" for name, share in shares if share > 0.05)
+    return (
+        f"The remaining residual is still {factor(remainder.over_noise)} times the noise"
+        f" ({where}), so the model is incomplete: the errors given here allow for that, and the"
+        " probabilities are lowered accordingly."
+    )
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

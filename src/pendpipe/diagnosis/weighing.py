@@ -1,7 +1,7 @@
-"""Final probabilities of each effect and its rivals; likelier rivals are swapped in."""
+"""Final probabilities of each effect and its rivals."""
 
 import math
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Final, NamedTuple
@@ -12,7 +12,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Step, is_further, is_gross
 from pendpipe.diagnosis.instants import with_instants
 from pendpipe.diagnosis.location import locate
-from pendpipe.diagnosis.refine import SETTLED, Fit, best_fit, misfit
+from pendpipe.diagnosis.refine import SETTLED, Fit, best_fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import with_errors
 from pendpipe.diagnosis.result import Finding, FoundEffect
@@ -42,11 +42,6 @@ _LISTED_FROM: Final = 0.05
 """Probability from which an unnamed curve is listed among the rivals."""
 _SEEN_IN_RESIDUAL: Final = (*RANDOM, "coloured-noise")
 """Faults detected in a residual: the misfit of a curve can look like any of them."""
-_LIKELIER: Final = 1.5
-"""Ratio of probabilities from which another effect replaces the one that was added."""
-_LIKELIER_CURVE: Final = 20.0
-"""The same for a curve that replaces a named effect. Names precede curves that the recording
-cannot distinguish from them; at odds of twenty to one it can."""
 _SAME_GAIN: Final = 0.02
 """Relative change of a gain below which the rivals are not refitted."""
 
@@ -64,15 +59,12 @@ class Weighed(NamedTuple):
         The effects that the recording cannot distinguish from it, the best of each identifier.
     weights
         Probabilities of the effect, of its mates, and of none of them.
-    rivals
-        All that were refitted.
     """
 
     without: Fit
     gain: float
     mates: tuple[Rival, ...]
     weights: FloatArray
-    rivals: tuple[Rival, ...]
 
 
 def weigh(found: Hypothesis, step: Step) -> Weighed:
@@ -85,9 +77,7 @@ def weigh(found: Hypothesis, step: Step) -> Weighed:
     others = [rival for rival in rivals if rival.identifier != effect.identifier]
     mates = _best_of_each([mate for mate in others if of_one_class(own, mate)])
     # An effect that every pendulum has gets its prior against rivals and against "none of these".
-    # A curve that can follow anything gets no credit for leaving only noise.
-    follows = isinstance(effect, Curve) and effect.of_anything
-    none = own.evidence - max(own.prior, 0.0) - (0.0 if follows else _clean_charge(found))
+    none = own.evidence - max(own.prior, 0.0) - _clean_charge(found)
     if effect.kind != "unnamed":
         none += _charge_for_several(found)
     # Any law of the motion that nobody knows makes lines at its harmonics.
@@ -96,7 +86,7 @@ def weigh(found: Hypothesis, step: Step) -> Weighed:
     # What every pendulum has, and a line off the harmonics, no misfit can be mistaken for.
     if not (effect.expected or off_harmonics(found.fit, effect)):
         weights = weights * _explained(found, effect, gain)
-    return Weighed(without, gain, tuple(mates), weights, tuple(rivals))
+    return Weighed(without, gain, tuple(mates), weights)
 
 
 def beside(found: Hypothesis, effect: Effect) -> Hypothesis:
@@ -144,7 +134,7 @@ def effect_named(found: Hypothesis, step: Step, weighed: Weighed) -> FoundEffect
     """Return one effect with its final values, probability and location."""
     effect = step.winner.lead.effect
     found = beside(found, effect)
-    without, gain, mates, weights, _ = weighed
+    without, gain, mates, weights = weighed
     return FoundEffect(
         effect.identifier,
         effect.name,
@@ -280,7 +270,7 @@ def _rivalry(found: Hypothesis, step: Step) -> tuple[Fit, Sequence[Rival]]:
 
 
 def refitted(
-    without: Fit, found: Hypothesis, held: Sequence[int], rival: Rival, useful: float = math.inf
+    without: Fit, found: Hypothesis, held: Sequence[int], rival: Rival, useful: float
 ) -> Fit | None:
     """Refit a rival in the final model, from its earlier result, as far as it is useful."""
     effect = rival.lead.effect
@@ -305,87 +295,6 @@ def _is_of(fit: Fit, without: Fit, effect: Effect, found: Hypothesis) -> bool:
     if not np.array_equal(fit.model.time_s, without.model.time_s):
         return False  # the time stamps were corrected after it
     with suppress(NoMotionError):
-        now = misfit(fit.model, found.data, found.noise, fit.value)
-        return abs(now - fit.chi2) < SETTLED
+        now = refine(fit.model, found.data, found.noise, fit.value, rounds=0)
+        return abs(now.chi2 - fit.chi2) < SETTLED
     return False
-
-
-def likelier(
-    found: Hypothesis, weighed: Sequence[Weighed], seen: Container[object]
-) -> Hypothesis | None:
-    """Exchange an effect for a likelier rival: the last that has one, if the set is new.
-
-    A search adds what reduces a gross misfit most. Where much remains unexplained, a slightly
-    larger gain means nothing and the prior decides; and effects added later, or the final
-    estimate of the noise, may have changed the odds. Names under a curve stay: their probabilities
-    show how little they explain.
-    """
-    if found.without_curve is not None:
-        return None
-    for number in reversed(range(len(found.steps))):
-        best = _likelier(found, found.steps[number], weighed[number])
-        after = _exchanged(found, number, best, weighed[number]) if best else None
-        if after and after.key not in seen:
-            return after
-    return None
-
-
-def _likelier(found: Hypothesis, step: Step, weighed: Weighed) -> Rival | None:
-    """Return the likelier rival that may replace a step's winner."""
-    present = {effect.key for effect in found.fit.model.effects}
-    own = step.winner
-    likelier = [
-        (float(weight), rival)
-        for rival, weight in zip(weighed.mates, weighed.weights[1:], strict=False)
-        if rival.lead.effect.key not in present
-        # What no model explains has its curve already, on top of the names, and one is enough.
-        and not (rival.drawn and (found.remainder.systematic or _has_curve(found.steps, step)))
-        and weight
-        > weighed.weights[0] * (_LIKELIER_CURVE if rival.drawn and not own.drawn else _LIKELIER)
-    ]
-    return max(likelier, key=lambda each: each[0], default=(0.0, None))[1]
-
-
-def _has_curve(steps: Sequence[Step], but: Step) -> bool:
-    return any(step.winner.drawn for step in steps if step is not but)
-
-
-def _exchanged(found: Hypothesis, number: int, best: Rival, weighed: Weighed) -> Hypothesis | None:
-    """Replace a step's winner by a rival; None where the model has no such motion."""
-    step, effect = found.steps[number], best.lead.effect
-    own, held = step.winner.lead.effect, set(found.held)
-    # A held part of b has no index: the model itself holds it.
-    if isinstance(own, ReleasedParameter) and own.index is not None:
-        held.add(own.index)
-    if isinstance(effect, ReleasedParameter):
-        held = set(effect.without(held))
-    fit = refitted(weighed.without, found, sorted(held), best)
-    if fit is None:
-        return None
-    fit = with_errors(fit, found.data, found.noise)
-    return replace(
-        found,
-        fit=fit,
-        steps=_reordered(found.steps, number, effect, weighed),
-        held=tuple(sorted(held)),
-        without_curve=None,
-    )
-
-
-def _reordered(
-    steps: Sequence[Step], number: int, effect: Effect, weighed: Weighed
-) -> tuple[Step, ...]:
-    """Return the steps with an effect moved to the front of its rivals at one of them.
-
-    These are as they were refitted: what they are compared beside stays.
-    """
-    again = {rival.lead.effect.key: rival for rival in weighed.rivals}
-    rivals = [again.get(rival.lead.effect.key, rival) for rival in steps[number].rivals]
-    own = [rival for rival in rivals if rival.lead.effect.key == effect.key]
-    rest = [rival for rival in rivals if rival.lead.effect.key != effect.key]
-    after = list(steps)
-    after[number] = replace(steps[number], rivals=(*own, *rest), before=weighed.without)
-    if number + 1 < len(steps):
-        # The next step is tested without its own effect: start from this model.
-        after[number + 1] = replace(steps[number + 1], before=own[0].fit)
-    return tuple(after)

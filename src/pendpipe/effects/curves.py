@@ -45,8 +45,6 @@ class Curve(Effect):
     """The curves that are drawn over the same argument."""
     over_logarithm: ClassVar[bool] = False
     """Whether it is straight between the knots over the argument's logarithm."""
-    of_anything: ClassVar[bool] = False
-    """Whether it follows whatever may happen, at whatever time."""
     make_knots: ClassVar[Callable[[Span], FloatArray]]
     """Returns where the basis functions have their peaks."""
     unit: ClassVar[Callable[[Pendulum, Span], float]]
@@ -277,7 +275,6 @@ def profile_curve(motion: Motion, pendulum: Pendulum, profile: FloatArray) -> Fl
     hundredth,
     drawn=("value", "quadrature"),
     in_time=True,
-    of_anything=True,
     prior=-6.0,
     identifier="unnamed-drive",
     name="a torque that depends on the time in an unknown way",
@@ -318,7 +315,6 @@ def reading_curve(sampled: Sampled, pendulum: Pendulum, added: FloatArray) -> Fl
     partial(instants, 14),
     partial(share_of_swing, 0.05),
     in_time=True,
-    of_anything=True,
     identifier="unnamed-measurement",
     name="a wandering offset",
     equation=r"y = x + s(t)",
