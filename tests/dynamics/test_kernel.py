@@ -132,6 +132,18 @@ def test_numba_works_in_a_process_that_has_loaded_the_kept_code(kept: Path) -> N
     assert first_call(kept, NUMBA_AFTERWARDS) == ["11", "False", "False", "3.0", "zero"]
 
 
+def test_the_process_that_compiles_runs_what_it_keeps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What Numba itself made rounds otherwise: a campaign's first run would differ from later."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    one = anew(fill)
+    assert callable(one.machine_code)
+    again = machine_code.load(tmp_path / fill.file_name())
+    assert again is not None
+    assert type(one._owner) is type(again[1])
+
+
 def test_damaged_code_is_compiled_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert callable(anew(fill).machine_code)

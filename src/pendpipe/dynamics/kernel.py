@@ -152,6 +152,7 @@ class Kernel:
         if sys.stderr.isatty():
             print(f"compiling, once: {self.__name__} (march: half a minute)", file=sys.stderr)
         library, entry = numba_side.compiled(self)
+        own = library.get_pointer_to_function(entry), library
         for folder in folders():
             try:
                 machine_code.keep(folder / name, library.get_llvm_str(), entry)
@@ -161,8 +162,9 @@ class Kernel:
                 if old.name != name:
                     # The code of other sources.
                     old.unlink(missing_ok=True)
-            break
-        return library.get_pointer_to_function(entry), library
+            # What is kept runs now as later: that which Numba made rounds otherwise.
+            return machine_code.load(folder / name) or own
+        return own
 
     def ship(self) -> None:
         """Make the code for many machines, unless it is there."""
