@@ -652,7 +652,9 @@ def find_step(values: FloatArray) -> float | None:
     step = _refined(jumps, near) or _refined(jumps, smallest)
     sizes = np.unique(np.abs(finite))
     large = sizes[3 * len(sizes) // 4 :]
-    return None if step and len(large) > 8 and _multiples(large, 10.0 * step) else step
+    tenths = large / (10.0 * step) if step else np.empty(0)
+    # All large ones multiples of ten steps: numbers of fixed digits.
+    return None if len(tenths) > 8 and np.all(np.abs(tenths - np.rint(tenths)) < 0.02) else step
 
 
 _SOME: Final = 256
@@ -678,11 +680,6 @@ def decimal_step(values: FloatArray) -> float | None:
         if slack < 0.01 and np.all(np.abs(scaled - np.rint(scaled)) < slack):
             return float(10.0**-digits)
     return None
-
-
-def _multiples(values: FloatArray, step: float) -> bool:
-    """Whether all values are multiples of a step."""
-    return bool(np.all(np.abs(values / step - np.rint(values / step)) < 0.02))
 
 
 def _refined(jumps: FloatArray, step: float) -> float | None:

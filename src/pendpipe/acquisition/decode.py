@@ -238,25 +238,19 @@ def _rows(
     segments: Sequence[Segment], rate_hz: float, column: int, step: float
 ) -> tuple[FloatArray, FloatArray, ByteArray]:
     """Put the streams one after the other, with rows for what is missing in and between them."""
-    times, readings, qualities = [np.empty(0)], [np.empty(0)], [np.empty(0, dtype=np.uint8)]
-
-    def put(time_s: FloatArray, values: FloatArray, quality: ByteArray) -> None:
-        times.append(time_s)
-        readings.append(values)
-        qualities.append(quality)
-
+    parts: list[tuple[AnyArray, AnyArray, AnyArray]] = []
     for segment, begin_s in zip(segments, offsets_s(segments, rate_hz), strict=True):
         scans = segment.scans
         count = len(scans.counts)
-        if len(times) > 1:
-            last_s = float(times[-1][-1])
+        if parts:
+            last_s = float(parts[-1][0][-1])
             # Late stamps must not make time stand still.
             begin_s = max(begin_s, last_s + 1.0 / rate_hz)
             rows = max(0, math.ceil((begin_s - last_s) * rate_hz - 0.5) - 1)
             # A long break (the computer slept) gets its first and last row alone.
             gap = np.arange(rows) if rows <= max(_MOST_ROWS, count) else np.array([0, rows - 1])
             missing = np.full(len(gap), MISSING, "u1")
-            put(last_s + (gap + 1) / rate_hz, np.full(len(gap), np.nan), missing)
+            parts.append((last_s + (gap + 1) / rate_hz, np.full(len(gap), np.nan), missing))
         lost = np.zeros(count, dtype=np.int64)
         for loss in scans.losses:
             # What came before the first scan was never one, unless its frame was damaged.
@@ -270,8 +264,9 @@ def _rows(
         values, quality = np.full(len(every), np.nan), np.full(len(every), MISSING, "u1")
         values[number] = scans.counts[:, column] * step
         quality[number] = np.where(doubt, SUSPECT, GOOD)
-        put(begin_s + every / rate_hz, values, quality)
-    return np.concatenate(times), np.concatenate(readings), np.concatenate(qualities)
+        parts.append((begin_s + every / rate_hz, values, quality))
+    times, readings, qualities = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return times, readings, qualities
 
 
 _MOST_ROWS: Final = 1 << 20

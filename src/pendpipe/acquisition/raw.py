@@ -68,12 +68,6 @@ class Frame(NamedTuple):
         return head + _CHECK.pack(check) + self.content
 
 
-def description_line(header: Mapping[str, Any]) -> bytes:
-    """The description as the first line of a file, without its line feed."""
-    text = json.dumps({"format": _FORMAT, "version": 2, **header}, ensure_ascii=True)[:-1]
-    return f'{text}, "crc32": "{zlib.crc32(text.encode()):08x}"}}'.encode()
-
-
 class RawWriter:
     """Append a recording's bytes to an open binary file.
 
@@ -99,7 +93,8 @@ class RawWriter:
         self._most_bytes = min(max(1, int(bytes_per_s)), _LONGEST_FRAME)
         self._on_disk = hasattr(stream, "fileno") and not hasattr(stream, "getbuffer")
         self._starts = self._bytes = 0
-        line = description_line(header)
+        text = json.dumps({"format": _FORMAT, "version": 2, **header}, ensure_ascii=True)[:-1]
+        line = f'{text}, "crc32": "{zlib.crc32(text.encode()):08x}"}}'.encode()
         self._write(line + b"\n" + Frame(b"H", 0.0, line).packed())
         self.sync()
 

@@ -359,7 +359,8 @@ def _columns(
     for at, texts in enumerate(map(list, zip(*rows, strict=True))):
         known = _column(header, at, np.empty(0))
         column = column_of_numbers(texts, layout, known)
-        clock = column_of_clock_times(texts) if column is None or _are_times(texts) else None
+        timed = column is None or any(":" in text for text in texts[:3])
+        clock = column_of_clock_times(texts) if timed else None
         if clock is not None:
             columns.append(
                 Column(
@@ -404,10 +405,6 @@ def _columns(
         for column in columns
     ]
     return whole, [[texts[row] for row in kept] for texts in words], [note], kept
-
-
-def _are_times(texts: Sequence[str]) -> bool:
-    return any(":" in text for text in texts[:3])
 
 
 def _filled(wrong: BoolArray, texts: Sequence[str]) -> dict[int, str]:

@@ -163,12 +163,9 @@ def _recorded_at(out: Path) -> str | None:
     if not out.is_file():
         return None
     with out.open(encoding="utf-8", errors="replace") as stream:
-        head = (line.lstrip("# ").partition(": ") for line in takewhile(_is_remark, stream))
+        remarks = takewhile(lambda line: line.startswith("#"), stream)
+        head = (line.lstrip("# ").partition(": ") for line in remarks)
         return next((text.strip() for key, _, text in head if key == "recorded_at"), None)
-
-
-def _is_remark(line: str) -> bool:
-    return line.startswith("#")
 
 
 def _is_recording(out: Path) -> bool:

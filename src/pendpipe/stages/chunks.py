@@ -111,7 +111,8 @@ def split(records: dict[str, Record], batch: int) -> dict[str, tuple[Record, ...
     >>> sorted(split(dict.fromkeys(["a", "b", "c"]), 2))
     ['0', '1']
     """
-    bits = {name: _bits(name) for name in records}
+    sums = {name: hashlib.sha256(name.encode()).digest() for name in records}
+    bits = {name: f"{int.from_bytes(digest):0256b}" for name, digest in sums.items()}
 
     def parts(names: list[str], prefix: str) -> Iterator[tuple[str, list[str]]]:
         if len(names) <= batch:
@@ -125,10 +126,6 @@ def split(records: dict[str, Record], batch: int) -> dict[str, tuple[Record, ...
     return {
         chunk: tuple(records[name] for name in names) for chunk, names in parts(list(records), "")
     }
-
-
-def _bits(name: str) -> str:
-    return f"{int.from_bytes(hashlib.sha256(name.encode()).digest()):0256b}"
 
 
 def call(campaign: Campaign, stage: Stage, record: Record, configuration: str) -> list[str]:
