@@ -11,11 +11,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.fft import dct
+from scipy.special import ndtr
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.blocks import blocks_of
 from pendpipe.diagnosis.forensics.evidence import Evidence
-from pendpipe.diagnosis.forensics.tails import tail_of_squares, upper_tail
+from pendpipe.diagnosis.forensics.tails import tail_of_squares
 from pendpipe.diagnosis.projection import tangent_basis
 from pendpipe.diagnosis.result import Finding, Location
 from pendpipe.diagnosis.summary import COLOURED_NOISE
@@ -112,7 +113,7 @@ def find_coloured_noise(evidence: Evidence) -> Finding | None:
     word = "stronger" if ratio > 1.0 else "weaker"
     return Finding(
         COLOURED_NOISE,
-        upper_tail(score),
+        float(ndtr(-score)),
         max(gain, 0.0),
         {
             "slope": Estimate(slope, math.sqrt(float(across @ noise.uncertainty @ across)), ""),

@@ -19,7 +19,6 @@ from pendpipe.diagnosis.forensics.codes import (
     read_codes,
 )
 from pendpipe.diagnosis.forensics.local import local_residual
-from pendpipe.diagnosis.forensics.tails import upper_tail
 from pendpipe.diagnosis.result import Finding, Location
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number
@@ -330,7 +329,7 @@ def find_coarse_steps(evidence: Evidence) -> Finding | None:
     step, end = coded.step, float(evidence.sampled.amplitude[-1])
     return Finding(
         "coarse-quantisation",
-        upper_tail((size - allowed) / sd),
+        float(ndtr((allowed - size) / sd)),
         max(size / sd, 0.0) ** 2,
         {
             "step": Estimate(step, 0.0, data.unit),

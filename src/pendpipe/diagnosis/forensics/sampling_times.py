@@ -6,11 +6,12 @@ import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
+from scipy.special import ndtr
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.forensics.codes import read_codes
 from pendpipe.diagnosis.forensics.local import whitened_series
-from pendpipe.diagnosis.forensics.tails import tail_of_squares, upper_tail
+from pendpipe.diagnosis.forensics.tails import tail_of_squares
 from pendpipe.diagnosis.result import Finding
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import with_error
@@ -91,7 +92,7 @@ def find_irregular(evidence: Evidence) -> Finding | None:
     rms = float(np.std(off_s))
     return Finding(
         "time-stamps",
-        upper_tail(share / sd) if share > 0.5 else 1.0,
+        float(ndtr(-share / sd)) if share > 0.5 else 1.0,
         max(share / sd, 0.0) ** 2,
         {
             "share": Estimate(share, sd, ""),

@@ -13,12 +13,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
+from scipy.special import ndtr
 
 from pendpipe.analysis.half_cycles import find_extremes
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray, scaled_qr
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.tails import upper_tail
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Confirmation, Finding, Location
 from pendpipe.effects.model import jacobian
@@ -89,7 +89,7 @@ class Slips(NamedTuple):
         near = float(np.sum(np.cos(2.0 * math.pi * self.sizes)))
         squares = max(2.0 * half * self.scatter**2, 1e-300)
         ball = half * math.log(math.pi * squares) - math.lgamma(half + 1.0)
-        return min(upper_tail(near / math.sqrt(half)), math.exp(min(ball, 0.0)))
+        return min(float(ndtr(-near / math.sqrt(half))), math.exp(min(ball, 0.0)))
 
     def when_s(self, data: Data) -> FloatArray:
         """The instants of the steps."""

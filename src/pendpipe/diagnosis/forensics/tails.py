@@ -26,11 +26,6 @@ _LEAST_NOISE: Final = 0.05
 """Least part of the variance that the noise before rounding has at the start."""
 
 
-def upper_tail(sd: float) -> float:
-    """Return P(z > sd), z normal."""
-    return 0.5 * math.erfc(sd / math.sqrt(2.0))
-
-
 @dataclass(frozen=True)
 class Tail:
     """Possible distributions of the noise, with posterior weights.
