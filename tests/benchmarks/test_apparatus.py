@@ -44,6 +44,15 @@ def test_a_name_is_confident_above_its_limit(chance: float, wrong: bool) -> None
     assert questions([item("glitches", chance)])["the same, confident"] == [wrong]
 
 
+def test_what_was_presumed_is_fitted_and_no_detection() -> None:
+    sine = item("circular-error", 1.0, present=["circular-error"])
+    presumed = {**sine.content["effects"][0], "presumed": True}
+    content = {"verdict": "consistent", "effects": [presumed]}
+    asked = questions([solved({"number": 1, "truth": sine.truth, "diagnosis": content})])
+    assert asked["circular error named or in a class, where there is sin x"] == [True]
+    assert asked["detected"] == asked["first name is there"] == [False]
+
+
 def test_on_a_null_every_name_is_false_and_near_names_are_no_error_outside() -> None:
     null = item("second-mode", 0.3, family="null", effects=[])
     assert questions([null])["nulls with a false name"] == [True]

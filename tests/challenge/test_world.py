@@ -111,6 +111,12 @@ def test_what_an_effect_was_sized_for_is_what_a_fit_loses(effect: str) -> None:
     assert 2 * left.cost == pytest.approx(400.0, rel=0.25)
 
 
+def test_a_motion_that_runs_away_is_worth_nothing() -> None:
+    fed = Cause("negative damping", lambda world, size: world.add("gamma", -100.0 * size), 1.0)
+    with pytest.raises(FloatingPointError, match="runs away"):
+        Bench(scene(), [fed])
+
+
 def test_all_effects_of_the_catalogue_but_three_can_be_hidden() -> None:
     listed = {effect.identifier for effect in catalogue.CATALOGUE}
     assert listed - LATER == CATALOGUE.keys()

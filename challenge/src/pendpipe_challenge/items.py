@@ -12,6 +12,7 @@ and converters of pendulums that swing by sin x, up to 2.6 rad, or of torsion wh
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
@@ -220,9 +221,11 @@ def make_item(recipe: Recipe, rng: Rng, noise: Noise | None = None) -> Item:
         When no scene can show it at all.
     """
     for turn in range(6 * TRIES):
-        item = _try(recipe, rng, 0.25 ** (turn // TRIES), noise)
-        if item is not None:
-            return item
+        # A motion that runs away can't be shown either.
+        with suppress(FloatingPointError):
+            item = _try(recipe, rng, 0.25 ** (turn // TRIES), noise)
+            if item is not None:
+                return item
     raise ValueError(f"no pendulum can show {recipe}")
 
 
@@ -253,7 +256,8 @@ def _try(recipe: Recipe, rng: Rng, ease: float, noise: Noise | None) -> Item | N
         oracle = Oracle(bench, listed(scene), rng)
         if family == "outside":
             # Sized by what no listed effect takes up.
-            grown = (recipe["delta_chi2"][0] * ease / oracle.left_by_catalogue()[0]) ** 0.5
+            missed = max(oracle.left_by_catalogue()[0], 1e-3)
+            grown = (recipe["delta_chi2"][0] * ease / missed) ** 0.5
             size = causes[0].size * min(grown, laws[0].most / abs(causes[0].size))
             bench = Bench(scene, [causes[0]._replace(size=size)])
             oracle = Oracle(bench, listed(scene), rng)

@@ -44,13 +44,16 @@ class Solved:
     Parameters
     ----------
     effects
-        Of the diagnosis. What was presumed counts where it is there, and elsewhere is no claim.
+        Of the diagnosis. What was presumed counts where it was hidden, and elsewhere is no claim.
+    presumed
+        What was presumed.
     """
 
     name: str
     truth: dict[str, Any]
     content: dict[str, Any]
     effects: tuple[dict[str, Any], ...] = ()
+    presumed: frozenset[str] = frozenset()
     solved: bool = False
 
     @property
@@ -154,14 +157,11 @@ def read_item(name: str, truth: dict[str, Any], content: dict[str, Any] | None) 
     """One item with what was diagnosed of it."""
     if not content or content.get("verdict") in (None, "not-analysable"):
         return Solved(name, truth, {})
-    there = {each for e in truth["effects"] for each in (e["effect"], *e.get("also", []))}
-    there |= set(truth.get("present", ()))
-    effects = [
-        effect
-        for effect in content.get("effects") or []
-        if not effect.get("presumed") or effect["id"] in there
-    ]
-    return Solved(name, truth, content, tuple(effects), solved=True)
+    hidden = {each for e in truth["effects"] for each in (e["effect"], *e.get("also", []))}
+    found = content.get("effects") or []
+    effects = [each for each in found if not each.get("presumed") or each["id"] in hidden]
+    presumed = frozenset(each["id"] for each in found if each.get("presumed"))
+    return Solved(name, truth, content, tuple(effects), presumed, solved=True)
 
 
 # ---------------------------------------------------------------- figures with their intervals
@@ -252,7 +252,7 @@ def questions(items: Sequence[Solved]) -> dict[str, list[bool]]:
     return {
         "without a diagnosis": [not item.solved for item in items],
         "circular error named or in a class, where there is sin x": [
-            any("circular-error" in members for members in item.classes)
+            any("circular-error" in members for members in (item.presumed, *item.classes))
             for item in items
             if "circular-error" in item.truth.get("present", ())
         ],

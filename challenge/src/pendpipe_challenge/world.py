@@ -260,6 +260,8 @@ class Scene:
 
 SHARE: Final = 0.02
 """Of a size, by which its derivative is taken."""
+FAR: Final = 1e15
+"""In standard deviations: no pendulum is there."""
 
 
 class Bench:
@@ -271,6 +273,11 @@ class Bench:
     ----------
     scene, causes
         The truth.
+
+    Raises
+    ------
+    FloatingPointError
+        Where the motion runs away, or there is none.
     """
 
     def __init__(self, scene: Scene, causes: list[Cause]) -> None:
@@ -288,7 +295,10 @@ class Bench:
         moved = [scene.reading(causes, each)[0] - self.there for each in (*changes, self._higher)]
         columns = [np.ones_like(self.there), self.seen.v, *moved]
         tangent = scene.whitened(np.column_stack(columns), self.seen.v)
-        u, sizes, _ = np.linalg.svd(tangent / np.linalg.norm(tangent, axis=0), full_matrices=False)
+        norms = np.linalg.norm(tangent, axis=0)
+        if not ((norms > 0) & (norms < FAR)).all():
+            raise FloatingPointError("the motion runs away, or there is none")
+        u, sizes, _ = np.linalg.svd(tangent / norms, full_matrices=False)
         self.basis = u[:, sizes > 1e-7 * sizes[0]]
         shares = []
         for number, cause in enumerate(causes):
