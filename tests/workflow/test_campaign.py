@@ -314,7 +314,8 @@ def test_a_finished_campaign_has_nothing_to_do_until_its_library_changes(
 ) -> None:
     """A change of the fit reruns the fits and what follows; an untouched copy nothing."""
     library = tmp_path / "src"
-    shutil.copytree(LIBRARY, library, ignore=shutil.ignore_patterns("__pycache__"))
+    ignore = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(LIBRARY / "pendpipe", library / "pendpipe", ignore=ignore)
     campaign.assert_nothing_planned(library)
     with (library / "pendpipe/analysis/fit/by_waveform.py").open("a") as source:
         source.write("# changed\n")
