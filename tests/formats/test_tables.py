@@ -48,6 +48,9 @@ TIMES = {
         doubted="a period of 217",
         time_s=LONG_S,
     ),
+    "numbers that end in their point": Case(
+        "t (ms),theta (rad)\n" + each("{:.0f}.,{:.5f}\n", 1e3 * TIME, ANGLE)
+    ),
     "whole milliseconds without a unit": Case(
         "t,theta (rad)\n" + each("{:.0f},{:.5f}\n", 1e3 * TIME, ANGLE), doubted="milliseconds"
     ),
