@@ -6,9 +6,11 @@ packages are imported by the function that needs them.
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -33,6 +35,9 @@ Source = Recording | str | Path
 """What is analysed: a recording, or the path of its file. A DataFrame serves as well, with a
 column ``time_s`` and one of `_COLUMNS`."""
 _COLUMNS: Final = ("angle_rad", "angle_deg", "volts", "displacement_m")
+_FIGURES_OF_A_FIT: Final = partial(importlib.import_module, "pendpipe.figures.decays")
+_FIGURES_OF_A_DIAGNOSIS: Final = partial(importlib.import_module, "pendpipe.figures.diagnosis")
+"""Who draws a result, imported when it is drawn: the result itself knows no figures."""
 
 
 @documented
@@ -306,7 +311,7 @@ def fit(
         recording = read_turning_points(recording)
     if isinstance(recording, TurningPoints):
         found = fit_turning_points(recording, restoring=restoring, baseline=baseline, fixed=fixed)
-        return replace(found, name=name or "", drawn_by=_figures_of_a_fit)
+        return replace(found, name=name or "", drawn_by=_FIGURES_OF_A_FIT)
     recording = _source(recording, angle_rad)
     place, motion = name or _place(recording), _motion(recording, volts_per_radian)
     own = "" if isinstance(recording, Recording) else Path(recording).name
@@ -319,7 +324,7 @@ def fit(
             fixed=fixed,
             place=place,
         )
-        return replace(found, name=own, drawn_by=_figures_of_a_fit)
+        return replace(found, name=own, drawn_by=_FIGURES_OF_A_FIT)
     refuse_if(
         period is not None, "period", "the recording shows its own", "leave it out (--fix holds it)"
     )
@@ -347,20 +352,8 @@ def fit(
         cuts=(*(cut._asdict() for cut in points.cuts), *result.cuts),
         name=own,
         decay=decay,
-        drawn_by=_figures_of_a_fit,
+        drawn_by=_FIGURES_OF_A_FIT,
     )
-
-
-def _figures_of_a_fit() -> Any:
-    from pendpipe.figures import decays
-
-    return decays
-
-
-def _figures_of_a_diagnosis() -> Any:
-    from pendpipe.figures import diagnosis
-
-    return diagnosis
 
 
 def _given_period(period: float | Estimate | None) -> Estimate | None:
@@ -463,7 +456,7 @@ def diagnose(
             own=own,
             same_sensor=same_sensor,
         )
-        return replace(joint, drawn_by=_figures_of_a_diagnosis)
+        return replace(joint, drawn_by=_FIGURES_OF_A_DIAGNOSIS)
     outcome = diagnose_recording(
         _motion(recording, volts_per_radian),
         baseline=baseline,
@@ -473,7 +466,7 @@ def diagnose(
         seed=seed,
         place=name or _place(recording),
     )
-    return replace(outcome, drawn_by=_figures_of_a_diagnosis)
+    return replace(outcome, drawn_by=_FIGURES_OF_A_DIAGNOSIS)
 
 
 @documented
