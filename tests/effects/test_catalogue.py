@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from pendpipe.commands.small import catalogue_manual as manual
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import OFFSET, OMEGA, START, TIME, A, B, C
+from pendpipe.effects.baseline import OFFSET, OMEGA, START, TIME, A, B, C, pendulum_of
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
-from pendpipe.effects.effect import enters
+from pendpipe.effects.effect import Span, enters
 from pendpipe.effects.model import Model, jacobian, responses
 from pendpipe.errors import InputError
 
@@ -296,3 +296,15 @@ def test_a_declaration_that_is_misspelt_or_short_is_refused(given: Any, said: st
         @enters("reading", identifier="push", **given)
         def push(sampled: object, pendulum: object, size: float) -> float:
             return size
+
+
+@pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.identifier)
+def test_what_is_tried_of_an_effect_is_what_is_believed(effect: Effect) -> None:
+    """Its example, what a simulation takes where nothing is given, and the shapes of a scan."""
+    span = Span(0.0, 100.0, 0.05, pendulum_of(baseline(a=0.1, b=0.02, c=1e-3)), 0.4, 0.1)
+    bounds = effect.bounds(100.0)
+    defaults = [each.default for each in effect.parameters]
+    for values in (effect.example, defaults, *effect.shapes(span)):
+        behind = bounds[len(bounds) - len(values) :]
+        for value, (low, high) in zip(values, behind, strict=True):
+            assert value is None or low <= value <= high
