@@ -14,6 +14,7 @@ a measurement effect of its own; here smoothing acts on the noise alone.
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from statistics import median
@@ -24,7 +25,7 @@ import numpy as np
 from scipy import signal
 
 from benchmarks import journal
-from benchmarks.table import share
+from benchmarks.table import head, share, table_row
 from pendpipe.arrays import FloatArray as Array
 from pendpipe_challenge.world import Scene
 
@@ -283,34 +284,19 @@ def row(title: str, kept: list[dict[str, Any]]) -> str:
     answered = [each for each in kept if "covers" in each]
     wrong = [names for each in answered if (names := false_names(each))]
     stated = sum(any(name in STATED for name, _ in each["effects"]) for each in answered)
-    covers = []
-    for name in RATES:
-        known = [each["covers"][name] for each in answered if each["covers"][name] is not None]
-        covers.append(f"{100 * np.mean(known):.1f}" if known else "-")
-    every = [c for each in answered for c in each["covers"].values() if c is not None]
-    chi2 = [each["chi2_per_dof"] for each in answered]
-    cpu_s = [each["cpu_s"] for each in kept]
-    counts = {name: sum(name in names for names in wrong) for names in wrong for name in names}
-    shown = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
-    cells = [
-        title,
-        f"{len(kept)}",
-        f"{len(kept) - len(answered)}",
-        share(len(wrong), len(answered)),
-        f"{stated}",
-        *covers,
-        share(sum(every), len(every)),
-        f"{median(chi2):.2f}, {max(chi2):.2f}" if chi2 else "-",
-        f"{median(cpu_s):.1f}, {max(cpu_s):.1f}",
-        shown,
-    ]
-    return f"| {' | '.join(cells)} |"
-
-
-HEAD: Final = (
-    "| family | asked | not answered | false names, % | noise stated | a | b | c | f"
-    " | covered, % | chi^2/dof, median and largest | CPU s | which |\n" + "|---" * 13 + "|"
-)
+    covers = {
+        name: [c for each in answered if (c := each["covers"][name]) is not None] for name in RATES
+    }
+    every = [c for known in covers.values() for c in known]
+    chi2, cpu_s = (
+        [each[key] for each in some] for key, some in (("chi2_per_dof", answered), ("cpu_s", kept))
+    )
+    counts = Counter(name for names in wrong for name in set(names))
+    cells = [len(kept), len(kept) - len(answered), share(len(wrong), len(answered)), stated]
+    cells += [f"{100 * np.mean(known):.1f}" if known else "-" for known in covers.values()]
+    cells += [share(sum(every), len(every))]
+    cells += [f"{median(each):.2f}, {max(each):.2f}" if each else "-" for each in (chi2, cpu_s)]
+    return table_row(title, [*cells, ", ".join(f"{name} {n}" for name, n in counts.items())])
 
 
 SOURCES: Final = (
@@ -324,7 +310,9 @@ def main() -> None:
     parser = journal.judge_parser(__doc__, "null_families", 300)
     parser.add_argument("--family", action="append", choices=FAMILIES, help="repeatable")
     arguments = parser.parse_args()
-    print(HEAD, flush=True)
+    titles = ("family", "asked", "not answered", "false names, %", "noise stated", *"abcf")
+    more = ("covered, %", "chi^2/dof, median and largest", "CPU s", "which")
+    print(head(*titles, *more), flush=True)
     pooled = []
     for family in arguments.family or FAMILIES:
         keys = [(family, number) for number in range(arguments.number)]
