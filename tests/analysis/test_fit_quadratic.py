@@ -10,6 +10,7 @@ from hypothesis.extra import numpy as hnp
 from scipy.optimize import lsq_linear, minimize
 
 from pendpipe.analysis.fit.least_squares import (
+    CHI2_95,
     Bounds,
     bounded_least_squares,
     bounded_step,
@@ -129,3 +130,13 @@ def test_at_its_ends_chi2_has_risen_by_3_84_however_the_others_follow(root, scor
 def test_what_is_held_has_no_variance() -> None:
     normal = np.array([[4.0, 1.0], [1.0, 2.0]])
     assert np.array_equal(covariance(normal, [1]), np.array([[0.25, 0.0], [0.0, 0.0]]))
+
+
+def test_an_interval_is_right_where_the_others_are_not_quite_at_their_best() -> None:
+    """What follows is pulled from the beginning on."""
+    normal, gradient = np.array([[1.0, 0.5], [0.5, 1.0]]), np.array([-1.0, 0.4])
+    value, bounds = np.array([0.0, 5.0]), Bounds(np.zeros(2), np.full(2, np.inf))
+    ((_, high),) = intervals95(value, normal, gradient, bounds, [0])
+    moved = np.array([high, 0.0])
+    step = moved + bounded_step(normal, gradient - normal @ moved, bounds.about(value), (0,))
+    assert step @ normal @ step - 2.0 * gradient @ step == pytest.approx(CHI2_95)
