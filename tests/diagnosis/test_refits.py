@@ -12,6 +12,7 @@ from pendpipe.diagnosis.rivals import (
     NEAR,
     NO_SCAN,
     Rival,
+    _names_first,
     of_one_class,
     refit_leads,
     side_by_side,
@@ -88,3 +89,21 @@ def test_an_effect_whose_score_a_bound_halves_is_refitted(
     )
     asked = {rival.identifier for rival in rivals}
     assert ("power-law-damping" in asked) == at_a_bound
+
+
+@pytest.mark.parametrize(
+    ("behind", "first"), [(1.0, "presliding-friction"), (30.0, "frequency-step")]
+)
+def test_in_a_misfit_a_law_that_acts_throughout_comes_before_an_event(
+    behind: float, first: str
+) -> None:
+    """A step takes a part of any misfit; one that explains it far better leads."""
+    fit, _, _ = null_fit()
+    rivals = [
+        Rival(Lead(by_identifier(name), (), 0.0, 0.0), fit, gain, worth, worth)
+        for name, gain, worth in (
+            ("frequency-step", 1000.0, 60.0),
+            ("presliding-friction", 900.0, 60.0 - behind),
+        )
+    ]
+    assert _names_first(rivals)[0].identifier == first

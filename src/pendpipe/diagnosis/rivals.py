@@ -393,7 +393,27 @@ def refit_leads(
     if not fits:
         return []
     scale = Scale.of(min((fit for _, fit in fits), key=lambda fit: fit.chi2), data, noise)
-    return ranked([Rival.of(lead, fit, base.chi2, scale, detection.chance) for lead, fit in fits])
+    rivals = ranked([Rival.of(lead, fit, base.chi2, scale, detection.chance) for lead, fit in fits])
+    return rivals if scale.clean else _names_first(rivals)
+
+
+def _names_first(rivals: list[Rival]) -> list[Rival]:
+    """Rank names that explain most of a misfit before curves, which may follow the rest.
+
+    Where even the best leaves a misfit, names and curves will be needed together, and a curve that
+    was drawn first would hide the names. What is not needed beside the curve is dropped again.
+    Among names that the record can't distinguish the prior decides; then a law that acts throughout
+    comes before an event, which takes a part of any misfit.
+    """
+    half = 0.5 * max(rival.gain for rival in rivals)
+    best = max(rivals, key=lambda rival: -math.inf if rival.drawn else rival.evidence)
+    near = best.evidence - class_width(best)
+
+    def order(rival: Rival) -> tuple[bool, float, bool, float]:
+        prior = rival.prior if rival.evidence > near else -math.inf
+        return rival.drawn or rival.gain < half, -prior, rival.lead.effect.local, -rival.evidence
+
+    return sorted(rivals, key=order)
 
 
 def _worth_refitting(found: Sequence[Lead], phase_lost: bool, most: int, wide: bool) -> list[Lead]:
