@@ -38,7 +38,7 @@ _MARKS: Final = re.compile(
     rb"|<(?:dc:title|desc)>pendpipe\b"  # SVG
     rb"|\A\x89PNG(?s:.){0,200}tEXtSoftware\0pendpipe"
     rb"|/Creator \(pendpipe\)(?s:.)*%%EOF\s*\Z"  # PDF
-    rb"|\0made by pendpipe [^\0]*\0\Z"  # Excel: the comment of its archive
+    rb"|\0made by pendpipe [^\0]*\0\Z"  # WinDaq: behind its last comment
     rb"|\x07made_by\x18.pendpipe (?s:.)*PAR1\Z"
     rb'|\A"record","fluid","branch","pendulum","T0_s",'  # for spreadsheets, which know no remarks
     rb"|\A(?:\xef\xbb\xbf)?file,light,T0_s,T0_sd_s,"

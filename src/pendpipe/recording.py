@@ -458,22 +458,6 @@ def write_plain(path: str | Path, recording: Recording, *, original: bool = Fals
         stream.writelines(plain_lines(recording, original=original))
 
 
-def check_name(path: str | Path) -> None:
-    """Refuse, before anything is recorded, a name that promises another form than the plain one.
-
-    Raises
-    ------
-    InputError
-        On the names of WinDaq, MATLAB and Excel, which are read alone.
-    """
-    refuse_if(
-        Path(path).suffix.lower() in (".wdq", ".wdh", ".wdc", ".whc", ".mat", ".xlsx", ".xls"),
-        path,
-        "this form is read, not written",
-        "name it OUT.csv",
-    )
-
-
 def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
     """Read the plain CSV form.
 

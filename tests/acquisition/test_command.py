@@ -117,7 +117,7 @@ def test_a_csv_that_could_not_be_written_is_made_at_the_next_call(
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("pendpipe.recording.write_plain", full)
+        patch.setattr("pendpipe.formats.writing.write", full)
         assert main([*QUICK.split(), str(out)]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1

@@ -141,13 +141,14 @@ def test_a_figure_replaces_a_figure_of_ours_and_no_other(
     assert main([*words, "--force"]) == 0
 
 
+@pytest.mark.parametrize("name", ["again.csv", "again.wdh"])
 def test_a_converted_recording_is_made_again_and_an_instruments_is_not(
-    given: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    given: dict[str, Path], tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["convert", str(given["recording"]), str(tmp_path / "again.csv")]
+    words = ["convert", str(given["recording"]), str(tmp_path / name)]
     assert [main(words), main(words)] == [0, 0]
     device = ["acquire", "--device", "simulated:di2108", "--clock-scale", "100", "--duration", "8"]
-    recorded = [*device, "--out", str(tmp_path / "recorded.csv")]
+    recorded = [*device, "--out", str(tmp_path / f"recorded-{name}")]
     assert main(recorded) == 0
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     assert main(recorded) == 2

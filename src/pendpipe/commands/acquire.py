@@ -49,7 +49,7 @@ _OWN: Final[Flags] = {
         "metavar": "N",
         "help": "length, instead of --duration",
     },
-    "--out": {"metavar": "FILE", "help": "the recording, plain form"} | OUTPUTS,
+    "--out": {"metavar": "FILE", "help": "the recording; FILE.wdh for WinDaq"} | OUTPUTS,
     "--raw": {
         "metavar": "FILE",
         "help": "a new file for the bytes off the wire (FILE.raw, FILE.<time stamp>.raw)",
@@ -135,7 +135,7 @@ def _record(arguments: Arguments) -> None:
     """Record, or write what an earlier call has recorded and could not write."""
     refuse_if(not arguments.out, "--out", "no file is named", "give --out FILE.csv")
     from pendpipe.acquisition import attempts
-    from pendpipe.recording import check_name, write_plain
+    from pendpipe.formats.writing import check_name, write
 
     out = Path(arguments.out)
     check_name(out)
@@ -175,10 +175,10 @@ def _record(arguments: Arguments) -> None:
             attempts.refuse_lost(attempt, remedy)
     recording = attempts.decode_attempt(raw, out.parent, arguments.channel)
     with attempts.kept_in(raw, out):
-        write_plain(out, recording, original=True)
+        lost = write(out, recording, original=True)
     if not arguments.recover:
         attempts.mark_saved(raw, out)
-    for note in recording.notes:
+    for note in (*recording.notes, *lost):
         print(f"pendpipe: {out}: {note}", file=sys.stderr)
     rate = recording.metadata["sample_rate_hz"]
     tell_written(out, f"{len(recording)} samples at {float(rate):.6g} Hz (raw bytes: {raw})")

@@ -24,7 +24,7 @@ from pendpipe.version import __version__
 
 COMMANDS: Final = {
     "inspect": "what a recording holds: format, channels, rate, gaps, clipping",
-    "convert": "any supported recording to the plain CSV form",
+    "convert": "any supported recording to the plain CSV form or to WinDaq (.wdh)",
     "acquire": "record from a Dataq instrument, real or simulated",
     "calibrate": "volts against angles to V/rad, with a linearity test",
     "simulate": "a recording from a described pendulum and measurement chain",

@@ -110,20 +110,21 @@ def _lines(file: str, found: "Inspection") -> list[str]:
         "out": {
             "metavar": "OUT",
             "type": Path,
-            "help": "OUT.csv, the plain form; - writes it to standard output",
+            "help": "OUT.csv: the plain form (- writes it to standard output); OUT.wdh: WinDaq",
         }
         | OUTPUT
     }
 )
 def convert(arguments: Arguments) -> None:
-    """Write any supported recording in the plain CSV form."""
+    """Write any supported recording in the plain CSV form, or as a WinDaq file (.wdh)."""
     from pendpipe.formats import read
-    from pendpipe.recording import check_name, write_plain
+    from pendpipe.formats.writing import check_name, write
 
     check_name(arguments.out)
     recording = read(arguments.file, read_options(arguments))
     announce(arguments, recording)
-    write_plain(arguments.out, recording)
+    for note in write(arguments.out, recording):
+        print(f"{arguments.out}: {note}", file=sys.stderr)
     tell_written(arguments.out, f"{len(recording)} samples, {recording.quantity}")
 
 

@@ -1,8 +1,10 @@
-"""WinDaq recordings: .WDQ (14 bit), .WDH (HiRes), .WDC and .WHC (circular).
+"""WinDaq recordings: .WDQ (14 bit), .WDH (HiRes), .WDC and .WHC (circular); a .WDH is written too.
 
 Layout after the CODAS data-format description: little-endian throughout, no magic at the
 start; the only mark is 0x8001 in the header's last two bytes. Behind the samples stand events,
-annotations and comments, which also hold pauses, and what a damaged header lost.
+annotations and comments, which also hold pauses, and what a damaged header lost. What WinDaq's
+screen needs (windows, keys, cursors) is written as in the files that WinDaq itself writes for one
+time window; nothing of it concerns the samples.
 Dataq's own texts are here too: spreadsheet exports, and captures of a DI-149 in its ASCII mode.
 """
 
@@ -31,23 +33,33 @@ from pendpipe.formats.text import decode, table_of_text
 SUFFIXES: Final = (".wdq", ".wdh", ".wdc", ".whc")
 _FIELDS: Final = {
     "channels": (0, "<u2"),
+    "one": (2, "<u2"),
     "table": (4, "u1"),
     "entry": (5, "u1"),
+    "size": (6, "<i2"),
     "data_bytes": (8, "<u4"),
     "event_bytes": (12, "<u4"),
     "annotation_bytes": (16, "<u2"),
+    "screen": (18, "(3,)<i2"),
+    "windows": (24, "(4,)u1"),
     "interval_s": (28, "<f8"),
     "opened": (36, "<i4"),
+    "closed": (40, "<i4"),
     "compression": (44, "<i4"),
     "next_write": (56, "<u4"),
     "shown": (64, "(4,)u1"),
+    "order": (68, "(32,)u1"),
     "flags": (100, "<u2"),
 }
 _ENTRY_FIELDS: Final = {
+    "scale": (0, "<f4"),
+    "offset": (4, "<f4"),
     "slope": (8, "<f8"),
     "intercept": (16, "<f8"),
     "unit": (24, "S6"),
     "divisor": (31, "u1"),
+    "number": (32, "u1"),
+    "gain": (33, "u1"),
 }
 _MARK: Final = b"\x01\x80"
 _HEADER_BYTES, _TABLE, _ENTRY = 1156, 110, 36
@@ -56,6 +68,8 @@ _HIRES, _PACKED = 1 << 1, 1 << 14
 _ANOTHER_COPY: Final = "give another copy"
 _LARGEST_SCALE: Final = 1e30
 """No unit makes a count worth more than this: a greater scale is a damaged one."""
+MOST_SAMPLES: Final = 1 << 29
+"""Pointers count samples in 31 bits, the data size bytes in 32."""
 
 
 def _layout(fields: dict[str, tuple[int, str]], size: int) -> np.dtype[Any]:
@@ -75,12 +89,16 @@ class Channel:
     Parameters
     ----------
     number
-        Its place.
+        The channel as printed on the box, where it is written; its place, where it was read.
     slope, intercept
         value = slope * count + intercept for counts of 14 bits; the slope of a HiRes file is four
         times the step, as if the two low bits were not there.
     unit
-        Of the value.
+        At most five letters of Latin-1 reach a file.
+    range_volts
+        Full scale of the input, for WinDaq's page of gains; ``None`` where it is no voltage.
+    annotation
+        A text that WinDaq shows beside the trace.
     divisor
         The channel stands in the scans that this divides.
     """
@@ -89,7 +107,9 @@ class Channel:
     slope: float
     intercept: float
     unit: str
-    divisor: int
+    range_volts: float | None = None
+    annotation: str = ""
+    divisor: int = 1
 
 
 @dataclass(frozen=True)
@@ -211,7 +231,7 @@ def _channel(place: Path, number: int, told: Any) -> Channel:
         f"the scale of channel {number} is damaged ({slope:g})",
         _ANOTHER_COPY,
     )
-    return Channel(number, slope, intercept, unit, max(int(told["divisor"]), 1))
+    return Channel(number, slope, intercept, unit, divisor=max(int(told["divisor"]), 1))
 
 
 def has_mark(head: bytes) -> bool:
@@ -232,9 +252,15 @@ def _size(data: bytes) -> tuple[int, list[str]]:
 _COMMENT: Final = 1 << 31
 _PAUSE: Final = 2.0
 """Stamps are whole seconds: less than this is no pause."""
+_GAP: Final = re.compile(r"gap (\d{1,9}\.\d{1,9}) s\b")
 _LONGEST_TEXT: Final = 1024
 _LONGEST_TAIL: Final = 4096
 """Bytes behind the samples of a recording with a damaged header; more is not sought."""
+
+
+def gap_comment(missing_s: float) -> str:
+    """Say the length of a gap so that `scan_times` understands it: ``gap 0.350000 s``."""
+    return f"gap {missing_s:.9f} s"
 
 
 def parse_trailers(
@@ -321,7 +347,7 @@ def scan_times(
     WinDaq strings the samples together over a pause; only the stamp of the event that
     follows tells of it. A stamp that is ahead of the samples by more than two seconds (and
     more than 1 % of the time since the last event, which a rate may be off) is a pause,
-    known to a second.
+    known to a second. A comment of `gap_comment` gives it exactly, where the stamp agrees.
     """
     steps, notes = np.zeros(scans), []
     lag, since = 0.0, 0.0
@@ -330,7 +356,11 @@ def scan_times(
             continue
         expected = event.scan * header.interval_s + lag
         missing = event.stamp_s - expected
-        if missing > max(_PAUSE, 0.01 * (expected - since)):
+        match = _GAP.match(event.comment)
+        if match and abs(missing - float(match[1])) <= _PAUSE:
+            missing = float(match[1])
+            notes.append(f"gap of {missing:.6g} s before scan {event.scan}, by its comment")
+        elif missing > max(_PAUSE, 0.01 * (expected - since)):
             notes.append(f"pause of {missing:.0f} s before scan {event.scan}, by its time stamp")
         else:
             missing = 0.0
@@ -452,6 +482,87 @@ def _column(
         resolution=abs(slope) * ladder,
         limits=(limits[0], limits[1]),
     )
+
+
+_FULL_SCALE_MILLIVOLTS: Final = (5000, 10_000, 2500, 2048, 1280, 500_000, 1_000_000)
+_GAINS: Final = (1, 2, 5, 10, 50, 100, 500, 1000, 4, 8, 20, 200, 10_000, 100_000, 40, 80)
+
+
+def pack(
+    counts: IntArray,
+    channels: Sequence[Channel],
+    interval_s: float,
+    *,
+    opened: int = 0,
+    closed: int = 0,
+    events: Sequence[Event] = (),
+) -> bytes:
+    """Put a HiRes file (.WDH) together.
+
+    Parameters
+    ----------
+    counts
+        Signed 16-bit counts, shape (scans, channels).
+    channels
+        One for each column of `counts`.
+    interval_s
+        Seconds between scans.
+    opened, closed
+        Seconds since 1970 (UTC); 0 where they are not known.
+    events
+        In the order of their scans; without one at scan 0, which is always there.
+
+    Returns
+    -------
+    bytes
+        Header (1156 bytes), interleaved little-endian words, list of events, annotations,
+        comments.
+    """
+    scans, width = counts.shape
+    texts = b"".join(_encoded(channel.annotation) for channel in channels)
+    # Pointers count samples, not scans: so in the vendor's HiRes sample of two channels. (The
+    # vendor's own control counts scans. For one channel both are the same.)
+    words = [0, 0] if not events or events[0].scan else []
+    comments = b""
+    for event in events:
+        words += [event.scan * width, event.stamp_s or 0]
+        if event.comment:  # its place counts from the annotations' first byte
+            words.append(_COMMENT | len(texts) + len(comments))
+            comments += _encoded(event.comment)
+    listed = np.array(words, "<u4").tobytes()
+    header = bytearray(_HEADER_BYTES)
+    header[-2:] = _MARK
+    sizes = 2 * scans * width, len(listed), len(texts)
+    # Screen in lines and points, cursor in the middle; one time window, a window a channel; not
+    # compressed. Event markers, grid and annotations shown; no window chosen.
+    screen, windows, shown = (400, 640, 0), (1, 1, min(width, 16), 0), (0xD7, 0x07, 0xFF, 0x30)
+    moments = interval_s, opened, closed
+    np.frombuffer(header, _HEADER, 1)[0] = (
+        *(width, 1, _TABLE, _ENTRY, _HEADER_BYTES, *sizes, screen, windows, *moments),
+        *(1, 0, shown, range(32), _HIRES),
+    )
+    entries = np.frombuffer(header, _layout(_ENTRY_FIELDS, _ENTRY), width, _TABLE)
+    for place, channel in enumerate(channels):
+        unit, gain = channel.unit.encode("latin-1", "replace")[:5], _gain(channel.range_volts)
+        scale = 1.0, 0.0, channel.slope, channel.intercept
+        entries[place] = (*scale, unit, 1, channel.number, gain)
+    return bytes(header) + counts.astype("<i2").tobytes() + listed + texts + comments
+
+
+def _gain(range_volts: float | None) -> int:
+    """Say the input's full scale as a code of its millivolts (high nibble) and a gain (low)."""
+    codes = (
+        code << 4 | gain_code
+        for code, full_scale in enumerate(_FULL_SCALE_MILLIVOLTS)
+        for gain_code, gain in enumerate(_GAINS)
+        if range_volts is not None and np.isclose(full_scale / gain, 1000.0 * range_volts)
+    )
+    return next(codes, 1 << 4)
+
+
+def _encoded(text: str) -> bytes:
+    """Encode a text as WinDaq has it: Latin-1, ended by a NUL."""
+    return text.replace("\0", " ").encode("latin-1", "replace") + b"\0"
 
 
 _CLOCKS: Final = ("time stamp", "timestamp", "clock")
