@@ -26,7 +26,7 @@ from pendpipe.diagnosis.refine import Fit, best_fit, fitted_from, refine
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
 from pendpipe.diagnosis.rivals import NO_SCAN, Rival, Scale
 from pendpipe.diagnosis.summary import BASELINES
-from pendpipe.diagnosis.weighing import Weighed, weigh
+from pendpipe.diagnosis.weighing import Weighed, weigh, with_likelier
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.baseline import C
 
@@ -55,7 +55,8 @@ def baseline_fitted(beginning: Beginning, task: Task) -> Hypothesis:
 def run_search(state: Hypothesis, task: Task) -> tuple[Hypothesis, tuple[Weighed, ...]]:
     """Go to a neighbour of a smaller score, until there is none that was not seen.
 
-    Cheap neighbours come first, and the first kind that has a better one is taken.
+    Cheap neighbours come first, and the first kind that has a better one is taken. Last, where all
+    are weighed, the most probable name of a class leads it.
     """
     seen = set()
     while True:
@@ -70,7 +71,12 @@ def run_search(state: Hypothesis, task: Task) -> tuple[Hypothesis, tuple[Weighed
                 break
         else:
             state = _judged(examine(state, task))
-            return state, tuple(weigh(state, step) for step in state.steps)
+            weighed = tuple(weigh(state, step) for step in state.steps)
+            other = with_likelier(state, weighed, seen)
+            if other is None:
+                return state, weighed
+            task.progress(f"{' and '.join(step.winner.name for step in other.steps)} is likelier")
+            state = other
 
 
 def _starts(state: Hypothesis, task: Task) -> Iterator[Neighbour]:

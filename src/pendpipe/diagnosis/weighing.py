@@ -1,7 +1,7 @@
-"""Final probabilities of each effect and its rivals."""
+"""Final probabilities of each effect and its rivals; the most probable leads."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Final, NamedTuple
@@ -42,6 +42,8 @@ _LISTED_FROM: Final = 0.05
 """Probability from which an unnamed curve is listed among the rivals."""
 _SEEN_IN_RESIDUAL: Final = (*RANDOM, "coloured-noise")
 """Faults detected in a residual: the misfit of a curve can look like any of them."""
+_LIKELIER: Final = 1.5
+"""Ratio of probabilities from which another name leads a class."""
 _SAME_GAIN: Final = 0.02
 """Relative change of a gain below which the rivals are not refitted."""
 
@@ -298,3 +300,49 @@ def _is_of(fit: Fit, without: Fit, effect: Effect, found: Hypothesis) -> bool:
         now = refine(fit.model, found.data, found.noise, fit.value, rounds=0)
         return abs(now.chi2 - fit.chi2) < SETTLED
     return False
+
+
+def with_likelier(
+    found: Hypothesis, weighed: Sequence[Weighed], seen: Container[object]
+) -> Hypothesis | None:
+    """Let the most probable name of a class lead it, if that hypothesis is new.
+
+    The prior, later effects, or the final noise may have changed the odds since one was added.
+    Names beside a curve stay: their probabilities show how little they explain.
+    """
+    present = {effect.key for effect in found.fit.model.effects}
+    for number in reversed(range(0 if found.without_curve else len(found.steps))):
+        each = weighed[number]
+        names = [
+            (float(weight), mate)
+            for mate, weight in zip(each.mates, each.weights[1:], strict=False)
+            if not mate.drawn and mate.lead.effect.key not in present
+        ]
+        weight, mate = max(names, key=lambda one: one[0], default=(0.0, None))
+        if mate is not None and weight > _LIKELIER * each.weights[0]:
+            after = _exchanged(found, number, mate, each)
+            if after is not None and after.key not in seen:
+                return after
+    return None
+
+
+def _exchanged(found: Hypothesis, number: int, mate: Rival, weighed: Weighed) -> Hypothesis | None:
+    """Replace a step's winner by a rival; None where the model has no such motion."""
+    step, effect, held = found.steps[number], mate.lead.effect, set(found.held)
+    own = step.winner.lead.effect
+    # A held part of b has no index: the model itself holds it.
+    if isinstance(own, ReleasedParameter) and own.index is not None:
+        held.add(own.index)
+    if isinstance(effect, ReleasedParameter):
+        held = set(effect.without(held))
+    fit = refitted(weighed.without, found, sorted(held), mate, math.inf)
+    if fit is None:
+        return None
+    rest = [rival for rival in step.rivals if rival.lead.effect.key != effect.key]
+    steps = list(found.steps)
+    steps[number] = replace(step, rivals=(mate, *rest), before=weighed.without)
+    if number + 1 < len(steps):
+        # The next step is tested without its own effect: start from this model.
+        steps[number + 1] = replace(steps[number + 1], before=mate.fit)
+    fit = with_errors(fit, found.data, found.noise)
+    return replace(found, fit=fit, steps=tuple(steps), held=tuple(sorted(held)))
