@@ -345,3 +345,16 @@ def test_of_noise_below_the_rounding_nothing_is_said() -> None:
     assert not [line for line in found.warnings if "noise" in line]
     assert found.improved.residual_rms_rad < step_rad / 12.0**0.5
     assert "less than the rounding adds (3.14 mrad)" in found.details
+
+
+def test_a_fault_that_leaves_the_law_as_it_was_predicts_as_that_does() -> None:
+    """Two equal models differ in their predictions by rounding alone, and nothing is said of it."""
+    random, time_s = np.random.default_rng(3), np.arange(4000) / 40.0
+    read_s = time_s + 2e-3 * random.standard_normal(4000)
+    angle_rad = 0.2 * np.exp(-read_s / 60.0) * np.cos(5.0 * read_s)
+    outcome = diagnose_recording(
+        Recording(time_s=time_s, angle_rad=angle_rad + 2e-5 * random.standard_normal(4000))
+    )
+    assert [effect.identifier for effect in outcome.effects] == ["jitter"]
+    assert outcome.held_out is None
+    assert "left out of the fit" not in str(outcome)

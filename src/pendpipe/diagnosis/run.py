@@ -217,7 +217,8 @@ def diagnose_decay(
         of_all = fit.method == "waveform" and not fit.cuts and fit.zero_drift is None
         # What it leaves of other readings, or beside a zero that drifts, compares with nothing.
         before = printed if of_all else replace(before, parameters=printed.parameters)
-    same = found.fit.value is found.baseline.value and found.fit.error_scale == 1.0
+    alike = found.fit.value is found.baseline.value
+    same = alike and found.fit.error_scale == 1.0
     law = law_of(found, weighed)
     after = before if same else _fitted_model(found.fit, found, law)
     drag_form = fit.drag_form if fit and stands else "energy"
@@ -225,10 +226,11 @@ def diagnose_decay(
     swung = found.baseline.model.restoring
     noise_rms = after.noise_rms_rad
     missing = any(effect.identifier != COLOURED_NOISE for effect in effects)
-    if missing:
+    held = None
+    if missing and not alike:
         progress("predicting cycles that are left out of the fit")
-    models = found.baseline, found.fit, found.data, found.noise
-    held = held_out(*models, beginning.held, found.held) if missing else None
+        models = found.baseline, found.fit, found.data, found.noise
+        held = held_out(*models, beginning.held, found.held)
     swings = _small_swings(law, found)
     return Diagnosis(
         baseline,
