@@ -1,4 +1,4 @@
-"""Forty recordings made to hurt: steps, spans, rates, rests and files at their extremes.
+"""Recordings made to hurt: steps, spans, rates, rests and files at their extremes.
 
 Each is a decay of Q pi f/b with white noise unless its name tells more. `benchmarks.hostile`
 diagnoses them within 20 s of the processor and 1 GB.
@@ -78,6 +78,8 @@ def recordings() -> Iterator[tuple[str, Writer]]:
         (600_000, 60, 10_000.0),
         (1_000_000, 1000, 1000.0),
         (1_000_000, 200, 5000.0),
+        (1_000_000, 30, 50_000.0),
+        (1_000_000, 6, 150_000.0),
     ):
         yield (
             f"{count:,} readings, {per_cycle} a cycle",
