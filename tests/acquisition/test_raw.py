@@ -1,5 +1,8 @@
 """The raw file: repeatable, and good up to where it breaks off."""
 
+import json
+import struct
+import zlib
 from io import BytesIO
 from pathlib import Path
 from random import Random
@@ -105,6 +108,21 @@ def test_a_changed_description_is_noticed() -> None:
     changed = whole.replace(b'"rate_hz": 100.0', b'"rate_hz": 300.0')
     with pytest.raises(InputError, match="the description of the recording is damaged"):
         read_raw(changed)
+
+
+def test_files_of_version_1_are_still_read() -> None:
+    """Frames without marks, a description without a check sum: up to the first damage."""
+    content = json.dumps({"format": "pendpipe-raw", "version": 1, **HEADER}).encode() + b"\n"
+    for number in range(3):
+        body = bytes([8 * number, 0x81]) * 20
+        check = zlib.crc32(body, zlib.crc32(struct.pack("<cId", b"D", len(body), 0.2 * number)))
+        content += struct.pack("<cIdI", b"D", len(body), 0.2 * number, check) + body
+    recording = decode_recording(content)
+    assert len(recording) == 60
+    assert recording.values[[0, 20, 40]].tolist() == [0.0, 20 / 4096, 40 / 4096]
+    damaged = bytearray(content)
+    damaged[-50] ^= 1
+    assert len(decode_recording(bytes(damaged))) == 40
 
 
 @pytest.mark.parametrize("kind", ["di154", "di2108"])

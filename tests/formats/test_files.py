@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 import openpyxl
 import pytest
-from scipy.io import savemat
+from scipy.io import savemat, wavfile
 
 from pendpipe.errors import InputError
 from pendpipe.formats import containers, inspect, read, table, trees
@@ -180,6 +180,31 @@ def test_what_unpacks_to_more_than_any_recording_is_refused(
         monkeypatch.setattr(module, "most_unpacked", lambda _: 9_000)
         with pytest.raises(InputError, match=said):
             read(file)
+
+
+def test_the_strength_of_a_tone_may_swing(tmp_path: Path) -> None:
+    """A sound card passes no constant: the sensor's voltage is the strength of a tone."""
+    time_s = np.arange(20 * 8000) / 8000
+    strength = 0.5 + np.interp(time_s, TIME, 0.5 * ANGLE)
+    tone = np.rint(32767 * strength * np.sin(2 * np.pi * 1000 * time_s)).astype(np.int16)
+    content = stream(lambda held: wavfile.write(held, 8000, tone))
+    recording = read_as(tmp_path, content, "b.wav")
+    expected = np.interp(recording.time_s + 0.0025, time_s, strength) / np.sqrt(2)
+    np.testing.assert_allclose(recording.values, expected, atol=2e-3)
+    assert any("a tone whose strength swings" in note for note in recording.notes)
+
+
+def test_repeated_cells_are_counted_before_they_are_there(tmp_path: Path) -> None:
+    """2.3 million cells, each of which says that it stands for 64."""
+    cell = "<table:table-cell office:value='1234567.5' table:number-columns-repeated='64'/>"
+    path = tmp_path / "a.ods"
+    path.write_bytes(opendocument(f"<table:table-row>{1000 * cell}</table:table-row>" * 2300))
+    tracemalloc.start()
+    with pytest.raises(InputError, match="it has more than 600000 cells"):
+        read(path)
+    peak_bytes = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak_bytes < 100e6
 
 
 @pytest.mark.parametrize("form", ["npz", "h5"])

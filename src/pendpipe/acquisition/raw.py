@@ -1,6 +1,6 @@
 """The bytes off the wire, kept as they came, with the time at which they came.
 
-A file is one line of JSON that describes it, then frames::
+A file (version 2) is one line of JSON that describes it, then frames::
 
     mark (4 bytes)  kind (1 byte)  length (u32)  stream (u16)  at_byte (u64)  time_s (f64)
     CRC-32 (u32)  content
@@ -13,7 +13,8 @@ by its mark, and what is missing between them is known to the byte. The event th
 recording is written twice.
 
 A file is only appended to; where it ends in the midst of a frame (power lost, process killed,
-disk full), what stands before is good.
+disk full), what stands before is good. In version 1 frames have neither mark, stream nor
+at_byte and the description no check sum; it is read up to the first damage.
 """
 
 import json
@@ -36,9 +37,12 @@ _BEGINNING: Final = b'{"format": "pendpipe-raw"'
 _LONGEST_HEADER: Final = 1 << 16
 _LONGEST_FRAME: Final = 1 << 22
 """What claims to be longer is damaged; no device sends as much in a second."""
+_LARGEST_HOLE: Final = 1 << 40
+"""No recording misses more bytes than that: a frame that claims so is not believed."""
 _MARK: Final = b"\xf5\x0aPp"
 _HEAD: Final = struct.Struct("<4scIHQd")
-"""What stands before the check sum of a frame."""
+_HEAD_1: Final = struct.Struct("<0scId")
+"""What stands before the check sum of a frame, in version 2 and in version 1."""
 _CHECK: Final = struct.Struct("<I")
 _SYNC_S: Final = 1.0
 COMPLETE: Final = ("scans", "time", "noise")
@@ -68,6 +72,12 @@ class Frame(NamedTuple):
         return head + _CHECK.pack(check) + self.content
 
 
+def description_line(header: Mapping[str, Any]) -> bytes:
+    """The description as the first line of a file, without its line feed."""
+    text = json.dumps({"format": _FORMAT, "version": 2, **header}, ensure_ascii=True)[:-1]
+    return f'{text}, "crc32": "{zlib.crc32(text.encode()):08x}"}}'.encode()
+
+
 class RawWriter:
     """Append a recording's bytes to an open binary file.
 
@@ -93,8 +103,7 @@ class RawWriter:
         self._most_bytes = min(max(1, int(bytes_per_s)), _LONGEST_FRAME)
         self._on_disk = hasattr(stream, "fileno") and not hasattr(stream, "getbuffer")
         self._starts = self._bytes = 0
-        text = json.dumps({"format": _FORMAT, "version": 2, **header}, ensure_ascii=True)[:-1]
-        line = f'{text}, "crc32": "{zlib.crc32(text.encode()):08x}"}}'.encode()
+        line = description_line(header)
         self._write(line + b"\n" + Frame(b"H", 0.0, line).packed())
         self.sync()
 
@@ -260,9 +269,9 @@ def read_raw(source: str | Path | bytes) -> RawRecording:
     holes: list[Hole] = []
     arrival: tuple[int, float] | None = None
     total = missing = starts = sound = 0
-    for size, frame in _frames(content, begin):
+    for size, frame in _frames(content, begin, _HEAD if header["version"] > 1 else _HEAD_1):
         hole = frame.at_byte - total - missing
-        if hole > len(content):  # it can't miss more than its damaged frames held
+        if hole > _LARGEST_HOLE:
             continue
         sound += size
         if frame.kind == b"D" and frame.stream > starts:
@@ -369,10 +378,10 @@ def _header(place: str, content: bytes) -> tuple[Mapping[str, Any], int]:
         )
         raise InputError(place, problem, "give another copy")
     refuse_if(
-        header.get("version") != 2,
+        header.get("version") not in (1, 2),
         place,
-        "it was made by another version",
-        "decode it with that pendpipe",
+        "it was made by a newer version",
+        "install a newer pendpipe",
     )
     return header, end + 1
 
@@ -382,8 +391,10 @@ def _description(line: bytes) -> dict[str, Any] | None:
     header = _json(line)
     if header is None or header.get("format") != _FORMAT:
         return None
+    check = header.pop("crc32", None)
     text, _, _ = line.rpartition(b', "crc32": "')
-    return header if header.pop("crc32", None) == f"{zlib.crc32(text):08x}" else None
+    unchecked = check is None and header.get("version") == 1
+    return header if unchecked or check == f"{zlib.crc32(text):08x}" else None
 
 
 def _json(body: bytes) -> dict[str, Any] | None:
@@ -395,18 +406,21 @@ def _json(body: bytes) -> dict[str, Any] | None:
     return content if isinstance(content, dict) else None
 
 
-def _frames(content: bytes, begin: int) -> Iterator[tuple[int, Frame]]:
-    """Find the sound frames and how many bytes they take, whatever stands between them."""
-    while 0 <= begin <= len(content) - _HEAD.size - _CHECK.size:
-        mark, kind, length, *place, time_s = _HEAD.unpack_from(content, begin)
-        start = begin + _HEAD.size + _CHECK.size
+def _frames(content: bytes, begin: int, form: struct.Struct = _HEAD) -> Iterator[tuple[int, Frame]]:
+    """Find the sound frames and how many bytes they take, whatever stands between them.
+
+    Those of version 1 have no mark by which the next one could be found behind a damaged one.
+    """
+    while 0 <= begin <= len(content) - form.size - _CHECK.size:
+        mark, kind, length, *place, time_s = form.unpack_from(content, begin)
+        start = begin + form.size + _CHECK.size
         body = content[start : start + min(length, _LONGEST_FRAME)]
-        known = zlib.crc32(content[begin + len(mark) : begin + _HEAD.size])
+        known = zlib.crc32(content[begin + len(mark) : begin + form.size])
         check = _CHECK.pack(zlib.crc32(body, known))
-        if len(body) == length and content.startswith(check, begin + _HEAD.size):
+        if len(body) == length and content.startswith(check, begin + form.size):
             # A damaged mark does no harm, but is noticed.
             unmarked = 0 if mark == _MARK else len(mark)
             yield start + length - begin - unmarked, Frame(kind, time_s, body, *place)
             begin = start + length
         else:
-            begin = content.find(_MARK, begin + 1)
+            begin = content.find(_MARK, begin + 1) if mark else -1

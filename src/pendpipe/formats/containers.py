@@ -112,27 +112,34 @@ def _sheets_of_excel(data: bytes) -> _Sheets:
 
 
 def _sheets_of_opendocument(archive: zipfile.ZipFile) -> _Sheets:
-    """Read all sheets of an OpenDocument table."""
-    content, most = archive.read("content.xml"), f"it has more than {_MOST_CELLS} cells"
-    # A cell takes four signs of the XML: it and its text begin and end.
-    damaged_if(content.count(b"<") > 4 * _MOST_CELLS, most)
+    """Read all sheets of an OpenDocument table, whose cells say how often they repeat.
+
+    Cells are counted while they are read: half a megabyte may stand for gigabytes of them.
+    """
     sheets: _Sheets = {}
-    for table in ET.fromstring(content).iterfind(".//{*}table"):
-        rows = (row.iterfind("{*}table-cell") for row in table.iterfind(".//{*}table-row"))
-        texts = ("\t".join(map(_repeated, cells)).rstrip("\t").split("\t") for cells in rows)
-        sheets[f"{len(sheets) + 1}"] = sheet = list(texts)
-        damaged_if(sum(map(len, sheet)) > _MOST_CELLS, most)
+    rows: list[list[Any]] = []
+    row: list[str] = []
+    cells = 0
+    for nodes, (at, node) in enumerate(ET.iterparse(archive.open("content.xml"), ("start", "end"))):
+        damaged_if(cells + nodes // 4 > _MOST_CELLS, f"it has more than {_MOST_CELLS} cells")
+        if at == "start":
+            continue
+        kind = node.tag.rpartition("}")[2]
+        if kind == "table-cell":
+            told = {name.rpartition("}")[2]: value for name, value in node.attrib.items()}
+            values = (told.get(name) for name in ("value", "date-value", "time-value"))
+            value = next(filter(None, values), " ".join("".join(node.itertext()).split()))
+            value = re.sub(r"^PT(\d+)H(\d+)M([\d.]+)S$", r"\1:\2:\3", value)
+            many = min(int(told.get("number-columns-repeated", 1)), _MOST_REPEATED)
+            row += [value] * many
+            cells += many if value else 1
+        elif kind == "table-row":
+            rows.append("\t".join(row).rstrip("\t").split("\t"))
+            row = []
+            node.clear()
+        elif kind == "table":
+            sheets[f"{len(sheets) + 1}"], rows = rows, []
     return sheets
-
-
-def _repeated(cell: ET.Element) -> str:
-    """Give a cell of OpenDocument as often as it says, parted by tabs."""
-    told = {name.rpartition("}")[2]: value for name, value in cell.attrib.items()}
-    values = (told.get(name) for name in ("value", "date-value", "time-value"))
-    value = next(filter(None, values), " ".join("".join(cell.itertext()).split()))
-    value = re.sub(r"^PT(\d+)H(\d+)M([\d.]+)S$", r"\1:\2:\3", value)
-    many = min(int(told.get("number-columns-repeated", 1)), _MOST_REPEATED)
-    return "\t".join([value] * many)
 
 
 def _of_sheets(place: Path, sheets: _Sheets, options: ReadOptions) -> Table:

@@ -23,6 +23,7 @@ from pendpipe.formats.table import (
     Table,
     damaged_if,
     refuse_unpacked,
+    swing_of,
 )
 from pendpipe.formats.text import table_of_text
 from pendpipe.formats.words import role_of, split_header
@@ -32,6 +33,9 @@ MOST: Final = 1 << 27
 _LARGEST_JSON: Final = 64 << 20
 _MOST_CELLS: Final = 1_500_000
 """Of records with texts: half a gigabyte."""
+_AUDIO_HZ: Final = 4000.0
+"""Rate from which on a file of sound may hold a tone that the swing modulates."""
+_STRETCH_S: Final = 5e-3
 
 
 def table_of_tree(
@@ -280,13 +284,24 @@ def read_tdms(place: Path, data: bytes, options: ReadOptions) -> Table:
 
 
 def read_sound(place: Path, data: bytes, _options: ReadOptions) -> Table:
-    """Read the channels of a .wav, full scale as 1."""
+    """Read the channels of a .wav, full scale as 1; a tone that a swing modulates by its strength.
+
+    A sound card passes no constant, so that some put the sensor's voltage on a tone.
+    """
     from scipy.io import wavfile
 
     rate: float
     rate, samples = wavfile.read(io.BytesIO(data))
     scale = {"i": float(np.iinfo(samples.dtype).max) + 1.0, "u": 128.0}.get(samples.dtype.kind, 1.0)
     values = samples.reshape(len(samples), -1).astype(np.float64) / scale
+    notes: tuple[str, ...] = ()
+    stretch = round(_STRETCH_S * rate)
+    if rate >= _AUDIO_HZ and len(values) > 100 * stretch:
+        blocks = values[: len(values) // stretch * stretch].reshape(-1, stretch, values.shape[1])
+        strength = blocks.std(axis=1)
+        if strength.mean() > blocks.mean(axis=1).std() and swing_of(strength[:, 0]).clear:
+            values, rate = strength, rate / stretch
+            notes = (f"a tone whose strength swings: that, every {_STRETCH_S:g} s, is the reading",)
     return Table(
         place,
         "sound",
@@ -295,4 +310,5 @@ def read_sound(place: Path, data: bytes, _options: ReadOptions) -> Table:
             for number, column in enumerate(np.ascontiguousarray(values.T), start=1)
         ),
         interval_s=1.0 / rate,
+        notes=notes,
     )

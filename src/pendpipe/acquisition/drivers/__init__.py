@@ -2,6 +2,7 @@
 
 import importlib
 import pkgutil
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -92,12 +93,13 @@ def without_port(devices: Path = Path("/sys/bus/usb/devices")) -> list[str]:
         Where the kernel lists USB devices; each is a folder with ``idVendor`` and
         ``idProduct``, its interfaces are folders in it, and a serial port is a ``tty`` there.
     """
-    products = [
-        (device / "idProduct").read_text(encoding="ascii").strip().lower()
-        for device in sorted(devices.glob("*"))
-        if not any(device.glob("*/tty*"))
-        if (given := device / "idVendor").is_file() and int(given.read_text(), 16) == VENDOR
-    ]
+    products: list[str] = []
+    for device in sorted(devices.glob("*")):
+        # A device may be unplugged meanwhile, and hubs and interfaces have no numbers.
+        with suppress(OSError, ValueError):
+            vendor = int((device / "idVendor").read_text(encoding="ascii"), 16)
+            if vendor == VENDOR and not any(device.glob("*/tty*")):
+                products.append((device / "idProduct").read_text(encoding="ascii").strip().lower())
     return [
         f"Dataq {name} (0683:{product}) without a serial port: {remedy}"
         for product in products
