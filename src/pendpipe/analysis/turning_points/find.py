@@ -18,6 +18,7 @@ from pendpipe.analysis.coarse import Between, between
 from pendpipe.analysis.half_cycles import half_cycles, usual_half_period
 from pendpipe.analysis.noise import quantisation_rms, undithered_rms
 from pendpipe.analysis.turning_points.harmonics import far_points, odd_harmonics, own_square
+from pendpipe.analysis.turning_points.long_records import follow
 from pendpipe.analysis.turning_points.measure import (
     HARMONICS,
     Measured,
@@ -335,11 +336,16 @@ def find_turning_points(recording: Recording, place: str | Path = "recording") -
     return turning_points_of(prepare(recording, place), place)
 
 
-def turning_points_of(samples: Samples, place: str | Path = "recording") -> TurningPoints:
-    """As `find_turning_points`, of readings that are prepared already."""
+def turning_points_of(
+    samples: Samples, place: str | Path = "recording", *, long: int = 1 << 22
+) -> TurningPoints:
+    """As `find_turning_points`, of readings that are prepared already; of `long` ones in a pass."""
+    points = None
     if (fine := between(samples.time_s, samples.values)) is not None:
         return _of_few(samples, fine, place)
-    return far_points(samples, _measured(samples, place))
+    if len(samples) > long:
+        points = follow(samples, lambda head: _measured(head, place), long // 128)
+    return far_points(samples, _measured(samples, place) if points is None else points)
 
 
 def _of_few(samples: Samples, fine: Between, place: str | Path) -> TurningPoints:
