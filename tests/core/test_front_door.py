@@ -7,6 +7,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib as mpl
@@ -39,6 +40,8 @@ def test_the_lines_of_the_readme_answer(capsys: pytest.CaptureFixture[str], tmp_
     assert (frame.low95 <= frame.value).all()
     assert (frame.value <= frame.high95).all()
     assert fit.plot().axes[0].get_xlabel() == "Time (s)"
+    with pytest.raises(pp.errors.InputError, match=r"plot: .*take that of pendpipe\.fit"):
+        replace(fit, drawn_by=None).plot()
     fit.save(tmp_path / "fit")
     pp.diagnose(names["recording"]).save(tmp_path / "fit")
     made = {path.name for path in (tmp_path / "fit").iterdir()}

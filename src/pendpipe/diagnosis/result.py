@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
-from pendpipe.analysis.fit.result import FitResult
+from pendpipe.analysis.fit.result import FitResult, drawer_of
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.summary import BASELINES, Summary, html_of, summarise
 from pendpipe.dynamics.eq8 import Restoring
@@ -436,8 +436,7 @@ class Diagnosis:
         -------
         matplotlib.figure.Figure
         """
-        assert self.drawn_by is not None
-        figure: Figure = self.drawn_by().plot(self)
+        figure: Figure = drawer_of(self.drawn_by).plot(self)
         return figure
 
 

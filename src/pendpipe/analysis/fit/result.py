@@ -78,6 +78,14 @@ def fast_beside(a: float, b: float, c: float, amplitude: float) -> float:
     return 1e4 * max(a * amplitude + b + c / amplitude, 1e-300)
 
 
+def drawer_of(drawn_by: Callable[[], Any] | None) -> Any:
+    """Return the module that draws a result: that of the front door (`pendpipe.api`)."""
+    if drawn_by is None:
+        remedy = "take that of pendpipe.fit or pendpipe.diagnose, or a function of pendpipe.figures"
+        raise InputError("plot", "this result has nothing that draws it", remedy)
+    return drawn_by()
+
+
 @dataclass(frozen=True, repr=False)
 class FitResult:
     """What one recording says of a, b, c and the rest.
@@ -301,8 +309,7 @@ class FitResult:
             It shows itself in a notebook; ``.show()`` opens a window, ``.savefig(path)`` writes.
         """
         points, decay = self._readings("plot")
-        assert self.drawn_by is not None
-        drawer = self.drawn_by()
+        drawer = drawer_of(self.drawn_by)
         figure: Figure = drawer.plot(drawer.Decay("", points, self), decay, ax)
         return figure
 
