@@ -17,7 +17,7 @@ _FEWEST_READINGS: Final = 5
 _NEIGHBOURS: Final = 9
 """Cycles over which the median number of readings is taken: an encoder that records its counts
 gives fewer at small amplitudes."""
-_HAIR: Final = 1e-12
+_RIDGE: Final = 1e-12
 
 
 def harmonic_columns(phase: FloatArray, harmonics: int) -> FloatArray:
@@ -76,7 +76,7 @@ def by_cycle(
     gram, right = normal_equations(columns, residual.reshape(len(phase), -1), starts)
     idle = np.arange(len(columns)) >= lengths[:, None] // 2
     unit = np.eye(len(columns))
-    gram = np.where(idle[:, None] | idle[:, :, None], unit, gram + _HAIR * gram[:, :1, :1] * unit)
+    gram = np.where(idle[:, None] | idle[:, :, None], unit, gram + _RIDGE * gram[:, :1, :1] * unit)
     right[idle] = 0.0
     root = np.linalg.cholesky(gram)
     found = np.linalg.solve(root, right)

@@ -483,7 +483,7 @@ _LEAST: Final = 1e-60
 _SUBSETS: Final = np.array(list(product((1.0, 0.0), repeat=3)))
 """Of a, b, c that are not at their bound."""
 _SLACK: Final = 1e-12
-_HAIR: Final = 1e-13
+_RIDGE: Final = 1e-13
 """For what the readings do not tell apart."""
 _ZOOMS: Final = 12
 _MOST: Final = 12
@@ -843,16 +843,16 @@ class _Losses:
         gradient, normal = gradient * scale, normal * scale
         rest = [j for j in range(OMEGA, DRIFT + 1) if j not in held]
         size = 1.0 / np.sqrt(np.maximum(normal[rest, rest], _LEAST))
-        within = normal[np.ix_(rest, rest)] * size[:, None] * size + _HAIR * np.eye(len(rest))
+        within = normal[np.ix_(rest, rest)] * size[:, None] * size + _RIDGE * np.eye(len(rest))
         own = np.linalg.inv(within) * size[:, None] * size
         following, settling = -own @ normal[rest, :4], own @ gradient[rest]
         # Of what is known at all: what the rest leaves of it may be rounding.
-        hair = np.diag(_HAIR * normal.diagonal()[:4] + _LEAST)
+        ridge = np.diag(_RIDGE * normal.diagonal()[:4] + _LEAST)
         return cls(
             fitted,
             value,
             np.array([float(j not in held) for j in (A, B, C)]),
-            hair + normal[:4, :4] + normal[:4, rest] @ following,
+            ridge + normal[:4, :4] + normal[:4, rest] @ following,
             gradient[:4] - normal[:4, rest] @ settling,
             rest,
             following,

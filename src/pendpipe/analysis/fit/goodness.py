@@ -28,7 +28,7 @@ _BLOCKS: Final = 128
 _SLOW: Final = 8
 """Polynomials that follow a slow change along the record."""
 
-_HAIR: Final = 1e-9
+_RIDGE: Final = 1e-9
 _GAPPED: Final = 60.0
 """Variances of a block's coefficients, added up, over that of its mean: 13 where it is whole."""
 
@@ -186,7 +186,7 @@ def _demodulated(
     waves, starts = harmonic_columns(phase, harmonics), np.searchsorted(phase, edges[:-1])
     gram, right = normal_equations(waves * root, sums / root, starts)
     # Blocks with a gap tell not all of them.
-    inverse = gram + _HAIR * gram[:, :1, :1] * np.eye(len(waves))
+    inverse = gram + _RIDGE * gram[:, :1, :1] * np.eye(len(waves))
     invert(inverse)
     whole = np.einsum("kpp->k", inverse) * gram[:, 0, 0] < _GAPPED
     inverse, right = inverse[whole], right[whole]
