@@ -4,6 +4,7 @@
 """
 
 import importlib.util
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +13,9 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+# Snakemake's plugin for Slurm asks the cluster as it is imported, and waits ten seconds for one
+# that is down; with no configuration it asks none.
+os.environ["SLURM_CONF"] = os.devnull
 settings.register_profile("untimed", deadline=None)
 settings.register_profile("same", settings.get_profile("untimed"), derandomize=True)
 settings.load_profile("same")

@@ -47,8 +47,9 @@ pytestmark = [
 
 
 @pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[None]:
+def cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A Slurm on this machine, ended afterwards."""
+    monkeypatch.delenv("SLURM_CONF")
     script = str(ROOT / "tests/slurm/cluster.sh")
     subprocess.run([script, "up", str(tmp_path / "slurm")], check=True)
     try:
