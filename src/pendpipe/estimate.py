@@ -77,6 +77,19 @@ class Estimate:
 
         return with_error(self.value, self.sd, self.unit)
 
+    def or_limit(self, *, short: bool = True) -> str:
+        """Print it, or its upper limit where it is no larger than its error and may be zero.
+
+        >>> Estimate(0.0, 0.001, "1/s", (0.0, 0.002), at_bound=True).or_limit()
+        '< 0.002 s⁻¹'
+        """
+        from pendpipe.quantities import with_error
+
+        low, high = self.bounds95
+        if self.at_bound or (low <= 0.0 and self.value < self.sd):
+            return f"< {with_error(float(f'{high:.2g}'), None, self.unit)}"
+        return with_error(self.value, self.sd, self.unit, short=short)
+
 
 def chi_square_p_value(chi2: float, degrees_of_freedom: int) -> float:
     """Probability of a larger chi^2; NaN without degrees of freedom.

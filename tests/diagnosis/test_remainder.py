@@ -9,8 +9,10 @@ import pytest
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import Remainder, remainder_of, with_errors
+from pendpipe.diagnosis.values import constants_of
 from pendpipe.effects.baseline import OMEGA, TIME, A, B, C
 from pendpipe.effects.model import Model
+from pendpipe.estimate import Z95
 
 from .records import INTERVAL_S, NOISE_RAD, TIME_S, TRUTH, null_fit, other_engine, prepared, white
 
@@ -94,3 +96,13 @@ def test_errors_are_those_that_a_random_misfit_of_one_part_makes(
     wider = dict(zip(fit.free, np.median(widened, axis=0) / noise_alone, strict=True))
     assert all(wider[index] > 10.0 for index in moved)
     assert all(wider[index] < 5.0 for index in still)
+
+
+@pytest.mark.parametrize("harmonic_rad", [2e-4, 4e-4])
+def test_intervals_far_from_a_bound_are_those_of_the_errors(harmonic_rad: float) -> None:
+    """Derivatives by the frequency are 1e8 times those by the share: no direction is lost."""
+    extra = harmonic_rad * np.cos(3.0 * 2.0 * np.pi * 0.9 * TIME_S)
+    data, noise = prepared(other_engine(TRUTH) + white(4) + extra)
+    fit = with_errors(refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH), data, noise)
+    for estimate in constants_of(fit, "rad").values():
+        assert np.ptp(estimate.bounds95) == pytest.approx(2.0 * Z95 * estimate.sd, rel=0.01)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from pendpipe.analysis.fit.printed import short_size
@@ -208,8 +208,8 @@ class Summary:
         return [
             (
                 _title(each),
-                _short(each.fitted, each.fitted.unit),
-                _short(each.with_missing, each.fitted.unit),
+                each.fitted.or_limit(),
+                replace(each.with_missing, unit=each.fitted.unit).or_limit(),
             )
             for each in self.consequence
         ]
@@ -251,15 +251,6 @@ def _title(change: Change) -> str:
     if change.amplitude_rad is None:
         return {"period": "T0"}.get(change.quantity, change.quantity)
     return f"Q at {short_size(change.amplitude_rad, change.unit)}"
-
-
-def _short(estimate: Estimate, unit: str) -> str:
-    if estimate.value == 0.0 or (estimate.at_bound and estimate.bounds95[1] > 0.0):
-        return f"< {with_error(float(f'{estimate.bounds95[1]:.2g}'), None, unit)}"
-    if not abs(estimate.value) > estimate.sd:
-        high = max(map(abs, estimate.bounds95))
-        return f"< {with_error(float(f'{high:.2g}'), None, unit)}"
-    return with_error(estimate.value, estimate.sd, unit, short=True)
 
 
 def summarise(diagnosis: Diagnosis) -> Summary:
@@ -417,7 +408,7 @@ def _matters(diagnosis: Diagnosis, changes: Sequence[Change], unit: str) -> str:
     moved = [each for each in changes if each.quantity != "Q" and each.moved_sd > _MOVED]
     words = [
         f"{_title(each)} {_like(each.fitted, each.with_missing)} →"
-        f" {_short(each.with_missing, each.fitted.unit)}"
+        f" {replace(each.with_missing, unit=each.fitted.unit).or_limit()}"
         for each in moved
     ]
     what = ", ".join(words) if words else "it moves no number by two standard deviations"

@@ -113,8 +113,11 @@ def _intervals(fit: Fit) -> dict[int, tuple[float, float]]:
     if fit.scatter is not None:
         # A misfit beyond the noise widens the intervals as it widens the standard deviations.
         free, narrow = np.ix_(fit.free, fit.free), normal.copy()
-        inverse = np.linalg.pinv(fit.scatter[free], hermitian=True)
-        normal[free] = narrow[free] @ inverse @ narrow[free]
+        # Units differ by many powers of ten: a unit length of each value keeps the small ones.
+        length = np.sqrt(np.maximum(fit.scatter.diagonal(), 1e-300))
+        unit = np.outer(length, length)
+        inverse = np.linalg.pinv((fit.scatter / unit)[free], hermitian=True)
+        normal[free] = narrow[free] @ (inverse / unit[free]) @ narrow[free]
         # The distance to which a value is pulled beyond its bound stays as it was.
         gradient = (
             gradient * normal.diagonal() / np.where(narrow.diagonal() > 0.0, narrow.diagonal(), 1.0)

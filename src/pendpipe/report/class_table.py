@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from pendpipe.analysis.fit.printed import SHORT, rate_with_error, short_size
+from pendpipe.analysis.fit.printed import SHORT, short_size
 from pendpipe.errors import refuse_if
 from pendpipe.estimate import Estimate, chi_square_p_value
 from pendpipe.files import MADE_BY, is_stream, write_json, write_whole
@@ -194,7 +194,7 @@ def _row(fitted: Fitted, *, wide: bool) -> tuple[str, ...]:
     unit, found = fit["amplitude"].unit, fit.quality_factors
     large = found[0] if found else None
     loss = large.dominant if large else None
-    rates = tuple("" if fit.light == "red" else rate_with_error(fit[n]) for n in WIDE if wide)
+    rates = tuple("" if fit.light == "red" else fit[n].or_limit() for n in WIDE if wide)
     remark = "" if fit.light == "green" else fit.light_reason
     if not remark and fit.refuted:
         remark = "more than noise is left: diagnose"

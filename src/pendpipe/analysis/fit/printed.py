@@ -205,7 +205,7 @@ def energy(result: FitResult) -> str:
 
 
 def _law(result: FitResult) -> str:
-    text = ", ".join(f"{name} {rate_with_error(result[name])}" for name in "abc")
+    text = ", ".join(f"{name} {result[name].or_limit()}" for name in "abc")
     limit = result.quality_factor_limit
     if limit is not None and limit.value > 3.0 * limit.sd:
         text += f"; πf/b {_number(limit)}"
@@ -337,14 +337,6 @@ def _line(title: str, value: str) -> str:
 
 def _number(estimate: Estimate) -> str:
     return with_error(estimate.value, estimate.sd, short=True)
-
-
-def rate_with_error(rate: Estimate, *, short: bool = True) -> str:
-    """Print a rate with its error, or its upper limit where it lies at zero."""
-    low, high = rate.bounds95
-    if rate.at_bound or (low <= 0.0 and rate.value < rate.sd):
-        return f"< {with_error(float(f'{high:.2g}'), None, rate.unit)}"
-    return with_error(rate.value, rate.sd, rate.unit, short=short)
 
 
 def cause(quality: Quality) -> str:
