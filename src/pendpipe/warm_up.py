@@ -17,11 +17,11 @@ from pendpipe.dynamics.kernel import SHIPPED, Kernel, shipped
 def kernels() -> list[Kernel]:
     """Return the kernels that Python calls."""
     from pendpipe.analysis import half_cycles
-    from pendpipe.analysis.fit import by_waveform
+    from pendpipe.analysis.fit import rounding
     from pendpipe.analysis.turning_points import find, long_records, measure
     from pendpipe.dynamics import march
 
-    modules = (march, half_cycles, find, measure, long_records, by_waveform)
+    modules = (march, half_cycles, find, measure, long_records, rounding)
     own = [each for module in modules for each in vars(module).values() if isinstance(each, Kernel)]
     called = {id(part) for each in own for part in each.parts()[1:]}
     return [each for each in own if id(each) not in called]

@@ -13,9 +13,10 @@ from scipy.special import ellipe, ellipk
 from pendpipe import cli
 from pendpipe.analysis.fit import fit_recording
 from pendpipe.analysis.fit.by_points import fit_energies
-from pendpipe.analysis.fit.by_waveform import start_values
+from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.least_squares import covariance
 from pendpipe.analysis.fit.printed import gravity_line
+from pendpipe.analysis.fit.start import start_values
 from pendpipe.analysis.torque import elliptic, restoring_of, sine_coefficient
 from pendpipe.analysis.turning_points import TurningPoints, find_turning_points
 from pendpipe.arrays import FloatArray
@@ -78,7 +79,7 @@ def test_a_start_is_near_each_law_before_any_motion_is_fitted(
 ) -> None:
     points = points_of(Eq8(OMEGA, 0.02, 0.005, 0.005, 0.01, torque), release, 50)
     assert restoring_of(points) == torque
-    start = start_values(points, {}, {}, "eq8", torque)
+    start = start_values(points, Held({}, "eq8", 1.0), torque)
     a, b, c, _, omega, angle, time, _ = start.value[:8].tolist()
     assert omega == pytest.approx(OMEGA, rel=2e-3)
     loss = 0.01 * release**2 + 0.01 * release + 0.01
@@ -133,7 +134,7 @@ def test_half_periods_that_alternate_change_no_coefficient() -> None:
     uneven = replace(points, time_s=points.time_s + 0.1 / OMEGA * points.side)
     one, other = sine_coefficient(points), sine_coefficient(uneven)
     assert other.value == pytest.approx(one.value, abs=0.01)
-    omega = start_values(uneven, {}, {}, "eq8", "sine").value[4]
+    omega = start_values(uneven, Held({}, "eq8", 1.0), "sine").value[4]
     assert omega == pytest.approx(OMEGA, rel=2e-3)
 
 
@@ -142,7 +143,9 @@ def test_gaps_leave_the_start_where_it_was() -> None:
     index = np.arange(80)
     left = points.chosen((index < 10) | (index > 25))
     assert restoring_of(left) == "sine"
-    assert start_values(left, {}, {}, "eq8", "sine").value[4] == pytest.approx(OMEGA, rel=5e-3)
+    assert start_values(left, Held({}, "eq8", 1.0), "sine").value[4] == pytest.approx(
+        OMEGA, rel=5e-3
+    )
 
 
 @pytest.mark.parametrize("release", [1.5, 2.5, 2.9])

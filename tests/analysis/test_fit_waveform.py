@@ -9,9 +9,11 @@ import pytest
 
 from pendpipe import cli
 from pendpipe.analysis.fit import FitResult, fit_recording
-from pendpipe.analysis.fit.by_points import parse_fixed
-from pendpipe.analysis.fit.by_waveform import BOUNDS, Waveform, rounded, start_values
+from pendpipe.analysis.fit.fixed import Held, parse_fixed
 from pendpipe.analysis.fit.least_squares import minimise
+from pendpipe.analysis.fit.rounding import rounded
+from pendpipe.analysis.fit.start import start_values
+from pendpipe.analysis.fit.waveform import BOUNDS, Waveform
 from pendpipe.analysis.turning_points.find import turning_points_of
 from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
@@ -289,7 +291,7 @@ def test_a_step_taken_on_trust_ends_at_the_optimum() -> None:
         values = noisy(sample(FIG_8, START, fine), 10.0 ** (-4.5 + 0.01 * seed), seed)
         points = turning_points_of(prepare(Recording(fine, values, "angle_rad"), "record"))
         problem = Waveform(fine, values, points.noise_rms_rad, {})
-        first = np.append(start_values(points, {}, {}, "eq8").value, 0.0)
+        first = start_values(points, Held({}, "eq8", 1.0)).value
         soon = minimise(
             problem.evaluate,
             first,

@@ -15,7 +15,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any, Final
 
-from pendpipe.analysis.fit.by_points import parse_fixed
+from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import Arguments, print_answer, print_json, read_motion, tell
 from pendpipe.diagnosis.result import FILE_NAME, Diagnosis, not_analysable

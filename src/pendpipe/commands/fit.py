@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Final
 
 from pendpipe import api
-from pendpipe.analysis.fit.by_points import parse_fixed
+from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.analysis.fit.printed import gravity_line, lines
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.turning_points import is_turning_points, read_turning_points

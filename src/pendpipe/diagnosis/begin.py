@@ -7,9 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import as_angles, held_values
-from pendpipe.analysis.fit.by_waveform import held_places, start_values, usable_span
+from pendpipe.analysis.fit.by_points import as_angles
+from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.result import Baseline, FitResult
+from pendpipe.analysis.fit.start import start_values, usable_span
 from pendpipe.analysis.torque import restoring_of
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
@@ -85,13 +86,13 @@ def begin(
     light is red, for then they have lost the motion. `stated` is whether it is known that the
     readings are angles.
     """
-    held_rates, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
+    held = Held(fixed, baseline, points.apparent_frequency_hz)
     angles, _ = as_angles(points, None, position=False)
     beats = not fixed and any(note.startswith(BEAT) for note in points.notes)
     torque: Restoring = fit.restoring if fit else restoring_of(angles, stated=stated)
     if beats:
         torque = "linear"
-    start = start_values(angles, held_rates, fixed, baseline, torque, samples=samples)
+    start = start_values(angles, held, torque, samples=samples)
     value, drag = start.value[: len(BASELINE)].copy(), None
     starts: tuple[Start, ...] = ()
     span = usable_span(samples, angles, start)
@@ -120,7 +121,7 @@ def begin(
         third=abs(angle) ** 3 / 192.0 if torque == "sine" else 0.0,
     )
     data = replace(data, row=span.indices(len(samples.time_s))[0])
-    value = with_parts(value, parts)
+    value = with_parts(value, held.parts)
     data = _far_from_the_stop(data, value)
     is_angle = samples.unit in ("rad", "rad/s")
     model = Model(
@@ -129,7 +130,7 @@ def begin(
         order=order_for(abs(angle), "rad" if is_angle else samples.unit),
         fold=data.fold,
         first_s=float(data.time_s[0]),
-        parts=parts,
+        parts=held.parts,
         scale=1.0 if is_angle else abs(angle),
         restoring=torque,
         drag=drag or "energy",
@@ -140,10 +141,10 @@ def begin(
         raise NoMotionError("it would swing far beyond the readings")
     if not starts:
         data = replace(data, anchor=anchored(data, at))
-    held = held_places(held_rates, fixed, parts, baseline)
     # Held parts of b are handled by the model.
-    held = tuple(place for place in held if not parts or place not in (B, SHARE))
-    return Beginning(data, model, value, held, starts)
+    of_model = (B, SHARE) if held.parts else ()
+    places = tuple(place for place in held.places if place not in of_model)
+    return Beginning(data, model, value, places, starts)
 
 
 def _far_from_the_stop(data: Data, value: FloatArray) -> Data:

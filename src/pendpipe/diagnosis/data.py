@@ -151,7 +151,7 @@ def rounding_bias(angle: FloatArray, step: float, noise_rms: float) -> FloatArra
 def with_lattice(data: Data, reading: FloatArray) -> Data:
     """Estimate the noise before rounding, if the readings show the mean rounding error.
 
-    This is not the maximum-likelihood noise of the codes (`fit.by_waveform.best_noise`): the
+    This is not the maximum-likelihood noise of the codes (`fit.rounding.best_noise`): the
     model may still be wrong by part of a step, which smooths the rounding error as noise does.
     Here the sawtooth that remains in the residual decides.
 

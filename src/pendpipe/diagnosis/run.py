@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import GRAVITY, check_fixed
+from pendpipe.analysis.fit.by_points import GRAVITY
+from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.result import Baseline, FitResult
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples, prepare

@@ -8,13 +8,14 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import as_angles, check_fixed, fit_points
+from pendpipe.analysis.fit.by_points import as_angles, fit_points
 from pendpipe.analysis.fit.by_waveform import (
     ODDS,
     Forms,
     fitted_waveform,
     waveform_result,
 )
+from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.goodness import LEVEL
 from pendpipe.analysis.fit.quality import period_of_frequency
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, read_fit
@@ -70,7 +71,7 @@ def fit_recording(
     baseline
         ``"eq8"``, or ``"viscous"`` for Eq. 3.
     fixed
-        Parameters that are held, by name (see `by_points.NAMES`).
+        Parameters that are held, by name (see `fixed.NAMES`).
     points
         Turning points found before; they are found here when they are not given.
     length_m

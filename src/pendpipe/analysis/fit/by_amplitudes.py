@@ -16,10 +16,9 @@ import numpy as np
 from pendpipe.analysis.fit.by_points import (
     GRAVITY,
     fit_envelope,
-    held_values,
     numbers_of,
-    share_of,
 )
+from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness
 from pendpipe.analysis.fit.period import Period
 from pendpipe.analysis.fit.result import PARAMETERS, fast_beside, result_of
@@ -100,16 +99,16 @@ def fit_amplitudes(
     if "frequency" in fixed and period is None:
         period = Estimate(1.0 / fixed["frequency"], 0.0, "s")
     turning = math.tau / period.value if period else math.nan
-    held, parts = held_values(fixed, baseline, 0.5 * turning / math.pi)
-    free = 4 - len([name for name in held if name != "offset"])
+    held = Held(fixed, baseline, 0.5 * turning / math.pi)
+    free = 4 - len([name for name in held.envelope if name != "offset"])
     freedom = max(len(time) - free, 1)
     least = max(step / math.sqrt(12.0), _FINEST * first)
-    rough = fit_envelope(points_of(max(least, 0.01 * first)), held)
+    rough = fit_envelope(points_of(max(least, 0.01 * first)), held.envelope)
     scatter = math.sqrt(float(rough.residual @ rough.residual) / freedom)
     points = points_of(max(scatter, least) * _students(freedom))
-    envelope = fit_envelope(points, held)
+    envelope = fit_envelope(points, held.envelope)
     a, b, c = (float(rate) for rate in envelope.value[:3])
-    share = share_of(parts, b, baseline)
+    share = held.share(b)
     hysteretic = (0.5 if share is None else share) * b
     spread = turning * period.sd / period.value if period else math.nan
     times = Period(turning, float(time[0]), np.diag([spread**2, 0.0]), math.nan, np.empty(0))

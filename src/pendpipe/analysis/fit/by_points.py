@@ -5,12 +5,13 @@ amplitude: they also tell which torque the half swings favour, and where fits of
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import LEVEL, Goodness, tail
 from pendpipe.analysis.fit.least_squares import (
     Bounds,
@@ -29,7 +30,6 @@ from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8
 from pendpipe.dynamics.eq8 import Restoring
-from pendpipe.errors import InputError, refuse_if
 from pendpipe.physics.decay import amplitude, amplitude_and_gradient
 
 ENVELOPE: Final = ("a", "b", "c", "amplitude", "level")
@@ -188,58 +188,27 @@ def _with_held(
 
 
 _LATE: Final = 3.0
-HELD: Final = ("a", "b", "c", "amplitude", "offset")
-
-
-def held_values(
-    fixed: Mapping[str, float], baseline: Baseline, frequency: float
-) -> tuple[dict[str, float], dict[str, float]]:
-    """What of a, b, c and the amplitude is held, and the held parts of b."""
-    held = {name: fixed[name] for name in HELD if name in fixed}
-    if baseline == "viscous":
-        held |= {"a": 0.0, "c": 0.0}
-    parts = loss_rates_of(fixed, frequency)
-    if parts and baseline == "viscous":
-        parts["hysteretic"] = 0.0
-    if len(parts) == 2:
-        held["b"] = parts["hysteretic"] + parts["viscous"]
-    return held, parts
-
-
-def share_of(parts: Mapping[str, float], b: float, baseline: Baseline) -> float | None:
-    """The hysteretic share of b where the user, or the baseline, tells it."""
-    if baseline == "viscous":
-        return 0.0
-    if not parts or b <= 0.0:
-        return None
-    if "hysteretic" in parts:
-        return min(parts["hysteretic"] / b, 1.0)
-    return max(1.0 - parts["viscous"] / b, 0.0)
 
 
 def envelope_and_period(
-    points: TurningPoints,
-    held: Mapping[str, float],
-    parts: Mapping[str, float],
-    fixed: Mapping[str, float],
-    baseline: Baseline,
-    restoring: Restoring,
-    *,
-    start: bool = False,
+    points: TurningPoints, held: Held, restoring: Restoring, *, start: bool = False
 ) -> tuple[EnvelopeFit, Period, float | None]:
     """Fit the amplitudes of turning points, and then their times; as a start without errors."""
     if restoring == "linear" and not start:
-        envelope = fit_envelope(points, held)
+        envelope = fit_envelope(points, held.envelope)
     else:
-        middle = share_of(parts, held.get("b", 0.0), baseline)
+        middle = held.share(held.envelope.get("b", 0.0))
         middle = 0.5 if middle is None else middle
-        envelope = fit_energies(points, held, restoring=restoring, share=middle)
+        envelope = fit_energies(points, held.envelope, restoring=restoring, share=middle)
     rates = envelope.value[:3].tolist()
-    share = share_of(parts, rates[1], baseline)
-    omega = 2.0 * math.pi * fixed["frequency"] if "frequency" in fixed else None
-    taken = 0.5 if start and share is None else share
+    share = held.share(rates[1])
     period = fit_period(
-        points, envelope.amplitude, rates, share=taken, held=omega, restoring=restoring
+        points,
+        envelope.amplitude,
+        rates,
+        share=0.5 if start and share is None else share,
+        held=held.angular_frequency,
+        restoring=restoring,
     )
     return envelope, period, share
 
@@ -274,8 +243,8 @@ def fit_points(
     """
     fixed = fixed or {}
     points = points if restoring == "linear" else clear(points)
-    held, parts = held_values(fixed, baseline, points.apparent_frequency_hz)
-    envelope, period, share = envelope_and_period(points, held, parts, fixed, baseline, restoring)
+    held = Held(fixed, baseline, points.apparent_frequency_hz)
+    envelope, period, share = envelope_and_period(points, held, restoring)
     a, b, c = (float(rate) for rate in envelope.value[:3])
     freedom = max(len(points) - 4.0, 1.0)
     p_value = tail(envelope.chi2_per_dof, freedom, 1e9)
@@ -399,88 +368,3 @@ def as_angles(
         step_rad=points.step_rad / omega,
         unit="rad",
     ), None
-
-
-NAMES: Final = (
-    "a",
-    "b",
-    "c",
-    "frequency",
-    "amplitude",
-    "offset",
-    "quality_factor_hysteretic",
-    "quality_factor_viscous",
-)
-_NOT_VISCOUS: Final = ("a", "c", "quality_factor_hysteretic")
-"""What Eq. 3 lacks: its only loss is viscous."""
-_POSITIVE: Final = ("frequency", "amplitude", "quality_factor_hysteretic", "quality_factor_viscous")
-
-
-def parse_fixed(words: Iterable[str], baseline: Baseline = "eq8") -> dict[str, float]:
-    """Read ``NAME=VALUE`` words.
-
-    Raises
-    ------
-    InputError
-        On a number that is none, a name that comes twice, and what `check_fixed` refuses.
-    """
-    fixed: dict[str, float] = {}
-    for word in words:
-        name, equals, text = word.partition("=")
-        if not equals:
-            raise _nameless(word)
-        refuse_if(name in fixed, f"--fix {word}", f"{name} is held twice", "give it once")
-        try:
-            fixed[name] = float(text)
-        except ValueError:
-            raise InputError(f"--fix {word}", f"'{text}' is no number", "give a number") from None
-    check_fixed(fixed, baseline)
-    return fixed
-
-
-def check_fixed(fixed: Mapping[str, float], baseline: Baseline) -> None:
-    """Refuse what can't be held.
-
-    Raises
-    ------
-    InputError
-        On a name that is no parameter's, a value that none can have, two that contradict each
-        other, or a parameter that the baseline lacks.
-    """
-    for name, value in fixed.items():
-        word = f"{name}={value:g}"
-        if name not in NAMES:
-            raise _nameless(word)
-        least = 0.0 if name != "offset" else -math.inf
-        refuse_if(
-            not math.isfinite(value) or value < least or (name in _POSITIVE and value == 0.0),
-            f"--fix {word}",
-            f"{name} can't be {value:g}",
-            "give a possible value",
-        )
-        refuse_if(
-            baseline == "viscous" and name in _NOT_VISCOUS,
-            f"--fix {word}",
-            f"the viscous baseline (Eq. 3) has no {name}",
-            "leave it out, or use --baseline eq8",
-        )
-    quality_factors = [name for name in fixed if name.startswith("quality_factor")]
-    if "b" in fixed and quality_factors:
-        raise InputError(
-            "--fix", f"b and {quality_factors[0]} are both held", "hold one of the two"
-        )
-
-
-def _nameless(word: str) -> InputError:
-    return InputError(
-        f"--fix {word}", "this names no parameter", f"use NAME=VALUE, NAME of {', '.join(NAMES)}"
-    )
-
-
-def loss_rates_of(fixed: Mapping[str, float], frequency: float) -> dict[str, float]:
-    """The held parts of b in 1/s, by name: ``pi f/Q``."""
-    return {
-        part: math.pi * frequency / fixed[f"quality_factor_{part}"]
-        for part in ("hysteretic", "viscous")
-        if f"quality_factor_{part}" in fixed
-    }

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_waveform import best_noise
+from pendpipe.analysis.fit.rounding import best_noise
 from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray

@@ -1,0 +1,118 @@
+"""Where the fit of the readings begins, and which of them it takes: by the turning points."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.fit.by_points import envelope_and_period
+from pendpipe.analysis.fit.fixed import Held
+from pendpipe.analysis.fit.period import Period
+from pendpipe.analysis.torque import TOP, clear, period_excess, swing_phase
+from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.analysis.turning_points.measure import Samples
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.eq8 import Restoring
+from pendpipe.physics.decay import amplitude, time_at
+
+_SLIP: Final = 0.7
+"""Phase in rad by which the law's turning points may part from the measured ones."""
+_SLIPPED: Final = (
+    "the period changes with the amplitude or the time as Eq. 8's does not:"
+    " {:.2g} rad of phase along the record"
+)
+_HIGH: Final = 2.0
+"""Amplitude in rad beyond which no turning point before the first is looked for with sin x."""
+_STOP: Final = 6.0
+"""In widths delta = pi c/(2 omega) of the Coulomb stop: amplitudes below are left out."""
+
+
+class Start(NamedTuple):
+    """Where the search begins."""
+
+    value: FloatArray
+    before: int
+    """Half cycles from the release to the first turning point kept."""
+    warnings: tuple[str, ...]
+
+
+def start_values(
+    points: TurningPoints,
+    held: Held,
+    restoring: Restoring = "linear",
+    *,
+    samples: Samples | None = None,
+) -> Start:
+    """Turn a fit of the turning points into the waveform's nine parameters.
+
+    The release is a turning point before the first reading (a virtual one, if need be),
+    unless the amplitude is held: then it is the first turning point itself. So it is with sin x
+    where the one before would be so large that there may be none below pi.
+    """
+    points = points if restoring == "linear" else clear(points)
+    envelope, period, share = envelope_and_period(points, held, restoring, start=True)
+    a, b, c, y0, level = (float(number) for number in envelope.value)
+    # Times uncertain by more than 0.2 rad show no slip.
+    late = period.late_rad[period.angular_frequency * points.time_sd_s < 0.2]
+    slipped = held.angular_frequency is None and np.max(np.abs(late), initial=0.0) > _SLIP
+    share = 0.5 if share is None else share
+    at_first, losses = "amplitude" in held.fixed, (a, b, c, share)
+    angle, time, before = _release(points, y0, losses, period, restoring, at_first=at_first)
+    if restoring == "sine":
+        angle = math.copysign(min(abs(angle), TOP), angle)
+    # The level is that of the readings, its error that of angles.
+    angles = samples is None or samples.unit == points.unit
+    offset = held.fixed.get("offset", float(np.mean(points.level_rad)) - (level if angles else 0.0))
+    value = np.array([*losses, period.angular_frequency, angle, time, offset, 0.0])
+    return Start(value, before, (_SLIPPED.format(np.ptp(late)),) if slipped else ())
+
+
+def _release(
+    points: TurningPoints,
+    y0: float,
+    losses: tuple[float, float, float, float],
+    period: Period,
+    restoring: Restoring,
+    *,
+    at_first: bool,
+) -> tuple[float, float, int]:
+    """Angle and time of the release, and half cycles from it to the first turning point."""
+    a, b, c, _ = losses
+    omega, first_s = period.angular_frequency, period.time_s
+    side = float(points.side[0])
+    if at_first:
+        return side * y0, first_s, 0
+    half_period = math.pi / omega
+    before = max(1, math.ceil((first_s - points.start_s) / half_period + 0.05))
+    earlier, back = y0, 0.0
+    for step in range(before):
+        last = earlier
+        earlier = float(amplitude(-(step + 1.0) * half_period, y0, a, b, c))
+        if not earlier < 1.5 * last:
+            earlier = last * math.exp(min((a * last + b + c / last) * half_period, 0.4))
+        if restoring == "sine" and earlier > _HIGH:
+            return side * y0, first_s, 0
+        lasts = float(swing_phase(np.array([earlier, last]), restoring)[0]) / omega
+        back += lasts * (1.0 + float(period_excess(0.5 * (last + earlier), omega, *losses)))
+    return side * (-1.0) ** before * earlier, first_s - back, before
+
+
+def usable_span(samples: Samples, points: TurningPoints, start: Start) -> slice:
+    """The readings that are compared: while the motion is seen, and not about the stop.
+
+    Where Coulomb friction has stopped the pendulum is a discontinuous function of the
+    parameters; so the last half cycles before the stop are left out.
+    """
+    a, b, c, _, omega, _, time, *_ = start.value.tolist()
+    half_period = math.pi / omega
+    first = time + 0.05 * half_period if start.before == 0 else samples.time_s[0]
+    last = float(points.time_s[-1]) + 0.5 * half_period
+    width = 0.5 * half_period * c
+    y0, end = abs(float(points.angle_rad[0])), abs(float(points.angle_rad[-1]))
+    if 0.0 < _STOP * width < y0 and end < 2.0 * _STOP * width:
+        last = min(last, float(points.time_s[0]) + float(time_at(_STOP * width, y0, a, b, c)))
+    least = float(points.time_s[min(3, len(points) - 1)])
+    begin = int(np.searchsorted(samples.time_s, first))
+    return slice(begin, int(np.searchsorted(samples.time_s, max(last, least), side="right")))

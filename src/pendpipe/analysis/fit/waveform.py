@@ -1,0 +1,247 @@
+"""chi^2 of all the readings of a free decay against Eq. 8, with the engine's exact derivatives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal
+
+import numpy as np
+
+from pendpipe.analysis.fit.fixed import share_of
+from pendpipe.analysis.fit.least_squares import Bounds, Quadratic
+from pendpipe.analysis.fit.rounding import rounded
+from pendpipe.analysis.torque import TOP
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian
+from pendpipe.dynamics.eq8 import OFFSET, OMEGA, SHARE, START, TIME, A, B, C, Drag, Restoring
+
+Seen = Literal["angle", "rate", "position"]
+
+DRIFT: Final = 8
+"""Behind the engine's eight: by how much the zero rises in a second."""
+BOUNDS: Final = Bounds(
+    np.array([0.0, 0.0, 0.0, 0.0, 1e-12, -np.inf, -np.inf, -np.inf, -np.inf]),
+    np.array([np.inf] * 3 + [1.0] + [np.inf] * 5),
+)
+_PIECE: Final = 1 << 18
+"""Readings whose Jacobian is in memory at a time: 16 MB."""
+_BY_SHARE: Final = 0.5 - 4.0 / 3.0 + math.pi**2 / 8.0
+"""(omega/b)^2 times the relative lengthening of the period by the square of b's hysteretic share
+(`by_points.period_excess`)."""
+_BESIDE: Final = 2e-3
+"""Phase between the two motions that tell the velocity: 1e-13 of it is lost in the sixth power."""
+
+
+@dataclass(frozen=True)
+class Waveform:
+    """chi^2 of the readings against Eq. 8.
+
+    Parameters
+    ----------
+    time_s, values
+        The readings, shape (n,).
+    noise_rms
+        Standard deviation of one.
+    split
+        What is told of b's parts: ``"hysteretic"`` or ``"viscous"`` with its rate (1/s)
+        held fixed; empty when the share is marginalised.
+    step
+        The step of readings whose rounding is not random (see above); `noise_rms` is
+        then that before the rounding. Zero: the readings scatter as `noise_rms` says.
+    restoring, drag
+        The law's restoring torque, and the form of its drag.
+    seen
+        What is read: the angle, its rate, or a position L sin x.
+    length_m
+        L of a position.
+    """
+
+    time_s: FloatArray
+    values: FloatArray
+    noise_rms: float
+    split: Mapping[str, float]
+    step: float = 0.0
+    restoring: Restoring = "linear"
+    drag: Drag = "energy"
+    seen: Seen = "angle"
+    length_m: float = 1.0
+    _last: list[tuple[FloatArray, FloatArray, FloatArray]] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
+    _left: list[tuple[FloatArray, FloatArray]] = field(
+        default_factory=list, init=False, repr=False, compare=False
+    )
+
+    def model(self, value: FloatArray) -> tuple[Eq8, Release]:
+        """What moves, and from where, for a set of parameters."""
+        a, b, c, share, omega, angle, time, offset = value[:DRIFT].tolist()
+        told = share_of(self.split, b)
+        share = share if told is None else told
+        law = Eq8(omega, a, share * b, (1.0 - share) * b, c, self.restoring)
+        if self.drag == "speed":
+            law = replace(law, drag="speed")
+        return law, Release(time, angle, offset if self.seen == "angle" else 0.0)
+
+    @property
+    def bounds(self) -> Bounds:
+        """Of the nine parameters: the start is before all readings, with sin x below the top."""
+        low, high = BOUNDS.lower.copy(), BOUNDS.upper.copy()
+        high[TIME] = self.time_s[0]
+        if self.restoring == "sine":
+            low[START], high[START] = -TOP, TOP
+        return Bounds(low, high)
+
+    def _zero(self, value: FloatArray, time_s: FloatArray) -> FloatArray | float:
+        """What the zero adds beyond the engine's offset."""
+        middle = 0.5 * float(self.time_s[0] + self.time_s[-1])
+        drift = value[DRIFT] * (time_s - middle) if value[DRIFT] != 0.0 else 0.0
+        return drift if self.seen == "angle" else drift + value[OFFSET]
+
+    def residual(self, value: FloatArray) -> FloatArray:
+        """Readings less model, shape (n,)."""
+        if not (self._left and np.array_equal(self._left[0][0], value)):
+            self._left[:] = [(value.copy(), self._residual(value))]
+        return self._left[0][1]
+
+    def _residual(self, value: FloatArray) -> FloatArray:
+        model, release = self.model(value)
+        if self.seen == "rate":
+            pieces = range(0, len(self.time_s), _PIECE)
+            times = [self.time_s[first : first + _PIECE] for first in pieces]
+            found = np.concatenate([self.read(value, each)[0] for each in times])
+            return np.asarray(self.values - found)
+        # Before it is let go it is held; a search that got there is no minimum, but has a residual.
+        angle = sample(model, release, np.maximum(self.time_s, release.time_s))
+        read = self.length_m * np.sin(angle) if self.seen == "position" else angle
+        return np.asarray(self.values - read - self._zero(value, self.time_s))
+
+    def _has_motion(self, value: FloatArray) -> bool:
+        """Whether there is a motion from before the readings on, and one that they can show."""
+        try:
+            model, release = self.model(value)
+        except ValueError:
+            return False
+        turns = model.angular_frequency * (self.time_s[-1] - release.time_s) / np.pi
+        # Of more half cycles than two a reading nothing is seen, and they would never end.
+        seen = turns < 2.0 * len(self.values) and bool(np.isfinite(model.stop_rad))
+        return seen and release.time_s <= self.time_s[0]
+
+    def chi2(self, value: FloatArray) -> float:
+        """What `evaluate` has, without the derivatives."""
+        try:
+            left = self.residual(value) if self._has_motion(value) else None
+        except ValueError:
+            left = None
+        return math.inf if left is None else self.unlikely(left)
+
+    def unlikely(self, left: FloatArray) -> float:
+        """Return -2 ln likelihood of some residuals."""
+        if self.step == 0.0:
+            return float(left @ left) / self.noise_rms**2
+        unused = np.empty_like(left), np.empty_like(left)
+        return float(rounded(left, 0.5 * self.step, self.noise_rms, *unused))
+
+    def read(self, value: FloatArray, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Readings of the law, shape (n,), and their derivatives by the engine's parameters.
+
+        The motion depends on the time since its release alone, so that its rate is the derivative
+        by the release's time, with the other sign.
+        """
+        model, release = self.model(value)
+        if self.seen != "rate":
+            reading, jacobian = sample_with_jacobian(model, release, time_s)
+            if self.seen == "position":
+                slope = self.length_m * np.cos(reading)
+                reading, jacobian = self.length_m * np.sin(reading), jacobian * slope[:, None]
+                jacobian[:, -1] = 1.0
+            return reading + self._zero(value, time_s), jacobian
+        beside = _BESIDE / model.angular_frequency
+        earlier = replace(release, time_s=release.time_s - beside)
+        later = replace(release, time_s=release.time_s + beside)
+        after, by_after = sample_with_jacobian(model, earlier, time_s)
+        before, by_before = sample_with_jacobian(model, later, time_s)
+        jacobian = (by_after - by_before) / (2.0 * beside)
+        # Both means of the rate miss it by its second derivative, one by three times the other.
+        mean = -0.5 * (by_after[:, -2] + by_before[:, -2])
+        rate = 1.5 * (after - before) / (2.0 * beside) - 0.5 * mean
+        jacobian[:, -1] = 1.0
+        return rate + self._zero(value, time_s), jacobian
+
+    def curved(self, value: FloatArray, step: FloatArray) -> FloatArray:
+        """Return where a step ends: omega makes up for the square of what b's share changes."""
+        end = value + step
+        if step[OMEGA] != 0.0:  # else it is held
+            end[OMEGA] += _BY_SHARE * value[B] ** 2 / value[OMEGA] * step[SHARE] ** 2
+        return end
+
+    def evaluate(self, value: FloatArray) -> Quadratic:
+        """chi^2, gradient and normal matrix, summed over pieces of the record."""
+        refused = Quadratic(np.inf, np.zeros(len(value)), np.eye(len(value)))
+        if not self._has_motion(value):
+            return refused
+        chi2, gradient, normal = 0.0, np.zeros(8), np.zeros((8, 8))
+        by_drift, drifts = np.zeros(8), np.zeros(2)
+        middle = 0.5 * float(self.time_s[0] + self.time_s[-1])
+        for first in range(0, len(self.values), _PIECE):
+            piece = slice(first, first + _PIECE)
+            try:
+                reading, jacobian = self.read(value, self.time_s[piece])
+            except ValueError:
+                # Overdamped: far from anything that turns.
+                return refused
+            left, weights = self.values[piece] - reading, None
+            if self.step == 0.0:
+                chi2 += self.noise_rms**-2 * float(left @ left)
+                score = left
+            else:
+                score, weights = np.empty_like(left), np.empty_like(left)
+                chi2 += float(rounded(left, 0.5 * self.step, self.noise_rms, score, weights))
+            weighted = jacobian if weights is None else jacobian * weights[:, None]
+            late = self.time_s[piece] - middle
+            gradient += jacobian.T @ score
+            normal += jacobian.T @ weighted
+            by_drift += weighted.T @ late
+            own = late if weights is None else late * weights
+            drifts += float(late @ score), float(late @ own)
+        if self.step == 0.0:
+            unit = self.noise_rms**-2
+            gradient, normal = unit * gradient, unit * normal
+            by_drift, drifts = unit * by_drift, unit * drifts
+        full, slope = np.zeros((9, 9)), np.zeros(9)
+        full[:DRIFT, :DRIFT], slope[:DRIFT] = normal, gradient
+        full[DRIFT, :DRIFT] = full[:DRIFT, DRIFT] = by_drift
+        slope[DRIFT], full[DRIFT, DRIFT] = drifts
+        self._last[:] = [(value.copy(), slope, full)]
+        change = self.change(value)
+        return Quadratic(chi2, change.T @ slope, change.T @ full @ change)
+
+    def by_parts(self, value: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Gradient and normal matrix by the engine's parameters, the two parts of b among them.
+
+        The readings are as good as linear in these, however far the share goes.
+        """
+        at, gradient, normal = self._last[0]
+        return gradient - normal @ (self.parts(value) - self.parts(at)), normal
+
+    def parts(self, value: FloatArray) -> FloatArray:
+        """Return a, both parts of b, c, omega, the start's angle and time, offset and drift."""
+        law, release = self.model(value)
+        start = release.angle_rad, release.time_s, value[OFFSET], value[DRIFT]
+        return np.array([*law.rates(), law.angular_frequency, *start])
+
+    def parts_of_b(self, share: float) -> tuple[float, float]:
+        """How a change of b goes to its parts: what is told of one leaves it to the other."""
+        if self.split:
+            share = float("viscous" in self.split)
+        return share, 1.0 - share
+
+    def change(self, value: FloatArray) -> FloatArray:
+        """Derivative of the engine's parameters by ours, shape (9, 9)."""
+        by_share = 0.0 if self.split else float(value[B])
+        change = np.zeros((9, 9))
+        change[[0, 3, 4, 5, 6, 7, 8], [A, C, OMEGA, START, TIME, OFFSET, DRIFT]] = 1.0
+        change[1:3, B] = self.parts_of_b(float(value[SHARE]))
+        change[1:3, SHARE] = by_share, -by_share
+        return change
