@@ -12,10 +12,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Unpack
 
 from pendpipe.errors import refuse_if
-from pendpipe.options import check, documented
+from pendpipe.files import distinct_names
+from pendpipe.options import (
+    Acquiring,
+    Diagnosing,
+    Fitting,
+    Reading,
+    Simulating,
+    takes,
+)
 from pendpipe.recording import Recording
 
 if TYPE_CHECKING:
@@ -23,13 +31,14 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from pendpipe.acquisition.devices.simulated import Signal
-    from pendpipe.analysis.fit.result import Baseline, FitResult, Method
+    from pendpipe.acquisition.recorder import ProgressLine
+    from pendpipe.analysis.fit.result import FitResult
     from pendpipe.analysis.free_decay import FreeDecay
     from pendpipe.analysis.turning_points import TurningPoints
+    from pendpipe.diagnosis import Progress
     from pendpipe.diagnosis.result import Diagnosis
-    from pendpipe.dynamics.eq8 import Restoring
     from pendpipe.estimate import Estimate
-    from pendpipe.formats import Inspection
+    from pendpipe.formats import Inspection, ReadOptions
 
 Source = Recording | str | Path
 """What is analysed: a recording, or the path of its file. A DataFrame serves as well, with a
@@ -40,20 +49,8 @@ _FIGURES_OF_A_DIAGNOSIS: Final = partial(importlib.import_module, "pendpipe.figu
 """Who draws a result, imported when it is drawn: the result itself knows no figures."""
 
 
-@documented
-def read(
-    path: str | Path,
-    *,
-    channel: str | int | None = None,
-    column: str | int | None = None,
-    unit: str | None = None,
-    sample_rate: float | None = None,
-    decimal: str | None = None,
-    delimiter: str | None = None,
-    volts_per_radian: float | None = None,
-    start: float | None = None,
-    stop: float | None = None,
-) -> Recording:
+@takes(Reading)
+def read(path: str | Path, **options: Unpack[Reading]) -> Recording:
     """Read a recording from a file in any supported format.
 
     The layout is guessed, and each guess stands in the recording's `notes`. The options
@@ -63,15 +60,7 @@ def read(
     ----------
     path
         CSV in most dialects, WinDaq, MATLAB, Excel, ...
-    {channel}
-    {column}
-    {unit}
-    {sample_rate}
-    {decimal}
-    {delimiter}
-    {volts_per_radian}
-    {start}
-    {stop}
+    {options}
 
     Raises
     ------
@@ -88,32 +77,18 @@ def read(
     """
     from pendpipe.formats import read as read_file
 
-    return read_file(
-        path,
-        _options(
-            channel=channel,
-            column=column,
-            unit=unit,
-            sample_rate=sample_rate,
-            decimal=decimal,
-            delimiter=delimiter,
-            volts_per_radian=volts_per_radian,
-            start=start,
-            stop=stop,
-        ),
-    )
+    return read_file(path, _read_options(options))
 
 
-@documented
+@takes(Acquiring)
 def acquire(
     port: str,
     *,
-    duration_s: float,
-    rate_hz: float = 60.0,
     channel: int = 1,
-    model: str | None = None,
     signal: Signal | None = None,
-    **options: Any,
+    raw_path: str | Path | None = None,
+    progress: ProgressLine | None = None,
+    **options: Unpack[Acquiring],
 ) -> Recording:
     """Record from a Dataq instrument, or from a simulated one.
 
@@ -122,17 +97,15 @@ def acquire(
     port
         A device file, a COM port, ``socket://HOST:PORT`` or ``rfc2217://HOST:PORT``;
         ``"simulated:di2108"`` needs none.
-    {duration_s}
-    {rate_hz}
     channel
         As printed on the box.
-    {model}
     signal
         What a simulated instrument reads: times in s to volts. By default a decaying pendulum.
-    **options
-        Of `pendpipe.acquisition.recorder.record`: ``raw_path`` (a new file that keeps the bytes),
-        ``range_volts``, ``reconnect_s``, ``volts_per_radian``; and, where it is
-        simulated, ``clock_scale``.
+    raw_path
+        A new file that keeps the bytes off the wire; in memory only where not given.
+    progress
+        A display that is kept up to date.
+    {options}
 
     Returns
     -------
@@ -151,22 +124,25 @@ def acquire(
     """
     from pendpipe.acquisition.recorder import acquire_simulated, example_signal, record
 
-    request = {"rate_hz": rate_hz, "duration_s": duration_s, "channels": (channel,), **options}
+    request: dict[str, Any] = {**options, "channels": (channel,)}
+    request |= {"raw_path": raw_path, "progress": progress}
+    clock_scale, model = request.pop("clock_scale"), request.pop("model")
     where, _, kind = port.partition(":")
     if where == "simulated":
-        return acquire_simulated(kind, signal or example_signal(), **request)
+        signal = signal or example_signal()
+        return acquire_simulated(kind, signal, clock_scale=clock_scale, **request)
     return record(port, model, **request)
 
 
-def inspect(path: str | Path, **options: Any) -> Inspection:
+@takes(Reading)
+def inspect(path: str | Path, **options: Unpack[Reading]) -> Inspection:
     """Describe a file: format, channels, rate, gaps, clipping, and what was guessed.
 
     Parameters
     ----------
     path
         As for `read`.
-    **options
-        As for `read`.
+    {options}
 
     Examples
     --------
@@ -176,7 +152,7 @@ def inspect(path: str | Path, **options: Any) -> Inspection:
     """
     from pendpipe.formats import inspect as inspect_file
 
-    return inspect_file(path, _options(**options))
+    return inspect_file(path, _read_options(options))
 
 
 def find_free_decay(recording: Source) -> FreeDecay:
@@ -219,22 +195,14 @@ def turning_points(recording: Source) -> TurningPoints:
     return measure_recording(_motion(recording), _place(recording))[0]
 
 
-@documented
+@takes(Fitting)
 def fit(
     recording: Source | TurningPoints | ArrayLike | DataFrame,
     angle_rad: ArrayLike | None = None,
     *,
-    method: Method | Literal["auto"] | None = None,
-    restoring: Restoring | Literal["auto"] | None = None,
-    baseline: Baseline = "eq8",
-    fixed: Mapping[str, float] | None = None,
-    volts_per_radian: float | None = None,
     points: TurningPoints | None = None,
-    clock_ppm: float | None = None,
-    scale_percent: float | None = None,
-    length_m: float | None = None,
-    period: float | Estimate | None = None,
     name: str | None = None,
+    **options: Unpack[Fitting],
 ) -> FitResult:
     """Fit a, b, c, frequency and amplitude to the free decay of a recording.
 
@@ -252,17 +220,9 @@ def fit(
         Amplitudes alone (a ruler's, or speeds at a gate), and turning points, are fitted by Eq. 14.
     angle_rad
         The angles at these times, rad.
-    {method}
-    {restoring}
-    {baseline}
-    {fixed}
-    {volts_per_radian}
+    {options}
     points
         Turning points measured before (`turning_points`): they name the decay.
-    {clock_ppm}
-    {scale_percent}
-    {length_m}
-    {period}
     name
         What to call the recording in messages; by default its path.
 
@@ -292,10 +252,8 @@ def fit(
     Copy: T0 = (1.1454712 ± 0.0000028) s; Q = 162.27 ± 0.20 at 73.4 mrad; 62 % of the loss ...
     Next: pendpipe page FILE makes a sheet to hand out; --figure draws it, --json is for programs
     """
-    check(method=method, restoring=restoring, baseline=baseline)
-    check(clock_ppm=clock_ppm, scale_percent=scale_percent)
-    method = None if method == "auto" else method
-    restoring = None if restoring == "auto" else restoring
+    baseline, fixed, length_m = options["baseline"], options["fixed"], options["length_m"]
+    restoring = None if options["restoring"] == "auto" else options["restoring"]
     from pendpipe.analysis.fit import fit_recording, fit_turning_points
     from pendpipe.analysis.fit.by_amplitudes import fit_amplitudes
     from pendpipe.analysis.fit.by_points import as_angles
@@ -313,12 +271,12 @@ def fit(
         found = fit_turning_points(recording, restoring=restoring, baseline=baseline, fixed=fixed)
         return replace(found, name=name or "", drawn_by=_FIGURES_OF_A_FIT)
     recording = _source(recording, angle_rad)
-    place, motion = name or _place(recording), _motion(recording, volts_per_radian)
+    place, motion = name or _place(recording), _motion(recording, options["volts_per_radian"])
     own = "" if isinstance(recording, Recording) else Path(recording).name
     if motion.holds_amplitudes and points is None:
         found = fit_amplitudes(
             motion,
-            period=_given_period(period),
+            period=_given_period(options["period"]),
             length_m=length_m,
             baseline=baseline,
             fixed=fixed,
@@ -326,7 +284,10 @@ def fit(
         )
         return replace(found, name=own, drawn_by=_FIGURES_OF_A_FIT)
     refuse_if(
-        period is not None, "period", "the recording shows its own", "leave it out (--fix holds it)"
+        options["period"] is not None,
+        "period",
+        "the recording shows its own",
+        "leave it out (--fix holds it)",
     )
     if points is None:
         points, decay = measure_recording(motion, place)
@@ -335,15 +296,17 @@ def fit(
     result = fit_recording(
         decay,
         points=points,
-        method=method,
+        method=None if options["method"] == "auto" else options["method"],
         restoring=restoring,
         baseline=baseline,
         fixed=fixed,
         length_m=length_m,
         place=place,
     )
-    result = result if clock_ppm is None else with_clock(result, clock_ppm)
-    result = result if scale_percent is None else with_scale(result, scale_percent)
+    if (clock_ppm := options["clock_ppm"]) is not None:
+        result = with_clock(result, clock_ppm)
+    if (scale_percent := options["scale_percent"]) is not None:
+        result = with_scale(result, scale_percent)
     if points.unit != result["amplitude"].unit:
         # Of its rate, or of a position, the angle was fitted.
         points, _ = as_angles(points, position=points.unit == "m")
@@ -368,20 +331,15 @@ def _given_period(period: float | Estimate | None) -> Estimate | None:
     return given
 
 
-@documented
+@takes(Diagnosing)
 def diagnose(
     recording: Source | Sequence[Source] | Mapping[str, Source],
     *,
-    baseline: Baseline = "eq8",
-    fixed: Mapping[str, float] | None = None,
-    restoring: Restoring | Literal["auto"] | None = None,
-    level: float = 0.01,
-    seed: int = 0,
-    volts_per_radian: float | None = None,
+    points: TurningPoints | None = None,
     name: str | None = None,
-    own: Sequence[str] = (),
-    same_sensor: bool = False,
-    together: bool = False,
+    provenance: Mapping[str, Any] | None = None,
+    progress: Progress | None = None,
+    **options: Unpack[Diagnosing],
 ) -> Diagnosis:
     """Find what physics a fit of Eq. 8 leaves out of a recording.
 
@@ -394,17 +352,15 @@ def diagnose(
         A recording, or the path of its file; or several of one pendulum (a list, or a mapping
         of their names), which are then one measurement: physics shared, start and noise each
         its own (docs/several.md).
-    {baseline}
-    {fixed}
-    {restoring}
-    {level}
-    {seed}
-    {volts_per_radian}
+    {options}
+    points
+        Turning points measured before (`turning_points`): they name the decay.
     name
         What to call the recording in messages; by default its path.
-    {own}
-    {same_sensor}
-    {together}
+    provenance
+        Goes into the result.
+    progress
+        Receives a line for each step.
 
     Returns
     -------
@@ -424,16 +380,22 @@ def diagnose(
     >>> answer.verdict, answer.effects[0].identifier, answer.effects[0].presumed
     ('consistent', 'circular-error', True)
     """
-    check(restoring=restoring, baseline=baseline, level=level, seed=seed)
-    torque = None if restoring == "auto" else restoring
-    from pendpipe.diagnosis.run import diagnose_recording
+    from pendpipe.diagnosis import silent
+    from pendpipe.diagnosis.run import diagnose_decay, diagnose_recording
+    from pendpipe.diagnosis.several import diagnose_several
 
+    common: dict[str, Any] = {
+        "baseline": options["baseline"],
+        "restoring": None if options["restoring"] == "auto" else options["restoring"],
+        "level": options["level"],
+        "seed": options["seed"],
+        "provenance": provenance,
+        "progress": progress or silent,
+    }
+    constant, fixed = options["volts_per_radian"], options["fixed"]
     if not isinstance(recording, Recording | str | Path):
-        from pendpipe.diagnosis.several import diagnose_several
-        from pendpipe.files import distinct_names
-
         refuse_if(
-            not together,
+            not options["together"],
             "diagnose",
             f"{len(recording)} recordings are given",
             "say together=True if they are of one pendulum; else diagnose them one by one",
@@ -445,39 +407,34 @@ def diagnose(
                 for number, each in enumerate(recording, 1)
             ]
             recording = dict(zip(distinct_names(files), recording, strict=True))
-        joint = diagnose_several(
-            [_motion(each, volts_per_radian) for each in recording.values()],
+        found = diagnose_several(
+            [_motion(each, constant) for each in recording.values()],
             list(recording),
             diagnose=diagnose_recording,
-            baseline=baseline,
-            level=level,
-            restoring=torque,
-            seed=seed,
-            own=own,
-            same_sensor=same_sensor,
+            own=options["own"],
+            same_sensor=options["same_sensor"],
+            **common,
         )
-        return replace(joint, drawn_by=_FIGURES_OF_A_DIAGNOSIS)
-    outcome = diagnose_recording(
-        _motion(recording, volts_per_radian),
-        baseline=baseline,
-        fixed=fixed or {},
-        level=level,
-        restoring=torque,
-        seed=seed,
-        place=name or _place(recording),
-    )
-    return replace(outcome, drawn_by=_FIGURES_OF_A_DIAGNOSIS)
+        return replace(found, drawn_by=_FIGURES_OF_A_DIAGNOSIS)
+    common |= {"fixed": fixed, "place": name or _place(recording)}
+    motion = _motion(recording, constant)
+    if points is None:
+        found = diagnose_recording(motion, **common)
+    else:
+        decay = motion.between(points.start_s, points.stop_s)
+        found = diagnose_decay(decay, points, whole=motion, **common)
+    return replace(found, drawn_by=_FIGURES_OF_A_DIAGNOSIS)
 
 
-@documented
-def simulate(model: str | Path | Mapping[str, Any], *, seed: int | None = None) -> Recording:
+@takes(Simulating)
+def simulate(model: str | Path | Mapping[str, Any], **options: Unpack[Simulating]) -> Recording:
     """Simulate a recording from a described pendulum and measurement chain.
 
     Parameters
     ----------
     model
         A TOML file like ``config/model.toml``, or its content as a mapping.
-    {seed}
+    {options}
 
     Examples
     --------
@@ -492,8 +449,7 @@ def simulate(model: str | Path | Mapping[str, Any], *, seed: int | None = None) 
     """
     from pendpipe.simulation import model as models
 
-    check(seed=seed)
-    described = models.read_model(model)
+    described, seed = models.read_model(model), options["seed"]
     if seed is not None:
         described = described.model_copy(update={"seed": seed})
     place = "model" if isinstance(model, Mapping) else str(model)
@@ -520,15 +476,14 @@ def _source(recording: Any, angle_rad: ArrayLike | None = None) -> Source:
     return Recording(time_s=recording["time_s"].to_numpy(), **readings)
 
 
-def _options(**given: Any) -> Any:
+def _read_options(options: Reading) -> ReadOptions:
     """Turn the overrides into the readers' options; numbers of columns are words there."""
     from pendpipe.formats import ReadOptions
 
-    names = {"start": "start_s", "stop": "stop_s"}
-    for name in ("channel", "column"):
-        if isinstance(given.get(name), int):
-            given[name] = str(given[name])
-    return ReadOptions(**{names.get(name, name): value for name, value in given.items()})
+    named: dict[str, Any] = dict(options)
+    named |= {"start_s": named.pop("start"), "stop_s": named.pop("stop")}
+    named |= {key: str(named[key]) for key in ("channel", "column") if named[key] is not None}
+    return ReadOptions(**named)
 
 
 def _motion(recording: Source, volts_per_radian: float | None = None) -> Recording:

@@ -7,18 +7,16 @@ import hashlib
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
 
 from pendpipe.errors import InputError
 from pendpipe.files import check_output, is_stream, json_text, read_json, writing
-from pendpipe.options import ALTERNATIVES, Flags
+from pendpipe.options import ALTERNATIVES, Flags, Reading, given
 from pendpipe.version import __version__
 
 if TYPE_CHECKING:
     from pendpipe.configuration.load import Campaign
-    from pendpipe.formats import ReadOptions
     from pendpipe.recording import Recording
 
 Arguments: TypeAlias = argparse.Namespace
@@ -89,13 +87,6 @@ def checked_outputs(arguments: Arguments, declared: Flags) -> Iterator[None]:
         yield
 
 
-def read_options(arguments: Arguments) -> ReadOptions:
-    """Turn the parsed arguments into the readers' options."""
-    from pendpipe.formats import ReadOptions
-
-    return ReadOptions(**{each.name: getattr(arguments, each.name) for each in fields(ReadOptions)})
-
-
 def announce(
     arguments: Arguments,
     recording: Recording,
@@ -122,10 +113,10 @@ def read_motion(
         ``input_sha256`` (of what came through standard input too), ``version``,
         ``volts_per_radian`` (None where none was used).
     """
-    from pendpipe.formats import read
+    from pendpipe import api
     from pendpipe.formats.reading import file_bytes
 
-    recording = read(arguments.file, read_options(arguments))
+    recording = api.read(arguments.file, **given(arguments, Reading))
     constant = arguments.volts_per_radian or _calibrated(arguments.calibration)
     was_volts = recording.quantity == "volts"
     recording = recording.as_motion(constant, arguments.file)

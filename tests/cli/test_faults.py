@@ -15,7 +15,6 @@ import pendpipe as pp
 from pendpipe import cli
 from pendpipe.commands.main import command_of
 from pendpipe.errors import InputError, NotAnalysableError
-from pendpipe.options import OPTIONS
 from pendpipe.recording import Recording, write_plain
 
 
@@ -27,19 +26,22 @@ def test_every_command_says_what_it_does(name: str, capsys: pytest.CaptureFixtur
     assert command_of(name).description.splitlines()[0] in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("verb", [pp.read, pp.acquire, pp.fit, pp.diagnose, pp.simulate])
-def test_a_keyword_and_its_option_have_the_same_words(verb: Callable[..., object]) -> None:
-    said = " ".join((verb.__doc__ or "").split()).lower()
-    assert "{" not in said.partition("examples")[0]
-    shared = {
-        option.keyword or flag.lstrip("-").replace("-", "_"): option.help
-        for flag, option in OPTIONS.items()
-    }
-    # A box's channel is its number, a model to simulate is a file, points are measured ones.
-    others = {(pp.acquire, "channel"), (pp.simulate, "model"), (pp.fit, "points")}
-    for keyword in signature(verb).parameters.keys() & shared.keys():
-        if (verb, keyword) not in others:
-            assert f"{keyword} {' '.join(shared[keyword].split())}.".lower() in said
+@pytest.mark.parametrize("name", ["inspect", "acquire", "fit", "diagnose", "simulate"])
+def test_a_keyword_and_its_option_have_the_same_words(name: str) -> None:
+    verb, arguments = getattr(pp, name), command_of(name).arguments
+    said = " ".join(verb.__doc__.split()).lower()
+    declared = {options["dest"]: options for options in arguments.values() if "dest" in options}
+    shared = signature(verb).parameters.keys() & declared.keys()
+    assert shared
+    for keyword in shared:
+        words = declared[keyword]["help"].removesuffix("; repeatable")
+        assert f"{keyword} {words}.".lower() in said
+
+
+@pytest.mark.parametrize("verb", [pp.read, pp.inspect, pp.acquire, pp.fit, pp.diagnose])
+def test_a_keyword_that_there_is_not_is_no_keyword(verb: Callable[..., object]) -> None:
+    with pytest.raises(TypeError, match="unexpected keyword argument 'sampel_rate'"):
+        verb("examples/rod-pendulum.csv", sampel_rate=10.0)
 
 
 def test_a_mistyped_command_gets_the_nearest_one(capsys: pytest.CaptureFixture[str]) -> None:

@@ -24,10 +24,14 @@ from pendpipe.files import check_output, check_writable, is_stream
 from pendpipe.options import (
     ALTERNATIVES,
     INPUT,
+    NATURAL,
     OUTPUTS,
     POSITIVE,
+    Acquiring,
     Flags,
     flags,
+    flags_of,
+    given,
     under,
 )
 
@@ -82,9 +86,15 @@ _OF_A_STAGE: Final[Flags] = flags("--campaign", "--record", "--refused") | {
 ARGUMENTS: Final = (
     under(ALTERNATIVES, _SOURCES)
     | _OWN
-    | flags("--model", "--rate", "--duration", "--range-volts", "--reconnect", "--clock-scale")
-    | flags("--volts-per-radian")
-    | flags("--seed", default=0, help="of the simulated noise (0)")
+    | flags_of(Acquiring)
+    | {
+        "--seed": {
+            "type": NATURAL,
+            "metavar": "N",
+            "default": 0,
+            "help": "of the simulated noise (0)",
+        }
+    }
     | under("as a stage of a campaign", _OF_A_STAGE)
 )
 
@@ -145,7 +155,7 @@ def _record(arguments: Arguments) -> None:
     if not is_stream(out) and (out.is_file() or not out.exists()):  # else a device or a pipe
         check_writable(out.parent)
     if arguments.samples is not None:
-        arguments.duration = arguments.samples / max(arguments.rate, 1e-9)
+        arguments.duration_s = arguments.samples / max(arguments.rate_hz, 1e-9)
     kept = [Path(arguments.raw)] if arguments.raw else attempts.paths_beside(out)
     no_earlier_one = arguments.recover or arguments.anew
     earlier = [] if no_earlier_one else attempts.read_attempts(kept)
@@ -254,22 +264,16 @@ def _from_device(arguments: Arguments, raw: Path) -> None:
         "only simulated devices go here",
         "give simulated:di2108",
     )
-    options: dict[str, Any] = {"volts_per_radian": arguments.volts_per_radian}
+    options, simulated = given(arguments, Acquiring), None
     if device:
-        constant = arguments.volts_per_radian or 3.85
-        signal_volts = example_signal(arguments.seed, constant)
-        options = {"volts_per_radian": constant, "signal": signal_volts}
-        options["clock_scale"] = arguments.clock_scale
+        options["volts_per_radian"] = arguments.volts_per_radian or 3.85
+        simulated = example_signal(arguments.seed, options["volts_per_radian"])
     api.acquire(
         where,
-        model=arguments.model,
         channel=arguments.channel or 1,
-        rate_hz=arguments.rate,
-        duration_s=arguments.duration,
+        signal=simulated,
         raw_path=raw,
-        progress=ProgressLine(sys.stderr, arguments.duration),
-        range_volts=arguments.range_volts,
-        reconnect_s=arguments.reconnect,
+        progress=ProgressLine(sys.stderr, arguments.duration_s),
         **options,
     )
 

@@ -17,7 +17,7 @@ from pendpipe import manifest
 from pendpipe.arguments import Arguments, print_answer
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import is_stream, read_json, write_json
-from pendpipe.options import INPUT, OUTPUT, Flags, flags, under
+from pendpipe.options import INPUT, OUTPUT, SENSOR, Flags, flags, under
 from pendpipe.recording import Recording, read_plain
 from pendpipe.stages.refusal import run_stage
 
@@ -33,10 +33,15 @@ _OWN: Final[Flags] = {
         "metavar": "M",
         "help": "standard deviation of a displacement (the caliper's)",
     },
-    **flags("--delimiter", help="between the cells; guessed from the header"),
-    **flags("--decimal", choices=".,", help="decimal mark; guessed from the delimiter"),
+    "--delimiter": {"metavar": "SIGN", "help": "between the cells; guessed from the header"},
+    "--decimal": {
+        "metavar": "SIGN",
+        "choices": ".,",
+        "help": "decimal mark; guessed from the delimiter",
+    },
 }
-_OF_A_RECORD: Final = flags("--record", "--refused", "--volts-per-radian") | {
+_OF_A_RECORD: Final = flags("--record", "--refused") | {
+    "--volts-per-radian": {"type": float, "metavar": "V", "help": SENSOR},
     "--sensor": {"type": Path, "metavar": "JSON", "help": "the campaign's calibration"} | INPUT,
 }
 ARGUMENTS: Final = _OWN | under("with --record", _OF_A_RECORD)

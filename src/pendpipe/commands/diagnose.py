@@ -10,25 +10,22 @@ its own (docs/several.md).
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any, Final
 
+from pendpipe import api
 from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import Arguments, print_answer, print_json, read_motion, tell
 from pendpipe.diagnosis.result import FILE_NAME, Diagnosis, not_analysable
-from pendpipe.diagnosis.run import diagnose_decay, diagnose_recording
-from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_A_DIAGNOSIS
 from pendpipe.files import check_output, distinct_names, make_folder, write_json
 from pendpipe.manifest import check, job
-from pendpipe.options import FILES, OUTPUTS, Flags, flags
+from pendpipe.options import FILES, OUTPUTS, Diagnosing, Flags, flags, flags_of, given
 from pendpipe.process import keep_memory
 from pendpipe.quantities import listed
-from pendpipe.recording import Recording
 from pendpipe.stages.refusal import reason_of, within_results
 
 FOUND = 3
@@ -55,9 +52,8 @@ _OWN: Final[Flags] = {
 ARGUMENTS: Final = (
     FILES
     | _OWN
-    | flags("--level", "--restoring", "--together", "--own", "--same-sensor", "--verbose", "-v")
-    | flags("--json", "--baseline", "--fix", "--turning-points", "--record", "--refused")
-    | flags("--seed", default=0)
+    | flags_of(Diagnosing)
+    | flags("--verbose", "-v", "--json", "--turning-points", "--record", "--refused")
     # With several FILEs one for all, or one for each.
     | flags("--calibration", nargs="+", default=[])
 )
@@ -84,9 +80,9 @@ def run(arguments: Arguments) -> int:
         out = arguments.out / FILE_NAME
         with job(arguments.out, "diagnose-pendulum", inputs=inputs, outputs=[out]):
             return _diagnose_several(arguments)
-    arguments.file, given = arguments.files[0], arguments.calibration
-    arguments.calibration = given[0] if given else None
-    fixed = parse_fixed(arguments.fix, arguments.baseline)
+    arguments.file = arguments.files[0]
+    arguments.calibration = next(iter(arguments.calibration), None)
+    fixed = parse_fixed(arguments.fixed, arguments.baseline)
     if arguments.out is not None and Path(arguments.file).is_file():
         # Before the work: a long diagnosis must not end without a folder to write to.
         make_folder(arguments.out)
@@ -111,12 +107,14 @@ def _diagnose(arguments: Arguments, fixed: dict[str, float]) -> int:
     earlier = arguments.refused and reason_of(arguments.refused, before="fit")
     if earlier:
         return _not_analysable(arguments, earlier, {})
-    provenance: dict[str, Any] = {"seed": arguments.seed, "fixed": list(arguments.fix)}
+    provenance: dict[str, Any] = {"seed": arguments.seed, "fixed": list(arguments.fixed)}
     provenance["restoring"] = arguments.restoring
     try:
         recording, made = read_motion(arguments, quiet=not arguments.verbose)
         provenance = made | provenance | {"level": arguments.level}
-        outcome = _outcome(arguments, recording, fixed=fixed, provenance=provenance)
+        outcome = _outcome(
+            arguments, recording, fixed=fixed, provenance=provenance, name=arguments.file
+        )
     except InputError as error:
         if isinstance(error, DamagedError) or not Path(arguments.file).is_file():
             raise
@@ -142,27 +140,22 @@ def _answer(arguments: Arguments, content: Mapping[str, Any], name: str) -> str:
 
 def _diagnose_several(arguments: Arguments) -> int:
     """Diagnose recordings of one pendulum together."""
-    from pendpipe.diagnosis.several import diagnose_several
-
-    for single in ("fix", "turning_points"):
-        option, given = f"--{single.replace('_', '-')}", getattr(arguments, single)
-        refuse_if(
-            given not in (None, []),
-            option,
-            "it is for one recording",
-            "give one FILE, or leave it out",
-        )
+    for option, value in (
+        ("--fix", arguments.fixed),
+        ("--turning-points", arguments.turning_points),
+    ):
+        refuse_if(value, option, "it is for one recording", "give one FILE, or leave it out")
     refuse_if(
         arguments.record is None and not arguments.together,
         "diagnose",
         f"{len(arguments.files)} files are given",
         "add --together if they are recordings of one pendulum; else diagnose them one by one",
     )
-    recordings, made, given = {}, [], arguments.calibration
+    recordings, made, constants = {}, [], arguments.calibration
     refuse_if(
-        len(given) not in (0, 1, len(arguments.files)),
+        len(constants) not in (0, 1, len(arguments.files)),
         "--calibration",
-        f"{len(given)} are given",
+        f"{len(constants)} are given",
         "give one, or one for each",
     )
     names = distinct_names(arguments.files)
@@ -171,23 +164,16 @@ def _diagnose_several(arguments: Arguments) -> int:
             tell(f"{file}: refused, and left out")
             continue
         arguments.file = file
-        arguments.calibration = given[number % len(given)] if given else None
+        arguments.calibration = constants[number % len(constants)] if constants else None
         recordings[name], provenance = read_motion(arguments)
         made.append({"name": name, **provenance})
     if len(recordings) < 2:
         return _not_analysable(arguments, "fewer than two recordings can be used", {})
-    joint = diagnose_several(
-        list(recordings.values()),
-        list(recordings),
-        diagnose=diagnose_recording,
-        baseline=arguments.baseline,
-        level=arguments.level,
-        restoring=_torque(arguments),
-        seed=arguments.seed,
-        same_sensor=arguments.same_sensor,
-        own=arguments.own,
+    joint = _outcome(
+        arguments,
+        recordings,
+        together=True,
         provenance={"inputs": made, "seed": arguments.seed, "level": arguments.level},
-        progress=_print_progress,
     )
     if arguments.out is not None:
         joint.save(arguments.out)
@@ -196,26 +182,11 @@ def _diagnose_several(arguments: Arguments) -> int:
     return FOUND if arguments.fail_on == joint.verdict else 0
 
 
-def _torque(arguments: Arguments) -> Restoring | None:
-    return None if arguments.restoring == "auto" else arguments.restoring
-
-
-def _outcome(arguments: Arguments, recording: Recording, **more: Any) -> Diagnosis:
-    """Diagnose a recording, with the turning points of an earlier stage if given."""
-    more |= {
-        "baseline": arguments.baseline,
-        "seed": arguments.seed,
-        "level": arguments.level,
-        "restoring": _torque(arguments),
-        "place": arguments.file,
-        "progress": _print_progress,
-    }
-    if arguments.turning_points is None:
-        return diagnose_recording(recording, **more)
-    points = read_turning_points(arguments.turning_points)
-    return diagnose_decay(
-        recording.between(points.start_s, points.stop_s), points, whole=recording, **more
-    )
+def _outcome(arguments: Arguments, recording: Any, **more: Any) -> Diagnosis:
+    """Diagnose a recording, or several together."""
+    points = arguments.turning_points and read_turning_points(arguments.turning_points)
+    options = given(arguments, Diagnosing) | {"fixed": None} | more
+    return api.diagnose(recording, points=points, progress=_print_progress, **options)
 
 
 def _write(arguments: Arguments, outcome: Diagnosis) -> dict[str, Any]:
@@ -225,10 +196,7 @@ def _write(arguments: Arguments, outcome: Diagnosis) -> dict[str, Any]:
     )
     _remove_figures(arguments.out)
     if wanted:
-        from pendpipe.figures import diagnosis
-
         _print_progress("drawing")
-        outcome = replace(outcome, drawn_by=lambda: diagnosis)
     return outcome.save(arguments.out, figures=wanted)
 
 

@@ -25,7 +25,19 @@ from pendpipe.arguments import Arguments, print_answer, print_json, read_motion,
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import over
 from pendpipe.files import is_stream, read_json, write_json
-from pendpipe.options import ALTERNATIVES, FILES, OUTPUT, POSITIVE, Flags, flags, under
+from pendpipe.options import (
+    ALTERNATIVES,
+    FILES,
+    NATURAL,
+    OUTPUT,
+    POSITIVE,
+    Fitting,
+    Flags,
+    flags,
+    flags_of,
+    given,
+    measured_number,
+)
 from pendpipe.report.class_table import Fitted, form_of, printed, together, write_fits
 
 _OWN: Final[Flags] = {
@@ -54,11 +66,18 @@ _OWN: Final[Flags] = {
 ARGUMENTS: Final = (
     FILES
     | _OWN
-    | under(ALTERNATIVES, flags("--period", "--frequency"))
-    | flags("--length", "--clock-ppm", "--scale-percent", "--method", "--restoring", "--verbose")
-    | flags("-v", "--json", "--baseline", "--fix", "--turning-points", "--calibration")
+    | flags_of(Fitting)
+    | {
+        "--frequency": {
+            "type": measured_number,
+            "metavar": "HZ",
+            "help": "its inverse, Hz",
+            "heading": ALTERNATIVES,
+        },
+    }
+    | flags("--verbose", "-v", "--json", "--turning-points", "--calibration")
     | flags("--record", "--refused")
-    | flags("--seed", help="recorded only")
+    | {"--seed": {"type": NATURAL, "metavar": "N", "help": "recorded only"}}
 )
 
 
@@ -118,23 +137,18 @@ def _stage(arguments: Arguments) -> None:
 
 
 def _fit(arguments: Arguments, say: Callable[[str], None] = tell) -> FitResult:
-    fixed = parse_fixed(arguments.fix, arguments.baseline)
+    fixed = parse_fixed(arguments.fixed, arguments.baseline)
     recording, provenance = read_motion(arguments, quiet=not arguments.verbose, say=say)
     points = arguments.turning_points and read_turning_points(arguments.turning_points)
-    period, frequency = arguments.period, arguments.frequency
-    result = api.fit(
-        arguments.file if is_turning_points(arguments.file) else recording,
-        points=points,
-        method=arguments.method,
-        restoring=arguments.restoring,
-        baseline=arguments.baseline,
-        fixed=fixed,
-        length_m=arguments.length.value if arguments.length else None,
-        clock_ppm=arguments.clock_ppm,
-        scale_percent=_scale_percent(arguments),
-        period=over(1.0, frequency, "s") if frequency else period,
-        name=arguments.file,
-    )
+    period, frequency, length = arguments.period, arguments.frequency, arguments.length_m
+    options = given(arguments, Fitting) | {
+        "fixed": fixed,
+        "length_m": length.value if length else None,
+        "scale_percent": _scale_percent(arguments),
+        "period": over(1.0, frequency, "s") if frequency else period,
+    }
+    source = arguments.file if is_turning_points(arguments.file) else recording
+    result = api.fit(source, points=points, name=arguments.file, **options)
     return replace(
         result,
         provenance={
@@ -142,7 +156,7 @@ def _fit(arguments: Arguments, say: Callable[[str], None] = tell) -> FitResult:
             "version": provenance["version"],
             "seed": arguments.seed,
             "volts_per_radian": provenance["volts_per_radian"],
-            "fixed": list(arguments.fix),
+            "fixed": list(arguments.fixed),
         },
     )
 
@@ -166,8 +180,8 @@ def _print(arguments: Arguments, result: FitResult) -> None:
     """Print the answer."""
     name = "standard input" if arguments.file == "-" else Path(arguments.file).name
     printed = lines(result, name=name, law=arguments.accept)
-    if arguments.length or arguments.gravity:
-        length, gravity = arguments.length, arguments.gravity
+    length, gravity = arguments.length_m, arguments.gravity
+    if length or gravity:
         printed.insert(-2, gravity_line(result, length=length, gravity=gravity))
     print("\n".join(printed))
 

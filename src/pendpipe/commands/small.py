@@ -22,11 +22,21 @@ from pendpipe.arguments import (
     announce,
     declare,
     print_answer,
-    read_options,
     tell_written,
 )
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.options import ALTERNATIVES, FILE, INPUT, OUTPUT, Flags, flags
+from pendpipe.options import (
+    ALTERNATIVES,
+    FILE,
+    INPUT,
+    OUTPUT,
+    Flags,
+    Reading,
+    Simulating,
+    flags,
+    flags_of,
+    given,
+)
 from pendpipe.project import CONFIGURATION, PROJECT, SNAKEFILE
 
 if TYPE_CHECKING:
@@ -54,9 +64,9 @@ def command(arguments: Flags) -> Callable[[_Run], _Run]:
 )
 def inspect(arguments: Arguments) -> None:
     """Print what a recording holds: format, channels, rate, gaps, markers, clipping, step."""
-    from pendpipe.formats import inspect as inspect_file
+    from pendpipe import api
 
-    found = inspect_file(arguments.file, read_options(arguments))
+    found = api.inspect(arguments.file, **given(arguments, Reading))
     lines = [arguments.file, *("  " + line for line in found.why)]
     text = lines if arguments.why else _lines(arguments.file, found)
     print_answer(arguments, found.as_json(), "\n".join(text))
@@ -117,11 +127,11 @@ def _lines(file: str, found: "Inspection") -> list[str]:
 )
 def convert(arguments: Arguments) -> None:
     """Write any supported recording in the plain CSV form, or as a WinDaq file (.wdh)."""
-    from pendpipe.formats import read
+    from pendpipe import api
     from pendpipe.formats.writing import check_name, write
 
     check_name(arguments.out)
-    recording = read(arguments.file, read_options(arguments))
+    recording = api.read(arguments.file, **given(arguments, Reading))
     announce(arguments, recording)
     for note in write(arguments.out, recording):
         print(f"{arguments.out}: {note}", file=sys.stderr)
@@ -133,7 +143,7 @@ def convert(arguments: Arguments) -> None:
         "model": {"metavar": "MODEL.toml", "help": "what to simulate"} | INPUT,
         "out": {"metavar": "OUT.csv", "type": Path, "help": "the recording, plain form"} | OUTPUT,
     }
-    | flags("--seed", help="seed of the noise, instead of the model's")
+    | flags_of(Simulating)
 )
 def simulate(arguments: Arguments) -> None:
     """Make a recording from a described pendulum and measurement chain.
@@ -145,7 +155,7 @@ def simulate(arguments: Arguments) -> None:
     from pendpipe import api
     from pendpipe.recording import write_plain
 
-    recording = api.simulate(arguments.model, seed=arguments.seed)
+    recording = api.simulate(arguments.model, **given(arguments, Simulating))
     write_plain(arguments.out, recording)
     tell_written(arguments.out, f"{len(recording)} samples in {recording.unit}")
 
