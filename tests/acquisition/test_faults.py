@@ -1,22 +1,38 @@
-"""Every fault that a simulated device can have: what the recording then says."""
+"""Sessions with simulated instruments, faults of the line, and the rate of the clock."""
 
+import math
+import os
 from collections.abc import Callable
 from io import BytesIO
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 import pytest
 from benchmarks.faulty_device import Fault, acquire_faulty
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binom, t
 
 import pendpipe.acquisition.recorder
-from pendpipe.acquisition.decode import decode_recording
+from pendpipe.acquisition import decode
+from pendpipe.acquisition.clock import ScaledClock
+from pendpipe.acquisition.decode import decode_recording, find_delays, measure_rate
 from pendpipe.acquisition.devices import DEVICES
-from pendpipe.acquisition.drivers import find_driver
+from pendpipe.acquisition.devices.simulated import SimulatedDevice
+from pendpipe.acquisition.drivers import find_driver, identify
+from pendpipe.acquisition.drivers.letters import DI154RS, DI245
+from pendpipe.acquisition.drivers.text import DI2108
+from pendpipe.acquisition.line import Line, check_port
 from pendpipe.acquisition.raw import RawWriter
+from pendpipe.acquisition.recorder import acquire_simulated, record
 from pendpipe.arrays import FloatArray
+from pendpipe.errors import InputError
 from pendpipe.recording import GOOD, MISSING, SUSPECT, Recording
 
 from .stepped import STEP_S, recorded_in_steps
+
+# Every fault that a simulated device can have: what the recording then says.
 
 FAMILIES = ["di154", "di149", "di245", "di2108"]
 SYNC_BIT = FAMILIES[:3]
@@ -250,3 +266,315 @@ def test_the_rate_is_measured(kind: str, factor: float, recorded: Recorded) -> N
     assert used == (nominal if factor == 1.0 else measured)
     # As long as was asked by the recorder's clock.
     assert recording.time_s[-1] > 0.9 * 60.0
+
+
+# Device, line, driver, recorder and decoder together, over real terminals and sockets.
+
+LINKS = [
+    pytest.param(
+        "pty",
+        marks=pytest.mark.skipif(
+            not hasattr(os, "openpty"), reason="this system has no pseudo-terminals"
+        ),
+    ),
+    "socket",
+]
+KINDS = [("di154", 12, 4800 / 44), ("di2108", 16, 110.0)]
+
+
+def swing(time_s: FloatArray) -> FloatArray:
+    return np.asarray(4.0 * np.exp(-time_s / 200.0) * np.cos(math.pi * time_s))
+
+
+def step_volts(recording: Recording) -> float:
+    assert recording.resolution is not None
+    return recording.resolution
+
+
+@pytest.mark.parametrize("link", LINKS)
+@pytest.mark.parametrize(("kind", "bits", "rate_hz"), KINDS)
+@pytest.mark.parametrize(("scale", "duration_s"), [(1.0, 0.2), (1000.0, 300.0)])
+def test_a_recording_is_the_signal_to_half_a_step(
+    link: str, kind: str, bits: int, rate_hz: float, scale: float, duration_s: float
+) -> None:
+    recording = acquire_simulated(
+        kind, swing, rate_hz=110.0, duration_s=duration_s, clock_scale=scale, link=link
+    )
+    assert len(recording) == round(duration_s * rate_hz)
+    assert step_volts(recording) == 20.0 / 2**bits
+    assert recording.metadata["time_base"] == "nominal"
+    assert not recording.notes
+    error = np.abs(recording.values - swing(recording.time_s))
+    # Half a step, and the slope times what the divisors miss of 110 Hz.
+    assert error.max() <= 0.5 * step_volts(recording) * (1 + 1e-9) + 4 * math.pi * 1e-9
+
+
+@pytest.mark.parametrize("kind", ["di154", "di2108"])
+def test_every_channel_gets_its_own_signal_and_decodes_again_alike(
+    kind: str, tmp_path: Path
+) -> None:
+    """Noise and clipping as well: they depend on the seed, and not on the pace of the host."""
+    raw = tmp_path / "run" / f"{kind}.raw"
+
+    def recorded(seed: int, path: Path | None) -> Recording:
+        random = np.random.default_rng(seed)
+        signals = {
+            1: lambda t: random.normal(0.0, 1.0, len(t)),
+            2: lambda t: np.full(len(t), 2.0),
+            4: lambda t: 30.0 * swing(t),
+        }
+        return acquire_simulated(
+            kind, signals, channels=(4, 1, 2), rate_hz=50.0, duration_s=20.0, raw_path=path
+        )
+
+    first = recorded(5, raw)
+    assert np.array_equal(recorded(5, None).values, first.values)
+    assert not np.array_equal(recorded(6, None).values, first.values)
+    again = [decode_recording(raw, channel=number) for number in (1, 2, 4)]
+    assert np.array_equal(again[0].values, first.values)
+    assert again[0].metadata == first.metadata
+    assert np.abs(again[1].values - 2.0).max() <= 0.5 * step_volts(again[1])
+    assert again[2].values.max() == 10.0 - step_volts(again[2])
+    assert again[2].values.min() == -10.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "model"), [("di154", "DI-154RS"), ("di2108", "DI-2108")], ids=["di154", "di2108"]
+)
+def test_a_port_tells_who_is_there(kind: str, model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Each family is asked in its own language; the other does not answer.
+    for driver in (DI154RS, DI2108, DI245):
+        monkeypatch.setattr(driver, "patience_s", 0.2)
+        monkeypatch.setattr(driver, "attempts", 1)
+    with SimulatedDevice(kind, swing) as device:
+        assert identify(device.port).model == model
+
+
+def test_a_wrong_model_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(DI2108, "patience_s", 0.1)
+    with (
+        SimulatedDevice("di154", swing, clock_scale=100.0) as device,
+        pytest.raises(InputError, match="does not answer") as caught,
+    ):
+        record(device.port, "di2108", rate_hz=60.0, duration_s=1.0, clock=device.clock)
+    assert str(caught.value).startswith(device.port)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_failing_signal_is_not_called_a_silent_device(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pendpipe.acquisition.recorder._SILENCE_S", 0.2)
+
+    def failing(time_s: FloatArray) -> FloatArray:
+        raise ZeroDivisionError("the signal's own fault")
+
+    with pytest.raises(ZeroDivisionError, match="own fault"):
+        acquire_simulated("di2108", failing, rate_hz=60.0, duration_s=1.0)
+
+
+def test_simulated_time_stands_still_while_held() -> None:
+    clock = ScaledClock(1000.0)
+    clock.hold()
+    before = clock.now()
+    ScaledClock().sleep(0.01)
+    assert clock.now() == before
+    clock.release()
+    assert 0 <= clock.now() - before < 10.0 + before
+
+
+def test_faults_of_the_port_are_one_line_each(tmp_path: Path) -> None:
+    def refused(port: str) -> str:
+        with pytest.raises(InputError) as caught:
+            record(port, "di2108", rate_hz=60.0, duration_s=1.0)
+        assert caught.value.place == port
+        return str(caught.value)
+
+    plain = tmp_path / "file"
+    plain.touch()
+    assert "there is no such port" in refused(str(tmp_path / "ttyUSB9"))
+    assert "this is no serial port" in refused(str(plain))
+    assert "this is no port of an instrument" in refused("nonsense://x")
+    assert "nothing listens there" in refused("socket://127.0.0.1:1")
+    with SimulatedDevice("di2108", swing) as device, Line(device.port, 4800):
+        assert "the port is busy" in refused(device.port)
+
+
+@pytest.mark.parametrize(
+    "port",
+    [
+        "spy:///dev/null?file={file}",
+        "SPY://loop://?file={file}",
+        "spy://socket://127.0.0.1:1?file={file}",
+        "alt:///dev/null?class=PosixPollSerial",
+        "hwgrep://0683",
+        "loop://",
+        "socket://127.0.0.1:1?logging=debug",
+        "socket://user@127.0.0.1",
+        "file://{file}",
+        "simulated:di2108",
+        "{file}",
+    ],
+)
+def test_nothing_but_a_port_is_opened_and_no_file_is_touched(port: str, tmp_path: Path) -> None:
+    """Pyserial's spy:// writes a log over any file that it is given."""
+    file = tmp_path / "precious.csv"
+    file.write_text("my readings")
+    with pytest.raises(InputError, match="this is no") as caught:
+        record(port.format(file=file), "di2108", rate_hz=60.0, duration_s=1.0)
+    assert "\n" not in str(caught.value)
+    assert file.read_text() == "my readings"
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ({"rate_hz": 0.0}, "rate_hz: 0 is no positive number"),
+        ({"rate_hz": math.nan}, "rate_hz: nan is no positive number"),
+        ({"duration_s": -1.0}, "duration_s: -1 is no positive number"),
+        ({"channels": (9,)}, "has no channel 9"),
+        ({"channels": ()}, "has no channel none"),
+    ],
+)
+def test_impossible_wishes_are_one_line_each(asked: dict[str, object], message: str) -> None:
+    wish = {"rate_hz": 60.0, "duration_s": 1.0, **asked}
+    with pytest.raises(InputError, match=message):
+        acquire_simulated("di2108", swing, **wish)  # type: ignore[arg-type]
+
+
+def test_names_of_ports_and_links_to_devices_pass(tmp_path: Path) -> None:
+    link = tmp_path / "instrument"
+    link.symlink_to(os.devnull)
+    for port in ("COM3", r"\\.\COM12", "rfc2217://host:4001", "socket://[::1]:9", str(link)):
+        check_port(port)
+
+
+# The measured scan rate: true whatever delays the arrivals, and honest about its error.
+
+
+@given(
+    rate_hz=st.floats(1.0, 1e4),
+    delay_s=st.floats(0.0, 10.0),
+    origin_s=st.floats(-100.0, 100.0),
+)
+def test_a_constant_delay_changes_nothing(rate_hz: float, delay_s: float, origin_s: float) -> None:
+    scans = np.arange(1.0, 401.0)
+    found = measure_rate(origin_s + scans / rate_hz + delay_s, scans, 50.0)
+    assert found.measured_hz == pytest.approx(rate_hz, rel=1e-9)
+
+
+@given(scale=st.sampled_from([1.0, 1000.0]), rate_hz=st.floats(10.0, 1000.0))
+def test_units_scale(scale: float, rate_hz: float) -> None:
+    """A clock that runs faster measures a slower device, in proportion."""
+    scans = np.arange(1.0, 401.0)
+    arrival_s = scans / rate_hz + 1e-3 * np.sin(scans) ** 2
+    slow = measure_rate(arrival_s, scans, rate_hz)
+    fast = measure_rate(arrival_s * scale, scans, rate_hz / scale, clock_scale=scale)
+    assert fast.measured_hz * scale == pytest.approx(slow.measured_hz, rel=1e-9)
+    assert fast.measured_sd_hz * scale == pytest.approx(slow.measured_sd_hz, rel=1e-9)
+
+
+@pytest.mark.parametrize("late_s", [1e-3, 1e-2])
+def test_random_delays_leave_the_rate_within_its_error(late_s: float) -> None:
+    """Exponential delays, with one in twenty a hundred times as long."""
+    random = np.random.default_rng(20)
+    pulls = []
+    for _ in range(400):
+        scans = np.arange(8.0, 8.0 * 600, 8.0)
+        delay = random.exponential(late_s, len(scans))
+        delay *= np.where(random.random(len(scans)) < 0.05, 100.0, 1.0)
+        found = measure_rate(scans / 110.0 + delay, scans, 110.0)
+        pulls.append((found.measured_hz - 110.0) / found.measured_sd_hz)
+    assert abs(np.mean(pulls)) < 0.2
+    assert np.std(pulls) < 1.3
+
+
+def test_a_device_that_is_wrong_by_a_factor_is_believed_the_clock() -> None:
+    scans = np.arange(1.0, 501.0)
+    found = measure_rate(scans / 120.0, scans, 60.0)
+    assert found.chosen == "measured"
+    assert found.rate_hz == pytest.approx(120.0)
+
+
+def test_a_quartz_is_believed_before_the_time_stamps() -> None:
+    """10 parts in a million cannot be seen in five seconds."""
+    scans = np.arange(1.0, 501.0)
+    assert measure_rate(scans / (100.0 * (1 + 1e-5)), scans, 100.0).rate_hz == 100.0
+
+
+def test_too_few_arrivals_measure_nothing() -> None:
+    scans = np.arange(1.0, 36.0)
+    found = measure_rate(scans / 100.0, scans, 90.0)
+    assert np.isnan(found.measured_hz)
+    assert found.rate_hz == 90.0
+
+
+def steady(scans: FloatArray, rate_hz: float = 100.0) -> FloatArray:
+    return scans / rate_hz + np.random.default_rng(3).exponential(1e-3, len(scans))
+
+
+def slept(scans: FloatArray) -> FloatArray:
+    """A second late, then everything at once."""
+    arrival_s = steady(scans)
+    arrival_s[2000:2100] = arrival_s[2100]
+    return arrival_s
+
+
+def wandering(scans: FloatArray) -> FloatArray:
+    steps = np.random.default_rng(0).normal(0.0, 0.1, len(scans) // 20 + 1)
+    return np.asarray(scans / 100.0 + np.repeat(np.cumsum(steps), 20)[: len(scans)])
+
+
+@pytest.mark.parametrize(
+    ("arrivals", "rise_s", "found"),
+    [
+        (steady, 0.3, True),
+        (steady, 1.0, True),
+        (lambda scans: steady(scans, 102.0), 0.3, True),  # not at the rate that it says
+        (steady, 0.0, False),
+        (slept, 0.0, False),  # a busy host is no loss: nothing stays late
+        (wandering, 0.0, False),  # nor is what the usual steps explain
+        (wandering, 6.0, True),
+    ],
+)
+def test_scans_are_missing_where_the_arrivals_become_late_for_good(
+    arrivals: Callable[[FloatArray], FloatArray], rise_s: float, found: bool
+) -> None:
+    scans = np.arange(1.0, 6001.0)
+    arrival_s = arrivals(scans) + rise_s * (scans > 3000)
+    delays, limit_s = find_delays(arrival_s, scans, 100.0)
+    assert limit_s < 6.0
+    assert len(delays) == found
+    for delay in delays:
+        assert delay.begin <= 3000 <= delay.end
+        assert rise_s - 0.02 - 3.0 * (arrivals is wandering) < delay.late_s < rise_s + 0.02
+
+
+@pytest.mark.parametrize(("drift_s", "chosen"), [(0.006, "nominal"), (0.025, "measured")])
+def test_a_drift_of_a_busy_hosts_delays_is_no_rate(drift_s: float, chosen: str) -> None:
+    """It does not scatter; below 10 ms of the host it is not believed, at any pace of the clock."""
+    for clock_scale in (1.0, 20.0):
+        scans = np.arange(1.0, 251.0) * 16.0
+        arrival_s = scans / 100.0 * (1.0 + drift_s * clock_scale / 40.0)
+        assert measure_rate(arrival_s, scans, 100.0, clock_scale).chosen == chosen
+
+
+def test_chance_makes_a_rate_as_rarely_as_students_distribution_says() -> None:
+    """Twelve stretches and a line leave ten degrees of freedom: 1 in 8,000 beyond six."""
+    assert 2.0 * t.sf(decode._RATE_TRUST, 10) == pytest.approx(1.0 / 8000.0, rel=0.1)
+    generator, scans = np.random.default_rng(11), np.arange(1.0, 481.0) * 16.0
+    beyond = 0
+    for _ in range(1000):
+        # Delays of many ms: the floor of the host's ten is far below.
+        arrival_s = scans / 100.0 + generator.uniform(0.0, 3.0, len(scans))
+        beyond += measure_rate(arrival_s, scans, 100.0).chosen == "measured"
+    assert beyond <= binom.isf(1e-3, 1000, 1.0 / 8000.0)
+
+
+@pytest.mark.parametrize(("height_s", "lost"), [(1.2, 0), (1.4, 1)])
+def test_a_loss_is_a_step_of_more_than_eight_spreads_of_the_others(
+    height_s: float, lost: int
+) -> None:
+    """Delays of 0, 0.1, 0.1 s in turn: steps spread by 0.148 s, and a step loses 0.1 s in them."""
+    scans = np.arange(1.0, 2049.0)
+    delay_s = np.repeat(np.resize([0.0, 0.1, 0.1], 256), 8)
+    arrival_s = scans / 100.0 + delay_s + height_s * (scans > 1024)
+    assert len(find_delays(arrival_s, scans, 100.0)[0]) == lost

@@ -1,11 +1,18 @@
-"""The raw file: repeatable, and good up to where it breaks off."""
+"""Raw files: what was kept comes back, whatever happens to the recorder, its disk or the file."""
 
+import errno
+import io
 import json
+import os
+import random
+import signal
 import struct
+import time
 import zlib
 from io import BytesIO
 from pathlib import Path
 from random import Random
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -13,11 +20,19 @@ from benchmarks.acquisition import flip, recorded_bytes
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pendpipe.acquisition.attempts import accept, choose, new_path, read_attempts, refuse_lost
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.devices import DEVICES
-from pendpipe.acquisition.raw import Frame, RawWriter, read_raw
+from pendpipe.acquisition.drivers.streams import Scans, plain_scans
+from pendpipe.acquisition.line import LineLostError
+from pendpipe.acquisition.raw import Frame, RawWriter, append_event, lock, read_raw
+from pendpipe.acquisition.recorder import ProgressLine, acquire_simulated
+from pendpipe.arrays import FloatArray
+from pendpipe.cli import main
 from pendpipe.errors import InputError
-from pendpipe.recording import MISSING, SUSPECT
+from pendpipe.recording import MISSING, SUSPECT, read_plain
+
+# The raw file: repeatable, and good up to where it breaks off.
 
 HEADER = {
     "model": "DI-154RS",
@@ -196,3 +211,226 @@ def test_frames_need_not_hold_whole_scans(model: str) -> None:
         assert 2 <= np.sum(~good) <= 3
         assert np.array_equal(recording.time_s, sound.time_s)
         assert np.array_equal(recording.values[good], sound.values[good])
+
+
+# The recorder against the noise, a full disk, a killed process and a busy terminal.
+
+resource = pytest.importorskip("resource", reason="this system has no limit on a file's size")
+
+
+def slow(time_s: FloatArray) -> FloatArray:
+    return np.asarray(5.0 * np.sin(0.02 * time_s))
+
+
+class FullDisk:
+    """Takes so many bytes and no more."""
+
+    def __init__(self, room: int) -> None:
+        self.content = b""
+        self._room = room
+
+    def flush(self) -> None:
+        """Nothing is held back."""
+
+    def write(self, data: bytes) -> int:
+        piece = bytes(data[: self._room - len(self.content)])
+        if not piece:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        self.content += piece
+        return len(piece)
+
+
+def test_a_full_disk_keeps_every_whole_frame() -> None:
+    disk = FullDisk(1200)
+    writer = RawWriter(disk, {"model": "DI-2108"})  # type: ignore[arg-type]
+    pieces = [bytes([number]) * 20 for number in range(40)]
+    with pytest.raises(OSError, match="No space left"):
+        for number, piece in enumerate(pieces):
+            writer.data(0.1 * number, piece)
+    raw = read_raw(disk.content)
+    assert b"".join(pieces).startswith(raw.data)
+    described = len(disk.content) - len(disk.content.partition(b"\n")[2])
+    frame = len(Frame(b"D", 0.0, b"").packed())
+    # The description stands twice, the second time as a frame.
+    assert len(raw.data) // 20 == (1200 - 2 * described + 1 - frame) // (frame + 20)
+
+
+def test_a_full_file_system_is_one_line_and_what_was_kept_opens(tmp_path: Path) -> None:
+    raw = tmp_path / "full.raw"
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+    try:
+        with pytest.raises(InputError, match=r"can't be written .*--recover") as caught:
+            acquire_simulated("di2108", slow, rate_hz=1e3, duration_s=60.0, raw_path=raw)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, signal.SIG_DFL)
+    assert str(caught.value).startswith(str(raw))
+    recording = decode_recording(raw)
+    assert len(recording) > 8000
+    assert np.abs(recording.values - slow(recording.time_s)).max() < 3e-4
+
+
+def kill_a_recorder(raw: Path, after_s: float) -> int:
+    """Record in a process of its own, kill it, and return the size the file had before."""
+    process = os.fork()
+    if not process:
+        try:
+            acquire_simulated(
+                "di2108", slow, rate_hz=1e3, duration_s=1e6, clock_scale=50.0, raw_path=raw
+            )
+        finally:
+            os._exit(1)
+    while not raw.exists() or raw.stat().st_size < 1000:
+        time.sleep(0.005)
+    time.sleep(after_s)
+    size = raw.stat().st_size
+    os.kill(process, signal.SIGKILL)
+    os.waitpid(process, 0)
+    return size
+
+
+def test_a_killed_recorder_leaves_a_recording_that_opens(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    instants = random.Random(5)
+    for number in range(2):
+        raw, out = tmp_path / f"{number}.raw", tmp_path / f"{number}.csv"
+        size = kill_a_recorder(raw, instants.uniform(0.0, 0.3))
+        assert main(["acquire", "--recover", str(raw), "--out", str(out)]) == 0
+        assert "cut short" in capsys.readouterr().err
+        kept = read_raw(raw)
+        # Whatever had been written before is there, but for a frame half written.
+        assert raw.stat().st_size - kept.damaged_bytes >= size - 5000
+        recording = read_plain(out)
+        assert np.abs(recording.values - slow(recording.time_s)).max() < 3e-4
+    with pytest.raises(InputError, match="no raw recording is overwritten"):
+        acquire_simulated("di2108", slow, rate_hz=60.0, duration_s=1.0, raw_path=raw)
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+class Session:
+    """A DI-2108 of one channel, +-10 V."""
+
+    step_volts = 10.0 / 32768
+
+    def decode(self, data: bytes) -> Scans:
+        return plain_scans(data, 1)
+
+
+def test_the_progress_line_tells_amplitude_losses_and_breaks(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("pendpipe.acquisition.recorder._REFRESH_S", -1.0)
+    terminal = Terminal()
+    line, session = ProgressLine(terminal, 60.0), cast("Any", Session())
+    line.end()
+    assert terminal.getvalue() == ""
+    line.add(1.0, np.array([16384, -16384], dtype="<i2").tobytes(), session)
+    line.interrupt()
+    line.add(1.5, np.array([3277, -3277], dtype="<i2").tobytes(), session)
+    text = line.text(2.0)
+    assert "2.0 of 60 s, 4 scans, 2.0 Hz" in text
+    assert "amplitude 1.000 V" in text
+    assert text.endswith("0 lost, 1 break(s)")
+    line.end()
+    assert terminal.getvalue().endswith("\n")
+
+
+# Which of the kept attempts is used, and what is never taken for one.
+
+
+def kept(folder: Path, minute: int, scans: int, reason: str | None) -> Path:
+    """A raw file with so many scans, which ended for a reason or not at all."""
+    header = {
+        "model": "DI-2108",
+        "port": "COM3",
+        "channels": [1],
+        "rate_hz": 100.0,
+        "duration_s": 1.0,
+        "recorded_at": f"2026-01-01T00:{minute:02}:00+00:00",
+    }
+    stream = BytesIO()
+    writer = RawWriter(stream, header)
+    for number in range(scans):
+        writer.data(0.01 * number, b"\0\1")
+    if reason:
+        writer.event(1.0, event="stopped", reason=reason)
+    path = new_path(f"{folder}/")
+    path.write_bytes(stream.getvalue())
+    return path
+
+
+@pytest.mark.parametrize(
+    ("attempts", "chosen"),
+    [
+        # The newest complete one; without one the longest.
+        ([(100, "scans"), (100, "time"), (300, None), (300, "interrupted by the user")], 1),
+        ([(20, None), (90, "the line was lost"), (50, None)], 1),
+    ],
+)
+def test_the_best_attempt_is_used(
+    attempts: list[tuple[int, str | None]], chosen: int, tmp_path: Path
+) -> None:
+    paths = [kept(tmp_path, minute, *attempt) for minute, attempt in enumerate(attempts)]
+    assert choose(read_attempts(tmp_path.iterdir())).path == paths[chosen]
+
+
+@pytest.mark.parametrize(
+    ("events", "lost"),
+    [
+        ([("stopped", "scans")], ""),
+        ([("stopped", "interrupted by the user")], ""),
+        ([("stopped", "the line was lost")], "the line was lost"),
+        ([("stopped", "the device fell silent")], "the device fell silent"),
+        ([], ""),  # killed
+        ([("broken", "the line was lost")], "the line was lost"),  # and killed while it waited
+        ([("broken", "the line was lost"), ("restarted", "")], ""),
+        ([("stopped", "the line was lost"), ("accepted", "")], ""),
+    ],
+)
+def test_what_a_lost_line_has_ended_is_no_recording_unless_it_is_accepted(
+    events: list[tuple[str, str]], lost: str, tmp_path: Path
+) -> None:
+    path = kept(tmp_path, 1, 20, None)
+    for event, reason in events:
+        append_event(path, event=event, reason=reason)
+    assert read_raw(path).lost_line == lost
+
+
+def test_a_lost_line_is_reported_with_what_is_kept_of_what_was_asked(tmp_path: Path) -> None:
+    (attempt,) = read_attempts([kept(tmp_path, 1, 51, "the line was lost")])
+    with pytest.raises(LineLostError, match=r"COM3: the line was lost; 0\.5 s of 1 s are kept in"):
+        refuse_lost(attempt, "record anew")
+    assert LineLostError.status == 1
+    accept(attempt)
+    refuse_lost(read_raw(attempt.path), "record anew")
+
+
+def test_attempts_without_a_scan_do_not_count(tmp_path: Path) -> None:
+    """A header alone, a part of one, an empty file; a damaged file beside a sound one."""
+    kept(tmp_path, 1, 0, None)
+    (tmp_path / "part.raw").write_bytes(kept(tmp_path, 2, 0, None).read_bytes()[:20])
+    (tmp_path / "empty.raw").touch()
+    assert read_attempts(tmp_path.iterdir()) == []
+    (tmp_path / "damaged.raw").write_bytes(b"x" * 500)
+    with pytest.raises(InputError, match=r"damaged\.raw: this is no raw recording"):
+        read_attempts(tmp_path.iterdir())
+    sound = kept(tmp_path, 3, 10, None)
+    assert [one.path for one in read_attempts(tmp_path.iterdir())] == [sound]
+
+
+def test_what_is_being_recorded_is_left_alone(tmp_path: Path) -> None:
+    """A recorder may outlive a Snakemake that was killed."""
+    pytest.importorskip("fcntl", reason="this system has no such lock")
+    path = kept(tmp_path, 1, 50, None)
+    with path.open("ab") as recorder:
+        assert lock(recorder)
+        with pytest.raises(InputError, match="another process is recording into it"):
+            read_attempts([path])
+    assert len(read_attempts([path])) == 1

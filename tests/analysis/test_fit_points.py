@@ -1,19 +1,37 @@
-"""The paper's route: Eq. 14 and Eq. 8's frequency from turning points."""
+"""Fits to turning points and to amplitudes by hand, and the bounded problem beneath them."""
 
+import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from scipy.optimize import lsq_linear, minimize
 
-from pendpipe.analysis.fit.by_points import fit_envelope, fit_points
+import pendpipe as pp
+from pendpipe.analysis.fit.by_points import GRAVITY, fit_envelope, fit_points
+from pendpipe.analysis.fit.least_squares import (
+    CHI2_95,
+    Bounds,
+    bounded_least_squares,
+    bounded_step,
+    covariance,
+    intervals95,
+)
 from pendpipe.analysis.fit.period import fit_period
 from pendpipe.analysis.torque import period_excess
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
+from pendpipe.cli import main
 from pendpipe.dynamics import Eq8, Release, turning_points
+from pendpipe.estimate import Estimate
 from pendpipe.physics.decay import amplitude
+from pendpipe.recording import only_falls
+
+# The paper's route: Eq. 14 and Eq. 8's frequency from turning points.
 
 OMEGA = 2.0 * math.pi * 0.516
 
@@ -205,3 +223,295 @@ def test_no_exponential_loss_no_quality_factor() -> None:
     assert result.quality_factor_limit is None
     assert any("quality_factor_limit" in warning for warning in result.warnings)
     assert result.to_dict()["quality_factor_limit"]["value"] != 0.0
+
+
+# Small bounded problems: steps and intervals against the plain way of finding them.
+
+HALF_95 = 1.959963984540054
+ENTRY = st.floats(-2.0, 2.0)
+
+
+@given(
+    root=hnp.arrays(np.float64, (4, 4), elements=ENTRY),
+    gradient=hnp.arrays(np.float64, 4, elements=st.floats(-5.0, 5.0)),
+)
+def test_a_bounded_step_is_the_lowest_allowed_point(root, gradient) -> None:  # type: ignore[no-untyped-def]
+    normal = root @ root.T + 0.1 * np.eye(4)
+    bounds = Bounds(np.array([-0.3, -0.1, 0.0, -np.inf]), np.array([np.inf, 0.2, np.inf, np.inf]))
+    step = bounded_step(normal, gradient, bounds)
+    found = minimize(
+        lambda d: 0.5 * d @ normal @ d - gradient @ d,
+        np.array([0.0, 0.0, 0.0, 0.0]),
+        jac=lambda d: normal @ d - gradient,
+        bounds=list(zip(*bounds, strict=True)),
+        method="L-BFGS-B",
+        options={"ftol": 1e-15, "gtol": 1e-9},
+    )
+    assert np.all((bounds.lower <= step) & (step <= bounds.upper))
+    assert 0.5 * step @ normal @ step - gradient @ step <= found.fun + 1e-7
+
+
+@given(st.integers(1, 9), st.integers(0, 2**32 - 1))
+def test_least_squares_within_bounds(count: int, seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    matrix = generator.normal(size=(count + 2, count))
+    right = 10.0 * generator.normal(size=count + 2)
+    floor = np.where(generator.random(count) < 0.4, -np.inf, -generator.integers(0, 2, count))
+    ceiling = np.where(generator.random(count) < 0.4, np.inf, 3.0 * generator.random(count) + 0.1)
+    found = bounded_least_squares(matrix, right, floor, ceiling)
+    best = lsq_linear(matrix, right, (floor - 1e-9, ceiling + 1e-9), method="bvls").x
+    assert np.all((found >= floor) & (found <= ceiling))
+    cost, least = (float(np.sum((matrix @ x - right) ** 2)) for x in (found, best))
+    assert cost == pytest.approx(least, rel=1e-5, abs=1e-6)
+
+
+def test_far_from_bounds_the_interval_is_symmetric() -> None:
+    normal = np.array([[4.0, 1.0], [1.0, 2.0]])
+    value = np.array([100.0, 80.0])
+    bounds = Bounds(np.zeros(2), np.full(2, np.inf))
+    sd = math.sqrt(np.linalg.inv(normal)[0, 0])
+    low, high = intervals95(value, normal, np.zeros(2), bounds, [0])[0]
+    assert (low, high) == pytest.approx((100.0 - HALF_95 * sd, 100.0 + HALF_95 * sd))
+
+
+def test_one_parameter_near_its_bound_keeps_the_upper_end() -> None:
+    """At 0.5 sd the lower end is the bound, the upper that of the free estimate."""
+    bounds = Bounds(np.zeros(1), np.full(1, np.inf))
+    ends = intervals95(np.array([0.5]), np.eye(1), np.zeros(1), bounds, [0])
+    assert ends[0] == pytest.approx((0.0, 0.5 + HALF_95))
+
+
+def test_at_the_bound_the_slope_shortens_the_interval() -> None:
+    """Minimum at -1 outside: chi^2 = (x + 1)^2 - 1 rises by 3.84 at sqrt(4.84) - 1."""
+    bounds = Bounds(np.zeros(1), np.full(1, np.inf))
+    ends = intervals95(np.zeros(1), np.eye(1), np.array([-1.0]), bounds, [0])
+    assert ends[0] == pytest.approx((0.0, math.sqrt(1.0 + HALF_95**2) - 1.0), abs=1e-3)
+
+
+def test_intervals_cover_the_truth_on_the_bound() -> None:
+    """In truth c = 0, correlated with b: at least 95 % of the intervals hold both."""
+    rng = np.random.default_rng(5)
+    normal = np.array([[1.0, 0.8], [0.8, 1.0]])
+    root = np.linalg.cholesky(normal)
+    bounds = Bounds(np.array([0.0, 0.0]), np.full(2, np.inf))
+    truth = np.array([1.0, 0.0])
+    held = np.zeros(2)
+    for _ in range(1000):
+        score = root @ rng.standard_normal(2)
+        start = bounded_step(normal, score, bounds.about(truth))
+        value, gradient = truth + start, score - normal @ start
+        for j, (low, high) in enumerate(intervals95(value, normal, gradient, bounds, [0, 1])):
+            held[j] += low <= truth[j] <= high
+    assert np.all(held > 1000 * 0.95 - 3.0 * math.sqrt(1000 * 0.95 * 0.05))
+
+
+def test_what_readings_do_not_tell_apart_stays_within_its_bounds() -> None:
+    """Rounding makes such a matrix indefinite by a little: it is no error of the user."""
+    column = np.array([1.0, 2.0, 3.0])
+    normal = np.outer(column, column) - 1e-9 * np.diag([1.0, -1.0, 1.0])
+    bounds = Bounds(np.array([-0.1, -np.inf, -0.1]), np.array([0.1, np.inf, 0.1]))
+    step = bounded_step(normal, 5.0 * column, bounds)
+    assert np.all((step >= bounds.lower) & (step <= bounds.upper))
+    assert column @ step == pytest.approx(5.0, rel=1e-4)
+
+
+@given(
+    root=hnp.arrays(np.float64, (3, 3), elements=ENTRY),
+    score=hnp.arrays(np.float64, 3, elements=st.floats(-5.0, 5.0)),
+    room=hnp.arrays(np.float64, 3, elements=st.floats(0.0, 2.0)),
+)
+def test_at_its_ends_chi2_has_risen_by_3_84_however_the_others_follow(root, score, room) -> None:  # type: ignore[no-untyped-def]
+    normal = root @ root.T + 0.1 * np.eye(3)
+    bounds = Bounds(np.zeros(3), np.array([np.inf, np.inf, 2.5]))
+    start = bounded_step(normal, score, bounds.about(room))
+    value, gradient = room + start, score - normal @ start
+    for j, ends in enumerate(intervals95(value, normal, gradient, bounds, range(3))):
+        for end in ends:
+            moved = np.zeros(3)
+            moved[j] = end - value[j]
+            left = bounded_step(normal, gradient - normal @ moved, bounds.about(value), (j,))
+            step = moved + left
+            risen = float(step @ normal @ step - 2.0 * gradient @ step)
+            at_wall = min(abs(end - bounds.lower[j]), abs(end - bounds.upper[j])) < 1e-9
+            assert risen <= HALF_95**2 + 1e-4 if at_wall else abs(risen - HALF_95**2) < 1e-4
+
+
+def test_what_is_held_has_no_variance() -> None:
+    normal = np.array([[4.0, 1.0], [1.0, 2.0]])
+    assert np.array_equal(covariance(normal, [1]), np.array([[0.25, 0.0], [0.0, 0.0]]))
+
+
+def test_an_interval_is_right_where_the_others_are_not_quite_at_their_best() -> None:
+    """What follows is pulled from the beginning on."""
+    normal, gradient = np.array([[1.0, 0.5], [0.5, 1.0]]), np.array([-1.0, 0.4])
+    value, bounds = np.array([0.0, 5.0]), Bounds(np.zeros(2), np.full(2, np.inf))
+    ((_, high),) = intervals95(value, normal, gradient, bounds, [0])
+    moved = np.array([high, 0.0])
+    step = moved + bounded_step(normal, gradient - normal @ moved, bounds.about(value), (0,))
+    assert step @ normal @ step - 2.0 * gradient @ step == pytest.approx(CHI2_95)
+
+
+# Eq. 14 on amplitudes alone: by hand with a ruler, speeds at a gate, our table of turning points.
+#
+# A viscous decay of 200 s: half-life 138.6 s, and Q = pi 200 s/T.
+
+TAU = 200.0
+TIME = 30.0 * np.arange(12)
+FALL = np.exp(-TIME / TAU)
+
+
+def rows(head: str, values: FloatArray, form: str = "{:.0f},{:.2f}\n") -> str:
+    return head + "".join(form.format(t, y) for t, y in zip(TIME, values, strict=True))
+
+
+SIDE = np.where(np.arange(12) % 2, -1.0, 1.0)
+LAYOUTS = {
+    "ruler in cm": (rows("t (s),amplitude (cm)\n", 20 * FALL), 0.2, "m"),
+    "no header": (rows("", 20 * FALL, "{:.0f} {:.2f}\n"), 20.0, "1"),
+    "degrees": (
+        rows("time\tangle [deg]\n", 20 * FALL, "{:.0f}\t{:.2f}\n"),
+        math.radians(20),
+        "rad",
+    ),
+    "decimal commas": (
+        rows("t/s;A/cm\n", 20 * FALL, "{:.0f};{:.2f}\n").replace(".", ","),
+        0.2,
+        "m",
+    ),
+    "the plain form": (rows("time_s,angle_rad\n", 0.2 * FALL, "{:.0f},{:.5f}\n"), 0.2, "rad"),
+    "a gate": (rows("Time (s),Speed (m/s)\n", 0.9 * FALL, "{:.3f},{:.4f}\n"), 0.9, "m/s"),
+    "both sides, off the zero": (rows("t,deg\n", 20 * SIDE * FALL + 0.3), math.radians(20), "rad"),
+}
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_amplitudes_of_every_layout_tell_the_half_life(tmp_path: Path, name: str) -> None:
+    content, first, unit = LAYOUTS[name]
+    (tmp_path / "by-hand.csv").write_text(content)
+    fit = pp.fit(tmp_path / "by-hand.csv")
+    assert (fit.method, fit.light, fit["amplitude"].unit) == ("amplitudes", "green", unit)
+    assert abs(fit["amplitude"].value / first - 1.0) < 0.01
+    assert abs(fit.damping()["half_life_s"].value / (TAU * math.log(2.0)) - 1.0) < 0.01
+    assert fit["Q"].value != fit["Q"].value
+    written = fit.to_dict()
+    assert any("frequency, phase and noise_rms_rad" in said for said in written["warnings"])
+    assert all(math.isnan(written["parameters"][key]["value"]) for key in ("frequency", "phase"))
+    assert math.isnan(written["noise_rms_rad"])
+    assert "--period" in str(fit)
+
+
+def test_a_period_gives_q_with_its_error(tmp_path: Path) -> None:
+    time = np.linspace(0.0, 400.0, 40)
+    angle = 0.2 * np.exp(-time / TAU) + 1e-4 * np.random.default_rng(1).normal(size=40)
+    fit = pp.fit(time, angle, period=Estimate(1.42, 0.01, "s"))
+    assert abs(fit["Q"].value / (math.pi * TAU / 1.42) - 1.0) < 0.01
+    assert fit["period"].value == pytest.approx(1.42)
+    assert fit["period"].sd == pytest.approx(0.01)
+    assert "Q" in fit.quotable
+    assert "period" not in fit.quotable
+    same = pp.fit(time, angle, fixed={"frequency": 1.0 / 1.42})
+    assert same["Q"].value == pytest.approx(fit["Q"].value)
+    assert np.max(np.abs(fit.residual)) < 5e-4
+
+
+def test_the_command_takes_period_or_frequency(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "ruler.csv"
+    file.write_text(LAYOUTS["ruler in cm"][0])
+    found = []
+    for option in (["--period", "1.25"], ["--frequency", "0.8"], []):
+        assert main(["fit", str(file), "--json", *option]) == 0
+        found.append(json.loads(capsys.readouterr().out))
+    assert found[0]["quality_factors"] == found[1]["quality_factors"]
+    assert found[2]["parameters"]["frequency"]["value"] is None
+    assert found[2]["noise_rms_rad"] is None
+    assert found[2]["quality_factors"][0]["value"] is None
+    assert found[2]["damping"]["half_life_s"]["value"] == pytest.approx(138.6, rel=0.01)
+
+
+def test_a_length_makes_angles_of_speeds_and_of_positions() -> None:
+    """At the bottom v = 2 sqrt(g l) sin(A/2); on a ruler x = l sin A."""
+    angle, length = 0.9 * FALL, 0.5
+    speeds = 2.0 * math.sqrt(GRAVITY * length) * np.sin(0.5 * angle)
+    told = {"metadata": {"unit": "m/s"}, "quantity": "reading"}
+    gate = pp.Recording(time_s=TIME, values=speeds, **told)
+    assert any("--length" in said for said in pp.fit(gate).warnings)
+    for recording in (gate, pp.Recording(time_s=TIME, displacement_m=length * np.sin(angle))):
+        fit = pp.fit(recording, length_m=length)
+        assert fit["amplitude"].unit == "rad"
+        assert abs(fit["amplitude"].value - 0.9) < 1e-6
+        assert abs(fit["b"].value * TAU - 1.0) < 1e-4
+
+
+def test_fewer_than_five_amplitudes_are_refused() -> None:
+    with pytest.raises(pp.InputError, match="4 amplitudes tell no a, b and c; give 5 or more"):
+        pp.fit(TIME[:4], FALL[:4])
+    assert pp.fit(TIME[:5], FALL[:5])["b"].value > 0.0
+
+
+def test_a_swing_is_not_asked_for_its_period() -> None:
+    with pytest.raises(pp.InputError, match="the recording shows its own"):
+        pp.fit("examples/rod-pendulum.csv", period=1.2)
+
+
+def test_amplitudes_are_no_recording_of_the_swing() -> None:
+    with pytest.raises(pp.InputError, match=r"pendpipe fit takes Eq\. 14 of them"):
+        pp.diagnose(pp.Recording(time_s=TIME, angle_rad=FALL))
+
+
+def test_the_errors_of_a_b_and_the_half_life_cover_the_truth() -> None:
+    """Fourteen amplitudes with all three losses, read to 0.5 % of the first, 120 times."""
+    a, b, c = 0.01, 0.004, 1e-4
+    time, rng = 20.0 * np.arange(14), np.random.default_rng(7)
+    true = np.asarray(amplitude(time, 0.3, a, b, c))
+    within = np.zeros(3)
+    for _ in range(120):
+        fit = pp.fit(time, true + 1.5e-3 * rng.normal(size=14))
+        large = fit.quality_factors[0]
+        loss = a * large.amplitude_rad + b + c / large.amplitude_rad
+        life = large.damping_time_s
+        within += [
+            abs(life.value - 1.0 / loss) < 1.96 * life.sd,
+            fit["a"].bounds95[0] <= a <= fit["a"].bounds95[1],
+            fit["b"].bounds95[0] <= b <= fit["b"].bounds95[1],
+        ]
+    assert np.all(within / 120 > 0.90)
+
+
+def test_a_table_of_turning_points_has_its_period(tmp_path: Path) -> None:
+    table = tmp_path / "turned.csv"
+    assert main(["turning-points", "examples/rod-pendulum.csv", "--out", str(table)]) == 0
+    fit, whole = pp.fit(table), pp.fit("examples/rod-pendulum.csv")
+    assert fit.method == "turning-points"
+    assert abs(fit["period"].value - whole["period"].value) < 3.0 * whole["period"].sd
+    assert abs(fit["Q"].value / whole["Q"].value - 1.0) < 0.01
+
+
+REST = 1e-3 * np.random.default_rng(1).standard_normal(90000)
+
+
+@pytest.mark.parametrize(
+    ("values", "falls"),
+    [
+        (FALL, True),
+        (np.repeat(FALL, 2), True),
+        (FALL * SIDE, True),
+        (np.linspace(1.0, 0.0, 50), True),
+        (np.exp(-np.arange(200) / 120) + 0.004 * np.sin(7e3 * np.arange(200) ** 2), True),
+        (np.exp(-np.arange(500) / 100) * np.cos(0.3 * np.arange(500)), False),
+        (np.linspace(5.0, 1.0, 500) + 0.2 * np.cos(0.3 * np.arange(500)), False),
+        (np.linspace(5.0, 1.0, 500) + 0.02 * np.cos(0.3 * np.arange(500)), False),
+        (
+            np.exp(-np.arange(2400) / 1000) * np.cos(0.2 * np.arange(2400))
+            + 0.03 * np.sin(7e3 * np.arange(2400) ** 2)
+            + 20.0 * (np.arange(2400) == 900),
+            False,
+        ),
+        (np.exp(-np.arange(90000) / 300) * np.cos(0.06 * np.arange(90000)) + REST, False),
+        (FALL[:3], False),
+        (np.ones(20), False),
+    ],
+)
+def test_only_a_fall_without_swings_is_of_amplitudes(values: FloatArray, falls: bool) -> None:
+    assert only_falls(values) is falls

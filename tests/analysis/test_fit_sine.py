@@ -26,7 +26,7 @@ from pendpipe.estimate import Estimate
 from pendpipe.files import read_json
 from pendpipe.recording import Recording
 
-from .test_decrement import SHARED, pendulum, recorded
+from .test_one_fit import SHARED, pendulum, recorded
 
 OMEGA = 5.0
 TIME = np.arange(0.0, 120.0, 0.02)

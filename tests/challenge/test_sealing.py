@@ -1,18 +1,27 @@
-"""Sealing: the solver sees recordings and nothing else; nothing can be changed unseen."""
-
+"""Sealed sets, from the command to the page."""
 # ruff: noqa: ARG005
+
+import importlib.metadata
 import json
+import os
 import shutil
+import subprocess
 import sys
+import tomllib
+from collections.abc import Callable
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pendpipe import cli
 from pendpipe.errors import InputError
 from pendpipe_challenge import causes, command, items, sets
 from pendpipe_challenge.items import Item, make_item
-from pendpipe_challenge.sets import Places, answer_path, make_set, open_set, solve_set
+from pendpipe_challenge.sets import Places, answer_path, make_set, open_set, process_pool, solve_set
+
+# Sealing: the solver sees recordings and nothing else; nothing can be changed unseen.
 
 ENTER = sets.enter
 NULL = {"family": "null", "effects": [], "delta_chi2": []}
@@ -47,6 +56,7 @@ report = {
     "verdict": "consistent", "p_value": 0.5, "effects": [], "report": report,
 }))
 """
+
 
 # The released diagnosis, with everything that it opens written into its answer.
 WATCHED = """
@@ -254,3 +264,116 @@ def test_the_command_says_what_is_missing(tmp_path: Path, capsys: pytest.Capture
     arguments = parser.parse_args(["score", str(tmp_path), "--out", str(tmp_path)])
     with pytest.raises(InputError, match="not opened"):
         command.run(arguments)
+
+
+# The makers of items stand beside each other: each keeps to one thread.
+
+TASKS = Path("/proc/self/task")
+
+
+@pytest.mark.skipif(not TASKS.exists(), reason="no /proc to count a process's threads in")
+def test_linear_algebra_in_a_worker_takes_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    # As Snakemake has it for a rule of four threads.
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "4")
+    monkeypatch.setenv("OMP_NUM_THREADS", "4")
+    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
+    with process_pool(1) as pool:
+        pool.submit(np.linalg.inv, np.eye(400)).result()
+        assert len(pool.submit(os.listdir, str(TASKS)).result()) == 1
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "4"
+    assert "MKL_NUM_THREADS" not in os.environ
+
+
+# The challenge's rules: four jobs of their own, none in the campaign.
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.slow
+def test_the_challenge_is_four_jobs_and_its_target(tmp_path: Path) -> None:
+    for name in ("Snakefile", "config", "workflow", "profiles"):
+        source = ROOT / name
+        copy = shutil.copytree if source.is_dir() else shutil.copy
+        copy(source, tmp_path / name)
+    run = subprocess.run(
+        [sys.executable, "-m", "snakemake", "challenge", "-n", "--nolock", "--cores", "2"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    said = run.stdout + run.stderr
+    assert run.returncode == 0, said
+    jobs = {line.split()[0] for line in said.splitlines() if line.startswith("challenge")}
+    assert {"challenge_make", "challenge_solve", "challenge_open", "challenge_score"} <= jobs
+    assert "acquire" not in said
+
+
+# `pendpipe challenge` comes with the package beside the library, and only with it.
+
+GROUP = "pendpipe.commands"
+Install = Callable[..., None]
+
+
+@pytest.fixture
+def install(monkeypatch: pytest.MonkeyPatch) -> Install:
+    """Have exactly these commands come from other packages."""
+
+    def only(*found: EntryPoint) -> None:
+        def entry_points(*, group: str) -> tuple[EntryPoint, ...]:
+            assert group == GROUP
+            return found
+
+        monkeypatch.setattr(importlib.metadata, "entry_points", entry_points)
+
+    return only
+
+
+def declared() -> EntryPoint:
+    """The challenge's command as its own package declares it."""
+    with (ROOT / "challenge" / "pyproject.toml").open("rb") as stream:
+        (entry,) = tomllib.load(stream)["project"]["entry-points"][GROUP].items()
+    return EntryPoint(*entry, GROUP)
+
+
+def called(words: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    try:
+        status = cli.main(words)
+    except SystemExit as ended:
+        status = int(str(ended.code))
+    return status, *capsys.readouterr()
+
+
+def test_without_its_package_the_command_says_what_installs_it(
+    install: Install, capsys: pytest.CaptureFixture[str]
+) -> None:
+    install()
+    status, _, line = called(["challenge", "make", "set"], capsys)
+    assert status == 2
+    assert "not installed" in line
+    assert "pip install --editable ./challenge" in line
+    assert line.count("\n") == 1
+
+
+def test_help_lists_the_command_where_it_is_installed_and_nowhere_else(
+    install: Install, capsys: pytest.CaptureFixture[str]
+) -> None:
+    install()
+    assert "challenge" not in called(["--help"], capsys)[1]
+    install(declared())
+    assert "\n  challenge " in called(["--help"], capsys)[1]
+
+
+def test_a_call_that_cannot_be_understood_is_one_line(
+    install: Install, capsys: pytest.CaptureFixture[str]
+) -> None:
+    install(declared())
+    words = ["challenge", "make", "d", "--sealed", "s", "--items", "x"]
+    status, _, line = called(words, capsys)
+    assert status == 2
+    assert "'x' is no whole number" in line
+    assert line.count("\n") == 1
+
+
+def test_the_wheel_of_the_library_leaves_the_challenge_out() -> None:
+    assert not list((ROOT / "src").rglob("*challenge*.py"))

@@ -1,8 +1,9 @@
-"""`pendpipe fit` answers: one recording or many, as a summary, a table, JSON or a figure."""
+"""The commands that fit and print."""
 
 import io
 import json
 import math
+import re
 import sys
 from pathlib import Path
 
@@ -10,14 +11,14 @@ import numpy as np
 import pytest
 
 import pendpipe.api as pp
-from pendpipe import cli
+from pendpipe import cli, manifest
 from pendpipe.quantities import with_error
 from pendpipe.recording import write_plain
 
+# `pendpipe fit` answers: one recording or many, as a summary, a table, JSON or a figure.
+
 ROOT = Path(__file__).parents[2]
 ROD, STRING = (str(ROOT / f"examples/{name}-pendulum.csv") for name in ("rod", "string"))
-
-
 VISCOUS = {
     "pendulum": {"frequency_hz": 0.7, "quality_factor_viscous": 100.0, "release_angle_rad": 0.1},
     "sampling": {"sample_rate_hz": 50.0, "duration_s": 60.0},
@@ -177,3 +178,83 @@ def test_a_file_that_is_no_calibration_is_refused_in_a_line(
     assert cli.main(["fit", str(recording), "--calibration", str(calibration)]) == 2
     said = capsys.readouterr().err.splitlines()[-1]
     assert said == f"pendpipe: {calibration}: this is no calibration; run pendpipe calibrate"
+
+
+# Every command that answers prints one JSON object where it is asked to.
+
+
+@pytest.mark.parametrize(
+    ("command", "key"),
+    [
+        (["inspect", ROD], "sample_rate_hz"),
+        (["fit", ROD], "decrement_check"),
+        (["diagnose", ROD], "verdict"),
+        (["effects"], "effects"),
+        (["doctor", "{folder}"], "findings"),
+        (["calibrate", "{table}"], "volts_per_radian"),
+    ],
+)
+def test_a_commands_answer_is_one_json_object(
+    command: list[str], key: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = tmp_path / "caliper.csv"
+    rows = [f"{0.01 * step},{0.0385 * step + 0.001 * (step % 2)}" for step in range(-5, 6)]
+    table.write_text("angle_rad,volts\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    results = tmp_path / "results"
+    results.mkdir()
+    with manifest.job(results, "separate") as written:
+        (results / "separation.json").write_text("{}", encoding="utf-8")
+        written.append(results / "separation.json")
+    words = [word.format(folder=results, table=table) for word in command]
+    assert cli.main([*words, "--json"]) == 0
+    assert key in json.loads(capsys.readouterr().out)
+
+
+# `pendpipe page` writes one file that needs nothing outside itself.
+
+ROD_FILE = Path(__file__).parents[2] / "examples/rod-pendulum.csv"
+
+
+def test_one_page_holds_the_fit_and_refers_to_nothing_outside(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "rod.html"
+    assert cli.main(["page", str(ROD_FILE), "--out", str(page), "--no-diagnosis"]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert "dry friction" in text
+    assert "<svg" in text
+    assert re.search(r"T0? = \(1\.14547\d+ ± 0\.0+\d+\) s", text)
+    assert not re.findall(r'(?:src|href)="(?!#|data:image/png)[^"]*"', text)
+    assert str(tmp_path) not in text
+    assert str(ROD_FILE.parent) not in text
+
+
+def test_a_name_in_the_page_is_text_and_no_markup(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    odd = tmp_path / "<b>rod&.csv"
+    odd.write_bytes(ROD_FILE.read_bytes())
+    assert cli.main(["page", str(odd), "--out", "-", "--no-diagnosis"]) == 0
+    assert "&lt;b&gt;rod&amp;.csv" in capsys.readouterr().out
+
+
+def test_a_diagnosis_stands_on_the_page_unless_it_is_not_wanted(tmp_path: Path) -> None:
+    page = tmp_path / "rod.html"
+    assert cli.main(["page", str(ROD_FILE), "--out", str(page)]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert "Nothing is missing" in text
+    assert text.count("How to read it.") >= 3
+
+
+def test_several_recordings_get_a_page_each_and_a_table_that_links_to_them(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.csv"
+    bad.write_text("time_s,angle_rad\n0,0\n1,0\n", encoding="utf-8")
+    out = tmp_path / "class.html"
+    asked = ["page", str(ROD_FILE), str(ROD_FILE.with_name("string-pendulum.csv")), str(bad)]
+    assert cli.main([*asked, "--no-diagnosis", "--out", str(out)]) == 0
+    text = out.read_text(encoding="utf-8")
+    links = re.findall(r'href="([^"]+)"', text)
+    assert len(links) == 2
+    assert all((tmp_path / link).is_file() for link in links)
+    assert "refused" in text
+    assert cli.main(["page", str(ROD_FILE), "--out", str(tmp_path / "rod.pdf")]) == 2

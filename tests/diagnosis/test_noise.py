@@ -1,6 +1,8 @@
-"""The noise of the readings: its variance and colour, whatever the motion's misfit."""
+"""Noise: its colour, its level, lines and wander."""
 
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,15 +10,37 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.fft import idct
 from scipy.signal import lfilter
-from scipy.stats import chi2
+from scipy.stats import binom, chi2, kstest
 
+from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.forensics.colour import note_wander
+from pendpipe.diagnosis.forensics.evidence import Evidence
+from pendpipe.diagnosis.forensics.tracking import rows_of, wander, wander_confirmed
 from pendpipe.diagnosis.noise import Noise, white_noise
 from pendpipe.diagnosis.noise_estimate import _about_lines, estimate_noise, stands_out
+from pendpipe.diagnosis.run import diagnose_recording
+from pendpipe.diagnosis.spectrum import Band, ToneScan, tone_scan
+from pendpipe.formats import read
+from pendpipe.recording import Recording, read_plain, write_plain
 
-COUNT, INTERVAL_S, MOTION_HZ = 1500, 1.0 / 15.0, 0.9
-FREQUENCY_HZ = np.arange(COUNT) / (2.0 * COUNT * INTERVAL_S)
+from .records import (
+    FREQUENCY_HZ,
+    INTERVAL_S,
+    NOISE_RAD,
+    TIME_S,
+    TRUTH,
+    null_fit,
+    other_engine,
+    recording,
+    white,
+)
+
+# The noise of the readings: its variance and colour, whatever the motion's misfit.
+
+COUNT = 1500
+LINES_HZ = np.arange(COUNT) / (2.0 * COUNT * INTERVAL_S)
 
 
 def data_of(readings: FloatArray) -> Data:
@@ -25,16 +49,16 @@ def data_of(readings: FloatArray) -> Data:
 
 
 def estimated(readings: FloatArray) -> Noise:
-    return estimate_noise(data_of(readings), readings, MOTION_HZ, 0.0)
+    return estimate_noise(data_of(readings), readings, FREQUENCY_HZ, 0.0)
 
 
-def white(generator: np.random.Generator) -> FloatArray:
+def drawn(generator: np.random.Generator) -> FloatArray:
     return 2.5e-4 * generator.standard_normal(COUNT)
 
 
 def red(generator: np.random.Generator) -> FloatArray:
     """Spectrum 1 + 8 (0.05 Hz/f)^1.5 over the white part."""
-    spectrum = 1.0 + 8.0 * (0.05 / np.maximum(FREQUENCY_HZ, FREQUENCY_HZ[1])) ** 1.5
+    spectrum = 1.0 + 8.0 * (0.05 / np.maximum(LINES_HZ, LINES_HZ[1])) ** 1.5
     cosines = np.sqrt(spectrum) * generator.standard_normal(COUNT)
     return np.asarray(2.5e-4 * idct(cosines, norm="ortho"))
 
@@ -47,12 +71,12 @@ def low_pass(generator: np.random.Generator) -> FloatArray:
 
 @given(st.integers(0, 2**32 - 1), st.booleans(), st.booleans(), st.integers(2, 60))
 def test_weights_of_readings_are_the_transpose_of_whitening(
-    seed: int, white: bool, changing: bool, count: int
+    seed: int, drawn: bool, changing: bool, count: int
 ) -> None:
     """<W x, y> = <x, W^T y>, masks and levels included."""
     generator = np.random.default_rng(seed)
     weight = (generator.random(count) > 0.2).astype(float)
-    variance = np.ones(count) if white else generator.uniform(0.1, 9.0, count)
+    variance = np.ones(count) if drawn else generator.uniform(0.1, 9.0, count)
     level = generator.uniform(0.3, 3.0, count) if changing else None
     noise = Noise(variance, weight, level)
     x, y = generator.standard_normal((2, count, 3))
@@ -62,7 +86,7 @@ def test_weights_of_readings_are_the_transpose_of_whitening(
     np.testing.assert_allclose(noise.adjoint(y[:, 0]), noise.adjoint(y)[:, 0], atol=1e-12)
 
 
-@pytest.mark.parametrize("made", [white, red, low_pass])
+@pytest.mark.parametrize("made", [drawn, red, low_pass])
 def test_noise_of_any_colour_is_made_white(
     made: Callable[[np.random.Generator], FloatArray],
 ) -> None:
@@ -70,14 +94,14 @@ def test_noise_of_any_colour_is_made_white(
     records = [made(np.random.default_rng(seed)) for seed in range(10)]
     squares = np.array([estimated(readings).whiten(readings) ** 2 for readings in records])
     for low in (0.1, 0.2, 0.4, 0.8, 1.6, 3.2):
-        octave = (low <= FREQUENCY_HZ) & (2.0 * low > FREQUENCY_HZ)
+        octave = (low <= LINES_HZ) & (2.0 * low > LINES_HZ)
         inside = squares[:, octave]
         assert inside.mean() == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / inside.size))
 
 
 def test_white_noise_has_one_variance_known_as_well_as_it_can_be() -> None:
     """Of n squares ln S has the variance 2/n; the harmonics' bands and the doubt cost some."""
-    found = [estimated(white(np.random.default_rng(seed))) for seed in range(30)]
+    found = [estimated(drawn(np.random.default_rng(seed))) for seed in range(30)]
     assert np.mean([noise.coloured for noise in found]) < 0.2
     assert np.mean([noise.level is not None for noise in found]) < 0.2
     flat = [noise for noise in found if not noise.coloured and noise.level is None]
@@ -98,9 +122,7 @@ def test_a_column_at_low_frequency_meets_less_certain_noise() -> None:
 
 def test_what_the_uncertainty_of_red_noise_says_comes_true() -> None:
     """(ln S - ln S true)/sd is a standard normal number, in the middle of each octave."""
-    true = np.log(
-        (2.5e-4) ** 2 * (1.0 + 8.0 * (0.05 / np.maximum(FREQUENCY_HZ, FREQUENCY_HZ[1])) ** 1.5)
-    )
+    true = np.log((2.5e-4) ** 2 * (1.0 + 8.0 * (0.05 / np.maximum(LINES_HZ, LINES_HZ[1])) ** 1.5))
     pulls = []
     for seed in range(30):
         noise = estimated(red(np.random.default_rng(seed)))
@@ -116,7 +138,7 @@ def test_a_level_that_changes_along_the_record_is_followed(end: float) -> None:
     level = np.linspace(1.0, end, COUNT)
     squares = []
     for seed in range(8):
-        readings = level * white(np.random.default_rng(seed))
+        readings = level * drawn(np.random.default_rng(seed))
         noise = estimated(readings)
         assert noise.level is not None
         squares.append((readings * noise.scale) ** 2)
@@ -134,17 +156,17 @@ def test_heavy_tails_are_hardly_a_change_of_the_level() -> None:
 
 def test_a_red_part_may_be_forbidden() -> None:
     readings = red(np.random.default_rng(1))
-    noise = estimate_noise(data_of(readings), readings, MOTION_HZ, 0.0, red=False)
+    noise = estimate_noise(data_of(readings), readings, FREQUENCY_HZ, 0.0, red=False)
     assert noise.variance[1] < 0.5 * estimated(readings).variance[1]
 
 
 def test_a_misfit_about_the_harmonics_is_not_noise() -> None:
     """A misfit three times the noise, that comes and goes, changes the estimate by 1 % at most."""
-    readings = white(np.random.default_rng(5))
+    readings = drawn(np.random.default_rng(5))
     times = np.arange(COUNT) * INTERVAL_S
     swell = np.sin(np.pi * times / times[-1]) ** 2
-    misfit = 7.5e-4 * swell * np.cos(2.0 * np.pi * MOTION_HZ * times)
-    misfit += 4e-4 * swell * np.cos(4.0 * np.pi * MOTION_HZ * times)
+    misfit = 7.5e-4 * swell * np.cos(2.0 * np.pi * FREQUENCY_HZ * times)
+    misfit += 4e-4 * swell * np.cos(4.0 * np.pi * FREQUENCY_HZ * times)
     assert estimated(readings + misfit).rms == pytest.approx(estimated(readings).rms, rel=0.01)
 
 
@@ -193,21 +215,21 @@ def test_a_resonance_is_seldom_a_line_and_never_beside_a_harmonic(
 
 @pytest.mark.parametrize("scale", [1e-9, 0.3, 1e3])
 def test_the_noise_follows_the_unit(scale: float) -> None:
-    readings = white(np.random.default_rng(7))
+    readings = drawn(np.random.default_rng(7))
     assert estimated(scale * readings).rms == pytest.approx(
         scale * estimated(readings).rms, rel=1e-3
     )
 
 
 def test_the_noise_is_never_below_the_floor() -> None:
-    readings = white(np.random.default_rng(8))
-    noise = estimate_noise(data_of(readings), readings, MOTION_HZ, 1e-2)
+    readings = drawn(np.random.default_rng(8))
+    noise = estimate_noise(data_of(readings), readings, FREQUENCY_HZ, 1e-2)
     assert noise.rms == pytest.approx(1e-2)
 
 
 def test_a_counter_errs_in_time_so_its_angles_err_where_it_is_fast() -> None:
     times = np.arange(COUNT) * INTERVAL_S
-    speed = np.cos(2.0 * np.pi * MOTION_HZ * times)
+    speed = np.cos(2.0 * np.pi * FREQUENCY_HZ * times)
     variance = white_noise(data_of(speed), 1e-3, speed).sd ** 2
     assert variance[np.abs(speed).argmax()] > 4.0 * variance[np.abs(speed).argmin()]
     assert np.all(variance > 0.0)
@@ -216,12 +238,12 @@ def test_a_counter_errs_in_time_so_its_angles_err_where_it_is_fast() -> None:
 def test_a_counters_errors_are_white_once_divided_by_their_level() -> None:
     """A row a count: fewer rows in a cycle as the swings become smaller, and errors in time."""
     fine = np.linspace(0.0, 100.0, 400_000)
-    angle = np.exp(-0.01 * fine) * np.cos(2.0 * np.pi * MOTION_HZ * fine)
+    angle = np.exp(-0.01 * fine) * np.cos(2.0 * np.pi * FREQUENCY_HZ * fine)
     times = fine[1:][np.diff(np.floor(angle / 0.02)) != 0.0]
     speed = np.interp(times, fine, np.gradient(angle, fine))
     error = 1e-3 * speed * np.random.default_rng(2).standard_normal(len(times))
     data = Data(times, error, float(np.median(np.diff(times))), False, np.ones(len(times)))
-    noise = estimate_noise(data, error, MOTION_HZ, 0.0, slope=speed)
+    noise = estimate_noise(data, error, FREQUENCY_HZ, 0.0, slope=speed)
     assert not noise.coloured
     fast = np.abs(speed) > np.median(np.abs(speed))
     squares = noise.whiten(error) ** 2
@@ -233,12 +255,12 @@ def test_uneven_readings_are_whitened_as_they_follow_each_other() -> None:
     readings = low_pass(generator)
     times = np.arange(COUNT) * INTERVAL_S + 0.3 * INTERVAL_S * generator.uniform(-1.0, 1.0, COUNT)
     data = Data(times, readings, INTERVAL_S, False, np.ones(COUNT))
-    white = estimate_noise(data, readings, MOTION_HZ, 0.0).whiten(readings)
-    for part in np.split(white**2, 5):
+    drawn = estimate_noise(data, readings, FREQUENCY_HZ, 0.0).whiten(readings)
+    for part in np.split(drawn**2, 5):
         assert np.mean(part) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 * 5.0 / COUNT))
 
 
-@pytest.mark.parametrize("made", [white, red, low_pass])
+@pytest.mark.parametrize("made", [drawn, red, low_pass])
 def test_a_misfit_stands_out_of_noise_of_any_colour(
     made: Callable[[np.random.Generator], FloatArray],
 ) -> None:
@@ -247,7 +269,7 @@ def test_a_misfit_stands_out_of_noise_of_any_colour(
     noise = estimated(readings)
     assert noise.misfit(noise.whiten(readings)) == pytest.approx(1.0, abs=0.5)
     times = np.arange(COUNT) * INTERVAL_S
-    wrong = readings + 5e-4 * np.sin(2.0 * np.pi * MOTION_HZ * times)
+    wrong = readings + 5e-4 * np.sin(2.0 * np.pi * FREQUENCY_HZ * times)
     assert noise.misfit(noise.whiten(wrong)) > 3.0
 
 
@@ -256,3 +278,200 @@ def test_a_square_stands_out_where_a_line_is_likelier_than_noise() -> None:
     ratio = np.linspace(0.01, 60.0, 6000)
     noise = ratio * chi2(1).pdf(ratio)
     assert np.array_equal(stands_out(ratio), (noise < 1e-3 / 20.0) & (ratio > 1.0))
+
+
+# Tones of any frequency: a line stands out of what lies beside it, a resonance does not.
+
+LINE_HZ = 3.3
+
+
+def scanned(readings: FloatArray, decay_s: float = np.inf) -> tuple[ToneScan, FloatArray]:
+    """A scan of readings for tones, steady or fading, and the chi^2 of each frequency."""
+    fit, data, noise = null_fit()
+    basis = np.linalg.qr(fit.jacobian[:, list(fit.free)])[0]
+    scan = tone_scan(data, noise, basis, decay_s, Band(0.1, FREQUENCY_HZ))
+    whitened = np.append(noise.whiten(readings), 0.0)
+    whitened -= basis @ (basis.T @ whitened)
+    return scan, scan.scores(noise.adjoint(whitened[:-1]))
+
+
+def test_a_line_in_white_noise_is_as_improbable_as_the_noise_says() -> None:
+    """exp(-chi^2/2): its neighbours are no louder than they should be."""
+    line = 3e-5 * np.cos(2.0 * np.pi * LINE_HZ * TIME_S)
+    scan, scores = scanned(white(7) + line)
+    best = int(np.argmax(scores))
+    assert scan.frequency_hz[best] == pytest.approx(LINE_HZ, abs=1.0 / np.ptp(TIME_S))
+    assert scores[best] > 40.0
+    assert np.log(scan.p_values(scores)[best]) == pytest.approx(-0.5 * scores[best], rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_highest_peak_of_a_resonance_is_no_line(seed: int) -> None:
+    """Noise that is twenty times as strong at its centre: some of it looks like a line."""
+    wave = np.fft.rfft(white(seed))
+    frequency_hz = np.fft.rfftfreq(len(TIME_S), INTERVAL_S)
+    wave *= np.sqrt(1.0 + 19.0 / (1.0 + ((frequency_hz - LINE_HZ) / 0.6) ** 2))
+    scan, scores = scanned(np.fft.irfft(wave, len(TIME_S)))
+    best = int(np.argmax(scores))
+    # Against the noise that was assumed it would be one in a million or less.
+    assert np.exp(-0.5 * scores[best]) < 1e-6
+    # 1500 cosines are tried: one in fifty is as improbable as that.
+    assert scan.p_values(scores).min() > 0.02 / len(TIME_S)
+
+
+@pytest.mark.parametrize("decay_s", [25.0, 50.0])
+def test_a_tone_that_fades_is_not_hidden_by_its_own_width(decay_s: float) -> None:
+    """What lies a few 1/duration beside it is its own."""
+    tone = 1e-3 * np.exp(-TIME_S / decay_s) * np.cos(2.0 * np.pi * LINE_HZ * TIME_S)
+    scan, scores = scanned(white(7) + tone, decay_s)
+    best = int(np.argmax(scores))
+    assert scores[best] > 1000.0
+    assert np.log(scan.p_values(scores)[best]) < -50.0
+
+
+def test_beside_a_strong_line_its_neighbours_tell_the_noise() -> None:
+    """The spectrum may be unknown there by a factor of four: no line would be improbable."""
+    line = 3e-4 * np.cos(2.0 * np.pi * LINE_HZ * TIME_S)
+    scan, scores = scanned(white(7) + line)
+    unsure = replace(scan, log_scale_variance=np.full_like(scan.log_scale_variance, 2.0))
+    best = int(np.argmax(scores))
+    assert np.log(unsure.p_values(scores)[best]) < -50.0
+    assert unsure.p_values(scanned(white(8))[1]).min() > 0.02 / len(TIME_S)
+
+
+# Red noise or a slow effect: apparent red noise may be a drift.
+
+CLEAN = other_engine(TRUTH)
+SLOW = {"offset-drift", "equilibrium-creep", "ac-coupling", "equilibrium-step"}
+
+
+def named(readings: FloatArray, seed: int) -> set[str]:
+    found = diagnose_recording(recording(readings, seed)).effects
+    return {
+        name
+        for effect in found
+        for name in (effect.identifier, *(mate for mate, _ in effect.indistinguishable))
+    }
+
+
+def test_weak_drifts_of_the_offset_in_white_noise_are_distinguished_from_red_noise() -> None:
+    """Delta chi^2 = (slope/sigma)^2 sum (t - mean t)^2 = 196; found in most of six."""
+    centred = TIME_S - TIME_S.mean()
+    slope = 14.0 * NOISE_RAD / np.sqrt(centred @ centred)
+    found = [bool(named(CLEAN + slope * centred, seed) & SLOW) for seed in range(6)]
+    assert np.mean(found) > 0.5
+
+
+def test_red_noise_is_not_reported_as_a_drift() -> None:
+    """Twice the white density at 0.05 Hz, as 1/f below; three of ten are one in 10,000."""
+    frequency = np.arange(len(TIME_S)) / (2.0 * len(TIME_S) * INTERVAL_S)
+    spectrum = 1.0 + np.where(frequency < 0.05, 0.05 / np.maximum(frequency, frequency[1]), 0.0)
+    reported = 0
+    for seed in range(10):
+        cosines = np.sqrt(spectrum) * np.random.default_rng(seed).standard_normal(len(TIME_S))
+        noise = NOISE_RAD * idct(cosines, norm="ortho")
+        found = diagnose_recording(Recording(TIME_S, CLEAN + noise, "angle_rad"))
+        reported += any(effect.identifier in SLOW for effect in found.effects)
+    assert binom.sf(reported - 1, 10, 0.01) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "motion"),
+    [("offset-drift", lambda t: 4e-5 * (t - 16.0)), ("offset-step", lambda t: 5e-4 * (t > 15.0))],
+)
+def test_in_few_readings_a_large_slow_error_of_the_zero_is_no_noise(
+    name: str, motion: Callable[[FloatArray], FloatArray]
+) -> None:
+    """Five and more times the noise in 700 readings: a filter of some readings could make it."""
+    start = TIME_S[:700]
+    readings = CLEAN[:700] + motion(start - start[0])
+    assert name in named(readings, 3)
+
+
+@pytest.mark.parametrize("uneven", [0.0, 0.03])
+def test_what_wanders_more_slowly_than_the_motion_is_told_beside_what_is_faster(
+    uneven: float,
+) -> None:
+    """A zero that comes and goes has no name; the sentence does not call all of it noise."""
+    time_s = TIME_S + np.where(np.arange(len(TIME_S)) % 2, 0.0, uneven * INTERVAL_S)
+    wander = 5e-3 * np.exp(-(((time_s - 30.0) / 8.0) ** 2))
+    angle_rad = other_engine(TRUTH, time_s) + wander + white(3)
+    found = diagnose_recording(Recording(time_s, angle_rad, "angle_rad"))
+    assert not found.effects
+    assert found.details.startswith("Eq. 8 describes the motion of this recording, whose zero")
+    assert "the zero wanders by 1.4" in found.details
+
+
+def test_noise_about_the_motion_is_no_wander_of_the_zero() -> None:
+    fit, data, _ = null_fit()
+    turns = 2.0 * np.pi * FREQUENCY_HZ * TIME_S
+    slow = np.random.default_rng(1).standard_normal((2, len(TIME_S))).cumsum(axis=1)
+    line = 3e-5 * (slow[0] * np.cos(turns) + slow[1] * np.sin(turns))
+    near = replace(data, values=data.values + line)
+    noise = estimate_noise(near, near.residual(fit.at.reading), FREQUENCY_HZ, 0.0)
+    coloured = replace(noise, variance=np.linspace(2.0, 1.0, len(near)))
+    samples = Samples(TIME_S, near.values, "rad", None, NOISE_RAD)
+    assert note_wander(Evidence(near, fit, coloured, samples)) is None
+
+
+# A mark that is tracked with errors shows them in the distance from the pivot, too.
+
+LENGTH_M = 0.9
+TIME = np.arange(1500) / 30.0
+SWING = 0.2 * np.exp(-0.008 * TIME) * np.cos(3.3 * TIME + 0.3)
+
+
+def seen(folder: Path, along: FloatArray, across: FloatArray) -> Recording:
+    """A video's table of x and y, with errors along the string and across it, rad."""
+    radius, angle = LENGTH_M * (1.0 + along), SWING + across
+    rows = zip(TIME, radius * np.sin(angle), -radius * np.cos(angle), strict=True)
+    path = folder / "video.csv"
+    path.write_text("t,x,y\n" + "".join(f"{t:.4f},{x:.7f},{y:.7f}\n" for t, x, y in rows))
+    return read(path)
+
+
+def remembered(random: np.random.Generator) -> FloatArray:
+    drawn = np.convolve(random.standard_normal(len(TIME) + 99), np.exp(-np.arange(30) / 20))
+    return np.asarray(drawn[99 : 99 + len(TIME)])
+
+
+@pytest.mark.parametrize("kappa", [0.8, -0.5])
+def test_a_wander_along_one_line_is_named_and_taken_off(tmp_path: Path, kappa: float) -> None:
+    random = np.random.default_rng(3)
+    along = 3e-4 * remembered(random)
+    noise = 3e-4 * random.standard_normal((2, len(TIME)))
+    outcome = diagnose_recording(seen(tmp_path, along + noise[0], kappa * along + noise[1]))
+    found = {effect.identifier: effect for effect in outcome.effects}
+    assert "tracking-noise" in found
+    value = found["tracking-noise"].parameters["kappa"]
+    assert abs(value.value - kappa) < max(4.0 * value.sd, 0.15 * abs(kappa)), "w has noise too"
+    assert found["tracking-noise"].confirmed is not None
+    assert not {"offset-drift", "unnamed-measurement", "tone-pickup"} & set(found)
+
+
+def test_errors_of_their_own_in_both_coordinates_are_no_wander(tmp_path: Path) -> None:
+    """Then the test's p-value is uniform, whatever the colour of the noise."""
+    random = np.random.default_rng(5)
+    values = []
+    for _ in range(30):
+        # Trackers interpolate: neighbouring rows share what they err by.
+        white = random.standard_normal((2, len(TIME) + 4))
+        own = 2e-4 * np.array([np.convolve(each, np.ones(5), "valid") for each in white])
+        slow = 2e-4 * np.array([remembered(random), remembered(random)])
+        samples = prepare(seen(tmp_path, *(own + slow)), "video")
+        along = wander(samples)
+        assert along is not None
+        values.append(wander_confirmed(samples, along, rows_of(samples, 1.9)).p_value)
+    assert kstest(values, "uniform").pvalue > 0.01
+
+
+def test_the_distance_goes_with_the_readings(tmp_path: Path) -> None:
+    along = np.where(TIME > 30.0, 0.01, 0.0)
+    recording = seen(tmp_path, along, 0.0 * along)
+    assert recording.radius_excess == pytest.approx(along, abs=1e-6)
+    assert recording.between(29.0, 31.0).radius_excess == pytest.approx(
+        along[(TIME >= 29.0) & (TIME <= 31.0)], abs=1e-6
+    )
+    write_plain(tmp_path / "plain.csv", recording)
+    again = read_plain(tmp_path / "plain.csv")
+    assert np.array_equal(again.radius_excess, recording.radius_excess)  # type: ignore[arg-type]

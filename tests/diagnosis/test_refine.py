@@ -1,4 +1,7 @@
-"""Maximum likelihood: from far away, within bounds, with valid errors."""
+"""Fits of laws and effects: the minimum is found, from anywhere, whatever is held."""
+
+import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,13 +10,51 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.data import Data, gather
+from pendpipe.diagnosis.detect import Detection, Lead
+from pendpipe.diagnosis.instants import with_instants
 from pendpipe.diagnosis.noise import white_noise
-from pendpipe.diagnosis.refine import best_fit, damping_for, refine
-from pendpipe.effects.baseline import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
+from pendpipe.diagnosis.projection import finer_shape
+from pendpipe.diagnosis.refine import (
+    Fit,
+    best_fit,
+    damping_for,
+    fit_in_growing_window,
+    pulled,
+    refine,
+)
+from pendpipe.diagnosis.released_parameters import ReleasedParameter
+from pendpipe.diagnosis.rivals import (
+    NEAR,
+    NO_SCAN,
+    Rival,
+    _names_first,
+    of_one_class,
+    refit_leads,
+    side_by_side,
+    useful_chi2,
+)
+from pendpipe.diagnosis.values import effect_parameters
+from pendpipe.effects.baseline import (
+    HYSTERETIC,
+    OFFSET,
+    OMEGA,
+    SHARE,
+    START,
+    TIME,
+    VISCOUS,
+    A,
+    B,
+    C,
+)
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.effects.model import Evaluated, Model
+from pendpipe.estimate import Estimate
 
 from .records import (
+    FREQUENCY_HZ,
+    INSTANT_S,
     INTERVAL_S,
     LINEAR,
     NOISE_RAD,
@@ -25,8 +66,11 @@ from .records import (
     prepared,
     recording,
     stribeck_record,
+    swung,
     white,
 )
+
+# Maximum likelihood: from far away, within bounds, with valid errors.
 
 
 def test_circular_error_of_half_a_radian_is_fitted_from_the_start_of_a_law_with_x() -> None:
@@ -182,3 +226,285 @@ def test_a_step_without_a_limit_is_not_damped_however_long_it_is() -> None:
     with np.errstate(over="ignore"):
         assert damping_for(pull, squares, np.inf) == 0.0
     assert damping_for(np.array([3.0]), np.array([1.0]), 1.0) == pytest.approx(2.0, rel=1e-2)
+
+
+# Which effects are refitted, and which refits are carried to the end.
+
+
+@pytest.mark.parametrize("gain", [0.0, 20.0, 100.0, 400.0, 1e4])
+def test_effects_of_the_best_ones_class_are_useful(gain: float) -> None:
+    fit, _, _ = null_fit()
+    lead = Lead(by_identifier("cubic-stiffness"), (), gain, 0.0)
+    best = Rival(lead, fit, gain, gain, gain)
+    at_the_limit = gain - useful_chi2(0.0, gain, drawn=False)
+    behind = replace(best, gain=at_the_limit, worth=at_the_limit, evidence=at_the_limit)
+    assert not of_one_class(best, behind)
+
+
+@pytest.mark.parametrize("gain", [20.0, 400.0, 1e4])
+def test_a_name_may_end_farther_behind_a_curve_than_behind_a_name(gain: float) -> None:
+    """It has fewer values; but what explains a third of what a curve does is of no use."""
+    behind_a_curve, behind_a_name = (useful_chi2(0.0, gain, drawn=each) for each in (True, False))
+    assert behind_a_name < behind_a_curve < 2.0 / 3.0 * gain + NEAR
+
+
+def test_in_a_gross_misfit_every_refit_ends_at_its_minimum() -> None:
+    """Otherwise only those that come near the best: here the true friction."""
+    model, data, noise, truth = stribeck_record()
+    base = refine(model.bare(), data, noise, truth[:-2])
+    names = {"stribeck-friction": (float(truth[-1]),), "damping-drift": (100.0,)}
+    leads = [Lead(by_identifier(name), shape, 0.0, 0.0) for name, shape in names.items()]
+    whole = side_by_side(base, data, noise, leads, (), phase_lost=True)
+    near = side_by_side(base, data, noise, leads, (), phase_lost=False)
+    for lead, fit in whole:
+        start = np.concatenate([base.value, [0.0], lead.shape])
+        alone = refine(base.model.adding(lead.effect), data, noise, start)
+        assert fit.chi2 == pytest.approx(alone.chi2, abs=0.1)
+    (_, best), (_, rival) = near
+    assert best.chi2 == pytest.approx(whole[0][1].chi2, abs=1.0)
+    assert rival.chi2 > best.chi2 + 50.0
+    assert not rival.converged
+
+
+def _detection(scores: dict[str, tuple[float, tuple[float, ...]]]) -> Detection:
+    """The result of a scan, with negligible p-values."""
+    leads = [
+        Lead(by_identifier(name), shape, score, 0.0) for name, (score, shape) in scores.items()
+    ]
+    return Detection(tuple(leads), 0.0, NO_SCAN)
+
+
+@pytest.mark.parametrize(("others", "at_a_bound"), [(LINEAR, True), (TRUTH, False)])
+def test_an_effect_whose_score_a_bound_halves_is_refitted(
+    others: FloatArray, at_a_bound: bool
+) -> None:
+    """A loss between b and a needs a negative c, which the score keeps at zero."""
+    power = by_identifier("power-law-damping")
+    truth = np.concatenate([others, [5e-4, 1.4, 1.0]])
+    readings = Model(TIME_S, INTERVAL_S, (power,)).reading(truth)
+    data, noise = prepared(readings + white(3))
+    base = refine(Model(TIME_S, INTERVAL_S), data, noise, others)
+    assert ({A, C} & set(pulled(base)) != set()) == at_a_bound
+    rivals = refit_leads(
+        base,
+        data,
+        noise,
+        _detection({"damping-drift": (100.0, (40.0,)), "power-law-damping": (50.0, (1.5, 0.0))}),
+        held=(),
+        phase_lost=False,
+    )
+    asked = {rival.identifier for rival in rivals}
+    assert ("power-law-damping" in asked) == at_a_bound
+
+
+@pytest.mark.parametrize(
+    ("behind", "first"), [(1.0, "presliding-friction"), (30.0, "frequency-step")]
+)
+def test_in_a_misfit_a_law_that_acts_throughout_comes_before_an_event(
+    behind: float, first: str
+) -> None:
+    """A step takes a part of any misfit; one that explains it far better leads."""
+    fit, _, _ = null_fit()
+    rivals = [
+        Rival(Lead(by_identifier(name), (), 0.0, 0.0), fit, gain, worth, worth)
+        for name, gain, worth in (
+            ("frequency-step", 1000.0, 60.0),
+            ("presliding-friction", 900.0, 60.0 - behind),
+        )
+    ]
+    assert _names_first(rivals)[0].identifier == first
+
+
+# A held part of b that is released moves the readings as that part alone does.
+
+RATES = {HYSTERETIC: 6e-3, VISCOUS: 4e-3}
+"""The parts of b, in 1/s."""
+NAMES = {HYSTERETIC: "quality_factor_hysteretic", VISCOUS: "quality_factor_viscous"}
+
+
+def values(rates: dict[str, float]) -> FloatArray:
+    found = TRUTH.copy()
+    found[B] = sum(rates.values())
+    found[SHARE] = rates[HYSTERETIC] / found[B]
+    return found
+
+
+def held(rates: dict[str, float], parts: list[str]) -> Fit:
+    """A fit that holds parts of b at what they are."""
+    data, noise = prepared(other_engine(values(rates)) + white(4))
+    model = Model(TIME_S, INTERVAL_S, parts={part: rates[part] for part in parts})
+    return refine(model, data, noise, values(rates))
+
+
+def by_part(fit: Fit, part: str) -> FloatArray:
+    """By differences: what the readings do when a part alone changes, over the noise."""
+    rates = {HYSTERETIC: fit.value[B] * fit.value[SHARE]}
+    rates[VISCOUS] = fit.value[B] - rates[HYSTERETIC]
+    model, change = Model(TIME_S, INTERVAL_S), 1e-6
+    ends = []
+    for sign in (-1.0, 1.0):
+        moved = fit.value.copy()
+        there = rates | {part: rates[part] + sign * change}
+        moved[B] = sum(there.values())
+        moved[SHARE] = there[HYSTERETIC] / moved[B]
+        ends.append(model.reading(moved))
+    return (ends[1] - ends[0]) / (2.0 * change * NOISE_RAD)
+
+
+@pytest.mark.parametrize("part", [HYSTERETIC, VISCOUS])
+def test_beside_a_held_other_part_it_is_that_part_s_derivative(part: str) -> None:
+    fit = held(RATES, [HYSTERETIC, VISCOUS])
+    expected = by_part(fit, part)
+    found = ReleasedParameter(NAMES[part]).sensitivity(fit)[:-1]
+    assert found == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("part", [HYSTERETIC, VISCOUS])
+def test_beside_a_fitted_other_part_it_adds_what_that_one_lacks(part: str) -> None:
+    """With b's own derivative it spans what both parts do."""
+    fit = held(RATES, [part])
+    both = np.column_stack([by_part(fit, each) for each in (HYSTERETIC, VISCOUS)])
+    own = ReleasedParameter(NAMES[part]).sensitivity(fit)[:-1]
+    spanned = np.column_stack([fit.jacobian[:-1, B], own])
+    left = both - spanned @ np.linalg.lstsq(spanned, both, rcond=None)[0]
+    assert np.abs(left).max() < 1e-4 * np.abs(both).max()
+
+
+@pytest.mark.parametrize("part", [HYSTERETIC, VISCOUS])
+def test_where_the_other_part_is_nothing_it_is_all_of_b(part: str) -> None:
+    rates = dict.fromkeys(RATES, 0.0) | {part: 1e-2}
+    data, noise = prepared(other_engine(values(rates)) + white(4))
+    model = Model(TIME_S, INTERVAL_S, parts={part: rates[part]})
+    fit = refine(model, data, noise, values(rates), held=[B])
+    expected = by_part(fit, part)
+    found = ReleasedParameter(NAMES[part]).sensitivity(fit)[:-1]
+    assert found == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
+
+
+# Between the instants of a scan: the fit must end where one from the truth does.
+
+LONG_S = np.arange(0.0, 200.0, 0.05)
+
+
+@pytest.mark.parametrize(
+    ("identifier", "size"),
+    [
+        ("impulse", 1e-3),
+        ("equilibrium-step", 5e-5),
+        ("amplitude-step", 3e-3),
+        ("dropped-samples", 4e-4),
+    ],
+)
+@pytest.mark.parametrize("instant", [41.3, 120.6])
+def test_an_instant_is_found_from_the_nearest_row(
+    identifier: str, size: float, instant: float
+) -> None:
+    effect = by_identifier(identifier)
+    truth = np.append(TRUTH, [size, instant])
+    model = Model(LONG_S, 0.05)
+    noise_values = NOISE_RAD * np.random.default_rng(4).standard_normal(len(LONG_S))
+    readings = model.adding(effect).reading(truth) + noise_values
+    data = gather(
+        LONG_S, readings, step=None, unit="rad", counts=False, period_s=1.1, noise_rms=NOISE_RAD
+    )
+    noise = white_noise(data, NOISE_RAD)
+    base = refine(model, data, noise, TRUTH)
+    rows = np.unique([row[0] for row in effect.shapes(base.at.span)])
+    nearest = float(rows[np.argmin(np.abs(rows - instant))])
+    shape = finer_shape(base, noise, effect, (nearest,))
+    start = np.concatenate([base.value, [0.0], shape])
+    found = refine(model.adding(effect), data, noise, start)
+    best = refine(model.adding(effect), data, noise, truth)
+    assert base.chi2 - best.chi2 > 60.0
+    assert found.chi2 < best.chi2 + 3.0
+
+
+def test_effects_that_vary_slowly_need_no_closer_look() -> None:
+    model = Model(LONG_S, 0.05)
+    data = gather(
+        LONG_S,
+        model.reading(TRUTH),
+        step=None,
+        unit="rad",
+        counts=False,
+        period_s=1.1,
+        noise_rms=NOISE_RAD,
+    )
+    noise = white_noise(data, NOISE_RAD)
+    base = refine(model, data, noise, TRUTH)
+    assert finer_shape(base, noise, by_identifier("frequency-step"), (70.0,)) == (70.0,)
+
+
+# A progressive window finds the motion where a start over the whole record is turns away.
+
+
+def test_circular_error_at_1_4_rad_is_found_from_a_frequency_that_is_12_percent_off() -> None:
+    """The first cycles' own frequency is omega (1 - A^2/16): over 120 s that is 11 turns off."""
+    rate_hz, noise_rad, linear, omega = 20.0, 1e-3, 0.012, 6.1
+    time_s = np.arange(2400) / rate_hz
+    angle = swung(time_s, 1.4, omega, linear)[0]
+    values = angle + noise_rad * np.random.default_rng(4).standard_normal(len(time_s))
+    data = Data(time_s, values, 1.0 / rate_hz, True, np.ones(len(time_s)))
+    model = Model(time_s, 1.0 / rate_hz, (circular_error,), order=20)
+    slow = omega * (1.0 - 1.4**2 / 16.0)
+    start = np.array([0.0, linear, 0.0, 0.5, slow, 1.4, 0.0, 0.0, 1.0])
+    fit = fit_in_growing_window(model, data, white_noise(data, noise_rad), start)
+    assert fit.chi2 / len(time_s) == pytest.approx(1.0, abs=0.1)
+    sd = math.sqrt(fit.covariance()[OMEGA, OMEGA])
+    assert abs(fit.value[OMEGA] - omega) < 5.0 * sd
+
+
+# Intervals of instants hold the truth, in whichever half cycle chi^2 has its minimum.
+
+
+def told(
+    identifier: str, size: float, seed: int
+) -> tuple[dict[str, Estimate], dict[str, Estimate], FloatArray]:
+    """Estimates of a size and an instant, by the fit and over half cycles; and the truth."""
+    effect = by_identifier(identifier)
+    model = Model(TIME_S, INTERVAL_S)
+    truth = np.array([size, INSTANT_S])
+    clean = model.adding(effect).reading(np.append(TRUTH, truth))
+    data, noise = prepared(clean + white(seed))
+    without = refine(model, data, noise, TRUTH)
+    rows = effect.shapes(without.at.span)
+    nearest = min(rows, key=lambda row: abs(row[0] - INSTANT_S))
+    shape = finer_shape(without, noise, effect, tuple(nearest))
+    start = np.concatenate([without.value, [0.0], shape])
+    found = effect_parameters(refine(model.adding(effect), data, noise, start), effect)
+    return found, with_instants(found, effect, without, noise), truth
+
+
+def holds(estimates: dict[str, Estimate], truth: FloatArray) -> list[bool]:
+    inside = []
+    for estimate, true in zip(estimates.values(), truth, strict=True):
+        inside.append(bool(estimate.interval95[0] <= true <= estimate.interval95[1]))
+    return inside
+
+
+@pytest.mark.parametrize(("identifier", "size"), [("equilibrium-step", 4e-5), ("impulse", 2.5e-4)])
+def test_weak_steps_and_knocks_lie_within_their_intervals(identifier: str, size: float) -> None:
+    """At Delta chi^2 of some 40, chi^2 has minima in several half cycles."""
+    narrow: list[bool] = []
+    wide: list[bool] = []
+    for seed in range(30):
+        by_fit, over_cycles, truth = told(identifier, size, seed)
+        narrow += holds(by_fit, truth)
+        wide += holds(over_cycles, truth)
+    # 95 % of 60, and three standard deviations below it.
+    assert np.mean(wide) > 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / len(wide))
+    assert np.mean(wide) > np.mean(narrow)
+
+
+def test_a_hard_knock_is_known_to_a_part_of_a_cycle() -> None:
+    _, estimates, truth = told("impulse", 50.0 * NOISE_RAD, 1)
+    assert all(holds(estimates, truth))
+    assert 1.96 * estimates["time"].sd < 0.25 / FREQUENCY_HZ
+
+
+def test_an_effect_without_an_instant_is_unchanged() -> None:
+    effect = by_identifier("frequency-drift")
+    data, noise = prepared(other_engine(TRUTH) + white(2))
+    fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
+    known = {"rate": Estimate(1.0, 0.1, "1/s")}
+    assert with_instants(known, effect, fit, noise) is known

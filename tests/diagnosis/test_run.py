@@ -1,23 +1,34 @@
-"""The diagnosis as a whole: the right effect, the right size, and nothing from noise."""
+"""A diagnosis from a recording to its verdict."""
 
 import json
+import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
+import pendpipe as pp
 from pendpipe.analysis.free_decay import measure_recording
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.cycles import SmallSwings, small_swings
+from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.run import diagnose_decay, diagnose_recording
 from pendpipe.diagnosis.values import effect_parameters
-from pendpipe.effects.baseline import OFFSET, B, pendulum_of
+from pendpipe.dynamics import Eq8, Release, sample
+from pendpipe.dynamics.eq8 import Drag, Restoring
+from pendpipe.effects.baseline import OFFSET, A, B, C, pendulum_of
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.model import Model
 from pendpipe.errors import InputError
 from pendpipe.recording import Recording
+from pendpipe.simulation.model import read_model, simulate
 
-from .decays import rounded
+from .faults import rounded
 from .records import (
     FREQUENCY_HZ,
+    INTERVAL_S,
     LATER_S,
     LINEAR,
     NOISE_RAD,
@@ -26,11 +37,15 @@ from .records import (
     VALUES,
     classes_found,
     diagnosed,
+    null_fit,
     other_engine,
+    prepared,
     recording,
     white,
     with_effects,
 )
+
+# The diagnosis as a whole: the right effect, the right size, and nothing from noise.
 
 NAMES = tuple(VALUES)
 
@@ -358,3 +373,213 @@ def test_a_fault_that_leaves_the_law_as_it_was_predicts_as_that_does() -> None:
     assert [effect.identifier for effect in outcome.effects] == ["jitter"]
     assert outcome.held_out is None
     assert "left out of the fit" not in str(outcome)
+
+
+# Fit, diagnosis and simulation mean one law, and tell one noise: that of a reading.
+
+HERTZ = 0.87
+
+
+def simulated(
+    rate_hz: float = 50.0,
+    seed: int = 1,
+    amplitude: float = 1.0,
+    restoring: Restoring = "sine",
+    drag: Drag = "energy",
+    effects: tuple[str, ...] = (),
+    **losses: float,
+) -> "pp.Recording":
+    """160 s of a pendulum with white noise of 100 urad."""
+    described = {
+        "seed": seed,
+        "noise_rad": 1e-4,
+        "pendulum": {
+            "frequency_hz": HERTZ,
+            "release_angle_rad": amplitude,
+            "restoring": restoring,
+            "drag": drag,
+            **(losses or {"quality_factor_hysteretic": 200.0}),
+        },
+        "sampling": {"sample_rate_hz": rate_hz, "duration_s": 160.0},
+        "effects": [{"id": each} for each in effects],
+    }
+    return simulate(read_model(described))
+
+
+def judged(recording: "pp.Recording") -> "tuple[pp.FitResult, dict]":  # type: ignore[type-arg]
+    return pp.fit(recording), pp.diagnose(recording).to_dict()
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("restoring", "effects"), [("sine", ()), ("linear", ("circular-error",))])
+def test_nothing_is_missing_from_a_pendulum_with_hysteretic_loss(
+    seed: int, restoring: Restoring, effects: tuple[str, ...]
+) -> None:
+    """By the compiled engine and by the general one: Q 200, 1 rad, as both have it."""
+    fit, answer = judged(simulated(seed=seed, restoring=restoring, effects=effects))
+    assert fit.light == "green"
+    assert answer["verdict"] == "consistent"
+    truth = {"a": 0.0, "b": math.pi * HERTZ / 200.0, "c": 0.0}
+    for name, value in truth.items():
+        low, high = fit[name].bounds95
+        assert low - 2.0 * fit[name].sd <= value <= high + 2.0 * fit[name].sd
+
+
+@pytest.mark.parametrize("rate_hz", [45.0, 60.0, 120.0, 500.0])
+def test_the_noise_is_that_of_a_reading_whatever_was_averaged(rate_hz: float) -> None:
+    fit, answer = judged(simulated(rate_hz, amplitude=0.1))
+    left = answer["baseline"]
+    # Of n readings the rms is good to 1 part in the root of 2 n.
+    within = 4.0 / math.sqrt(2.0 * 160.0 * rate_hz)
+    assert answer["noise_rms_rad"] == pytest.approx(1e-4, rel=within)
+    assert answer["noise_rms_rad"] == fit.noise_rms_rad
+    assert left["residual_rms_rad"] == pytest.approx(1e-4, rel=within)
+    assert left["chi2_per_dof"] == pytest.approx(1.0, abs=2.0 * within)
+
+
+@pytest.mark.parametrize("rate_hz", [45.0, 120.0])
+def test_so_it_is_beside_an_effect(rate_hz: float) -> None:
+    plain = simulated(rate_hz, amplitude=0.1)
+    angle = plain.values + 0.5 * plain.values**2
+    answer = pp.diagnose(pp.Recording(time_s=plain.time_s, angle_rad=angle)).to_dict()
+    missing = [each["id"] for each in answer["effects"] if not each["presumed"]]
+    assert missing[0] == "sensor-quadratic"
+    for number in (answer["noise_rms_rad"], answer["improved"]["residual_rms_rad"]):
+        assert number == pytest.approx(1e-4, rel=0.03)
+
+
+def test_a_drag_that_follows_the_speed_is_fitted_and_presumed() -> None:
+    fit, answer = judged(simulated(drag="speed", a=0.02, quality_factor_viscous=400.0))
+    assert fit.drag_form == answer["drag_form"] == "speed"
+    presumed = [each["id"] for each in answer["effects"] if each["presumed"]]
+    assert presumed == ["circular-error", "drag-form"]
+    assert answer["verdict"] == "consistent"
+    assert abs(fit["a"].value - 0.02) < 4.0 * fit["a"].sd
+
+
+@pytest.mark.parametrize(
+    "spoilt",
+    [
+        lambda time_s, angle: (time_s + 2e-5 * time_s**2, angle),  # fitted to turning points
+        lambda time_s, angle: (time_s, angle + 2e-5 * time_s),  # fitted with a zero that drifts
+        lambda time_s, angle: (time_s, np.where(time_s > 80.0, 0.9 * angle, angle)),  # to a part
+        lambda time_s, angle: (time_s, np.where(time_s == time_s[900], angle + 0.1, angle)),
+    ],
+    ids=["clock", "zero", "gain", "glitch"],
+)
+def test_what_is_found_never_leaves_more_of_the_readings_than_was_left_without_it(
+    spoilt: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]],
+) -> None:
+    plain = simulated(20.0, amplitude=0.3)
+    found = pp.diagnose(pp.Recording(*spoilt(plain.time_s, plain.values), "angle_rad"))
+    assert found.improved.residual_rms_rad <= found.baseline.residual_rms_rad
+
+
+def test_a_position_is_diagnosed_as_l_sin_x() -> None:
+    """Read as x it has another torque; the angle of its fit lacks nothing."""
+    omega, time_s = 5.0, np.arange(0.0, 60.0, 0.01)
+    law = Eq8(omega, 0.02, 0.004, 0.006, 1e-3, restoring="sine")
+    noise = 1e-5 * np.random.default_rng(1).standard_normal(len(time_s))
+    position = 9.80665 / omega**2 * np.sin(sample(law, Release(-0.2, 0.5), time_s)) + noise
+    recording = pp.Recording(time_s, position, "displacement_m")
+    found = pp.diagnose(recording, restoring="sine")
+    assert (found.verdict, found.restoring) == ("consistent", "sine")
+    assert abs(found.baseline.parameters["frequency"].value - 0.5 * omega / math.pi) < 1e-6
+
+
+# A wrong prediction, missing physics, or both: distinguished from each other.
+
+
+def names(outcome: Diagnosis) -> set[str]:
+    return {effect.identifier for effect in outcome.effects}
+
+
+@pytest.mark.parametrize("factor", [0.6, 1.25])
+def test_a_wrong_loss_is_no_drift_and_comes_out_right(factor: float) -> None:
+    """Of whatever size: to first order a drift or a curve may look the better."""
+    given = {"b": factor * float(TRUTH[B])}
+    outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+    assert names(outcome) == {"parameter-b"}
+    assert outcome.effects[0].kind == "parameter"
+    assert outcome.effects[0].probability > 0.9
+    found = outcome.improved.parameters["b"]
+    assert abs(found.value - TRUTH[B]) < 4.0 * found.sd
+
+
+def test_two_wrong_losses_are_not_an_unnamed_third() -> None:
+    given = {"a": 0.5 * float(TRUTH[A]), "c": 2.0 * float(TRUTH[C])}
+    outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+    assert names(outcome) == {"parameter-a", "parameter-c"}
+    for name, index in (("a", A), ("c", C)):
+        found = outcome.improved.parameters[name]
+        assert abs(found.value - TRUTH[index]) < 4.0 * found.sd
+
+
+def test_of_several_predictions_the_wrong_one_is_reported() -> None:
+    given = {"a": 1.5 * float(TRUTH[A]), "b": float(TRUTH[B]), "c": float(TRUTH[C])}
+    outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+    assert names(outcome) == {"parameter-a"}
+
+
+@pytest.mark.parametrize("excess", [5.5e-4, 5e-3])
+def test_a_wrong_frequency_and_circular_error_are_both_reported(excess: float) -> None:
+    """The one shifts the frequency throughout, the other with the amplitude's square."""
+    given = {"frequency": (1.0 + excess) * FREQUENCY_HZ}
+    outcome = diagnose_recording(recording(with_effects("circular-error"), 3), fixed=given)
+    assert names(outcome) == {"parameter-frequency", "circular-error"}
+    found = outcome.improved.parameters["frequency"]
+    assert abs(found.value - FREQUENCY_HZ) < 4.0 * found.sd
+
+
+def test_right_predictions_are_not_blamed_for_missing_physics() -> None:
+    """All losses given and true, and one that nobody knew: a free a and b would do as well."""
+    effect = by_identifier("cubic-damping")
+    readings = Model(TIME_S, INTERVAL_S, (effect,)).reading(np.append(TRUTH, [0.05, 1.0]))
+    given = {"a": float(TRUTH[A]), "b": float(TRUTH[B]), "c": float(TRUTH[C])}
+    (found,) = diagnose_recording(recording(readings, 3), fixed=given).effects
+    assert not found.identifier.startswith("parameter")
+    suspected = dict(found.indistinguishable)
+    assert "cubic-damping" in {found.identifier, *suspected}
+    assert sum(odds for name, odds in suspected.items() if name.startswith("parameter")) < 0.1
+
+
+# The last cycles are judged by the scatter of all spans of cycles before them.
+
+
+def last_cycles(late_s: FloatArray) -> SmallSwings:
+    """The last cycles of a record whose phase is late, beside a model that knows nothing of it."""
+    fit, _, _ = null_fit()
+    readings = other_engine(TRUTH, TIME_S - late_s) + white(9)
+    found = small_swings(fit, *prepared(readings))
+    assert found is not None
+    return found
+
+
+def bend(size: float) -> FloatArray:
+    """A frequency that falls by a share over the last twelfth of the record."""
+    return size * np.maximum(TIME_S - 11.0 / 12.0 * TIME_S[-1], 0.0)
+
+
+def waver(size_s: float) -> FloatArray:
+    """A phase that comes and goes within the middle of the record."""
+    inside = (TIME_S > 30.0) & (TIME_S < 70.0)
+    return np.where(inside, size_s * np.sin(2.0 * np.pi * (TIME_S - 30.0) / 8.0), 0.0)
+
+
+@pytest.mark.parametrize("share", [1e-2, -1e-2])
+def test_a_change_of_the_last_cycles_alone_is_seen_and_measured(share: float) -> None:
+    found = last_cycles(bend(share))
+    assert found.significant
+    assert found.excess == pytest.approx(-share, abs=3.0 * found.excess_sd)
+    assert 0.04 < found.amplitude < 0.06
+
+
+def test_a_frequency_that_wavers_anyway_makes_the_last_cycles_uncertain() -> None:
+    """Wherever among the others it wavers; a calm one is known by its noise."""
+    calm, wavering = last_cycles(bend(0.0)), last_cycles(waver(0.02))
+    assert wavering.excess == calm.excess
+    assert calm.excess_sd < 1e-4
+    # An amplitude of 0.02 s in a period of 8 s makes 1.1 % rms, in two fifths of the spans.
+    slope = 0.02 * 2.0 * np.pi / 8.0 / np.sqrt(2.0) * np.sqrt(0.4)
+    assert wavering.excess_sd == pytest.approx(slope, rel=0.4)
+    assert not last_cycles(waver(0.02) + bend(1e-2)).significant

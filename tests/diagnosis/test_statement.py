@@ -1,15 +1,46 @@
-"""The details of a diagnosis: their lines, names, units and digits."""
+"""What a diagnosis says: its summary, its statement, where it lies, and what is left over."""
 
+import json
+import math
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import pytest
 
-from pendpipe.diagnosis.result import FittedModel, FoundEffect, Location
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.held_out import HeldOut
+from pendpipe.diagnosis.location import locate
+from pendpipe.diagnosis.noise import white_noise
+from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.remainder import Remainder, remainder_of, with_errors
+from pendpipe.diagnosis.result import Diagnosis, FittedModel, FoundEffect, Location
+from pendpipe.diagnosis.rivals import near_harmonic_by_chance
 from pendpipe.diagnosis.summary import statement
+from pendpipe.diagnosis.values import constants_of, curve_values
+from pendpipe.effects.baseline import OMEGA, TIME, A, B, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
-from pendpipe.estimate import Estimate
+from pendpipe.effects.curves import Curve, damping_curve, drive_curve
+from pendpipe.effects.model import Model
+from pendpipe.estimate import Z95, Estimate
 
-from .records import INTERVAL_S, diagnosed
+from .records import (
+    FREQUENCY_HZ,
+    INSTANT_S,
+    INTERVAL_S,
+    NOISE_RAD,
+    TIME_S,
+    TONE_HZ,
+    TRUTH,
+    diagnosed,
+    null_fit,
+    other_engine,
+    prepared,
+    white,
+)
+
+# The details of a diagnosis: their lines, names, units and digits.
 
 
 def named(identifier: str, **parameters: Estimate) -> FoundEffect:
@@ -100,3 +131,439 @@ def test_what_a_test_has_counted_is_said_in_words_alone() -> None:
         bit=Estimate(0.0, 0.0, ""),
     )
     assert details(codes)[1].startswith("Missing codes 90 %; throughout the record")
+
+
+# The dozen lines that a diagnosis prints, and the same as fields.
+
+REST = Remainder(1e4, 6.0, 40.0, {"phase": 0.8, "offset": 0.2})
+
+
+def parameters(frequency_hz: float) -> dict[str, Estimate]:
+    return {
+        "b": Estimate(0.0123, 0.0002, "1/s"),
+        "frequency": Estimate(frequency_hz, 2.3e-5, "Hz"),
+        "phase": Estimate(0.1, 0.001, "rad"),
+    }
+
+
+def diagnosis(*effects: FoundEffect, **more: Any) -> Diagnosis:
+    before = FittedModel(parameters(0.9), 2e-4, 4.0)
+    after = FittedModel(parameters(0.91), 1e-4, 1.0)
+    verdict = "missing-physics" if effects else "consistent"
+    held = HeldOut(1000.0, 1050.0, 5.0, 2e-4, 1.1e-4, 12, 11)
+    scanned = tuple((each.identifier, 0.5) for each in CATALOGUE)
+    return Diagnosis(
+        "eq8",
+        before,
+        after,
+        1e-4,
+        verdict,
+        0.0 if effects else 0.9,
+        effects,
+        held,
+        1e-4,
+        0.9,
+        "details",
+        scanned=scanned,
+        **more,
+    )
+
+
+def likely(identifier: str, probability: float, *rivals: tuple[str, float]) -> FoundEffect:
+    return replace(named(identifier), probability=probability, indistinguishable=rivals)
+
+
+def test_a_healthy_pendulum_takes_one_line() -> None:
+    healthy = diagnosis()
+    assert healthy.statement == "nothing is missing (p = 0.9)"
+    assert healthy.to_dict()["summary"]["missing"] == []
+
+
+def test_what_is_presumed_is_fitted_and_not_missing() -> None:
+    presumed = replace(named("circular-error"), presumed=True)
+    assert replace(diagnosis(), effects=(presumed,)).statement == (
+        "nothing is missing beyond sin x, which is fitted (p = 0.9)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("effect", "headline", "candidates"),
+    [
+        (likely("impulse", 0.9), "missing: impulse", ""),
+        # A class counts together.
+        (
+            likely("clock-drift", 0.3, ("frequency-drift", 0.4)),
+            "missing: drifting frequency or drifting clock (70 % together)",
+            "",
+        ),
+        (
+            likely("clock-drift", 0.22, ("frequency-drift", 0.08)),
+            "something is missing, its cause is NOT known",
+            "drifting clock (22 %)",
+        ),
+        (
+            likely("impulse", 0.08, ("backlash", 0.08)),
+            "something is missing, its cause is NOT known",
+            "none above 20 %",
+        ),
+    ],
+)
+def test_a_name_is_given_from_one_half_on(
+    effect: FoundEffect, headline: str, candidates: str
+) -> None:
+    found = diagnosis(effect)
+    assert found.summary.headline == headline
+    assert found.summary.candidates == candidates
+    assert found.statement.splitlines()[0] == headline
+    below = [f"{p:.0%}" for p in (0.08,)]
+    assert not any(percent in found.statement for percent in below)
+
+
+def test_the_answer_has_a_dozen_lines_in_the_order_of_the_questions() -> None:
+    found = diagnosis(likely("impulse", 0.9, ("backlash", 0.06)), remainder=REST, name="a.csv")
+    lines = str(found).splitlines()
+    assert len(lines) <= 12
+    order = [
+        "a.csv: missing: impulse, and a rest of unknown cause",
+        "  how much it matters   the fit misses the readings by 200 µrad (noise 100 µrad): T0",
+        "  where                 throughout the record; what is left lies in the phase (80 %)",
+        "  sure                  impulse 90 %; cycles left out of the fit are predicted better in",
+        "  looked for and not it second mode, ",
+        "  decide by ",
+        "  quote                 T0 1.098901(28) s",
+    ]
+    for line, start in zip(lines, order, strict=False):
+        assert line.startswith(start)
+    assert lines[-1].startswith("Copy: “Eq. 8 does not describe this recording (p < 1e-12)")
+
+
+def test_the_table_shows_the_numbers_as_fitted_and_with_what_is_missing() -> None:
+    found = diagnosis(likely("impulse", 0.9))
+    (period, b) = found.to_dict()["summary"]["consequence"]
+    assert (period["quantity"], b["quantity"]) == ("period", "b")
+    assert period["fitted"]["value"] == pytest.approx(1.0 / 0.9)
+    assert period["with_missing"]["value"] == pytest.approx(1.0 / 0.91)
+    assert period["moved_sd"] > 100.0
+    assert b["moved_sd"] == 0.0
+    old, new = found.summary.table().splitlines()[1:]
+    assert "1.111111(28) s" in old
+    assert "1.098901(28) s" in new
+
+
+def test_parameters_have_words_and_units_and_differ_from_zero() -> None:
+    effect = replace(
+        likely("second-mode", 0.9),
+        parameters={
+            "q_cosine": Estimate(3e-3, 1e-4, "rad"),
+            "q_sine": Estimate(4e-3, 1e-4, "rad"),
+            "f_2": Estimate(1.5, 0.01, "Hz"),
+            "tau_2": Estimate(0.0, 970000.0, "s"),
+        },
+    )
+    assert diagnosis(effect).summary.missing == (
+        "second mode (frequency 1.500(10) Hz, amplitude 0.00500(10) rad)",
+    )
+
+
+def test_a_diagnosis_prints_as_its_answer() -> None:
+    outcome = diagnosed("circular-error")
+    assert str(outcome) == repr(outcome)
+    content = json.loads(json.dumps(outcome.to_dict()))
+    assert str(outcome).endswith(content["statement"])
+    assert content["summary"]["headline"] in outcome._repr_html_()
+    assert content["details"].startswith("Eq. 8 does not describe this recording")
+
+
+# The curve of an effect without a name: its values, band and local exponent.
+
+AT_20_HZ_S = np.arange(3000) / 20.0
+FAINT_RAD = 1e-5
+LINEAR, QUADRATIC = 0.01, 0.08
+
+
+def fitted(kind: type[Curve], quadratic: float) -> tuple[Fit, Curve]:
+    """Readings with a quadratic loss, fitted by b and a curve, a and c held at zero."""
+    omega = 2.0 * math.pi * 0.9
+    truth = np.array([quadratic, LINEAR, 0.0, 0.0, omega, 0.15, -0.3, 0.0])
+    model = Model(AT_20_HZ_S, 0.05)
+    noise_free = model.evaluate(truth)
+    values = noise_free.reading + FAINT_RAD * np.random.default_rng(2).standard_normal(
+        len(AT_20_HZ_S)
+    )
+    data = Data(AT_20_HZ_S, values, 0.05, True, np.ones(len(AT_20_HZ_S)))
+    effect = kind(noise_free.span)
+    if kind is drive_curve:
+        effect = kind(noise_free.span, np.eye(effect.basis_size)[:, :3])
+    start = np.concatenate([truth, np.zeros(effect.sizes)])
+    start[0] = 0.0
+    fit = refine(model.adding(effect), data, white_noise(data, FAINT_RAD), start, held=(0, 1, 2, 3))
+    return fit, effect
+
+
+def test_a_loss_curve_is_the_missing_loss() -> None:
+    """Quadratic drag takes -dy/dt = a y^2: a loss rate of a y (Eq. 13)."""
+    fit, effect = fitted(damping_curve, QUADRATIC)
+    found = curve_values(fit, effect)
+    expected = QUADRATIC * found["at"]
+    inside = slice(5, -5)
+    assert found["value"][inside] == pytest.approx(expected[inside], rel=0.06)
+    assert np.all(found["sd"][inside] < 0.05 * expected[inside])
+    assert found["argument"].startswith("amplitude")
+    # The whole loss is b + a y: n = 1 + a y/(b + a y), between 1 (linear) and 2 (quadratic).
+    exponent = 1.0 + expected / (LINEAR + expected)
+    assert found["local_exponent"][inside] == pytest.approx(exponent[inside], abs=0.15)
+    assert np.all(found["local_exponent_sd"] > 0.0)
+
+
+def test_a_drive_has_two_curves() -> None:
+    fit, effect = fitted(drive_curve, 0.0)
+    found = curve_values(fit, effect, "m")
+    assert len(found["value"]) == len(found["quadrature"]) == len(found["at"])
+    # Nothing was driven: nothing is seen.
+    assert np.all(np.abs(found["value"]) <= 4.0 * found["sd"] + 1e-12)
+
+
+# Where an effect shows: time, frequency, harmonic.
+
+LARGE = np.where(TRUTH == 0.15, 0.4, TRUTH)
+"""The same pendulum released at 0.4 rad, where sin x is far from x."""
+
+
+def location_of(name: str) -> Location:
+    return diagnosed(name).effects[0].location
+
+
+def test_a_step_lies_at_its_instant() -> None:
+    """Within two 95 % intervals, each less than the record's fiftieth."""
+    found = location_of("equilibrium-step")
+    assert found.time_s is not None
+    low, high = found.time_s
+    assert 0.0 < high - low < 0.02 * TIME_S[-1]
+    assert abs(0.5 * (low + high) - INSTANT_S) < high - low
+    assert "s" in found.summary
+
+
+def test_a_tone_lies_at_its_frequency() -> None:
+    found = location_of("tone-pickup")
+    assert found.frequency_hz == pytest.approx((TONE_HZ,), abs=0.05 / TIME_S[-1])
+    assert found.harmonics == ()
+    assert "Hz" in found.summary
+
+
+def test_a_square_in_the_sensor_lies_in_the_second_harmonic_and_a_cube_in_the_third() -> None:
+    """Amplitude and losses absorb its effect on the fundamental."""
+    for name, harmonic in (("sensor-quadratic", 2), ("sensor-cubic", 3)):
+        found = location_of(name)
+        assert harmonic in found.harmonics
+        assert harmonic * FREQUENCY_HZ == pytest.approx(max(found.frequency_hz), rel=1e-3)
+        assert max(found.harmonics) == harmonic
+
+
+def test_a_curved_sensor_shows_at_large_amplitudes_that_is_early() -> None:
+    found = location_of("sensor-cubic")
+    amplitude = diagnosed("sensor-cubic").search.fit.at.sampled.amplitude
+    assert found.amplitude_rad[1] > 0.97 * amplitude.max()
+    assert found.amplitude_rad[0] > 1.2 * amplitude.min()
+    assert found.time_s[0] < 5.0
+
+
+@pytest.mark.parametrize("name", ["circular-error", "frequency-drift", "sensor-quadratic"])
+def test_intervals_lie_within_the_record(name: str) -> None:
+    found = location_of(name)
+    for interval, lowest, highest in (
+        (found.time_s, TIME_S[0], TIME_S[-1]),
+        (found.amplitude_rad, 0.0, 0.16),
+    ):
+        assert lowest <= interval[0] < interval[1] <= highest
+    assert np.all(np.isfinite(found.frequency_hz))
+
+
+def located(
+    identifier: str,
+    values: tuple[float, ...],
+    base: FloatArray = TRUTH,
+    time_s: FloatArray = TIME_S,
+) -> tuple[Location, float]:
+    """Where an effect shows that Eq. 8 lacks; and Eq. 8's phase error, rad."""
+    effect = by_identifier(identifier)
+    bare, extended = Model(time_s, INTERVAL_S), Model(time_s, INTERVAL_S, (effect,))
+    truth = np.append(base, values)
+    readings = extended.reading(truth) + white(2, len(time_s))
+    even = len(time_s) == len(TIME_S)
+    data = Data(time_s, readings, INTERVAL_S, even, np.ones(len(time_s)))
+    noise = white_noise(data, NOISE_RAD)
+    before, after = refine(bare, data, noise, base), refine(extended, data, noise, truth)
+    return locate(before, after, data, effect), before.max_phase_error_rad
+
+
+SLIPPING = {
+    "circular-error": ((1.0,), LARGE),
+    "clock-drift": ((1e-4, 1e3), TRUTH),
+    "frequency-drift": ((3e-4, 40.0), TRUTH),
+}
+
+
+@pytest.mark.parametrize("name", SLIPPING)
+def test_a_phase_error_of_a_radian_is_a_misfit_of_the_fundamental(name: str) -> None:
+    """However large: the pendulum is early or late, and its offset unchanged."""
+    found, slip = located(name, *SLIPPING[name])
+    assert slip > 0.5
+    assert found.harmonics == (1,)
+    assert found.frequency_hz == pytest.approx((FREQUENCY_HZ,), rel=1e-2)
+    assert "level" not in found.summary
+
+
+def test_a_phase_error_shows_at_the_same_amplitudes_whether_it_is_small_or_large() -> None:
+    """Its effect is linear along the motion, if not in the readings."""
+    small, slip = located("clock-drift", (2e-6, 1e3))
+    large, slipped = located("clock-drift", (1e-4, 1e3))
+    assert slip < 0.02
+    assert slipped > 0.5
+    assert large.amplitude_rad == pytest.approx(small.amplitude_rad, rel=0.01)
+
+
+def test_a_phase_misfit_shows_at_the_zero_crossings_and_a_loss_at_the_turning_points() -> None:
+    """Twice a cycle: no single arc of less than half a circle holds most of it."""
+    early, _ = located("clock-drift", (1e-5, 1e3))
+    assert early.phase_rad is None
+    assert "zero crossings" in early.summary
+    lossy, _ = located("damping-drift", (3e-4, 1e3))
+    assert lossy.phase_rad is None
+    assert "turning points" in lossy.summary
+
+
+def test_a_step_of_the_offset_prefers_no_part_of_the_cycle() -> None:
+    summary = located("equilibrium-step", (4e-4, INSTANT_S))[0].summary
+    assert "crossings" not in summary
+    assert "turning points" not in summary
+
+
+def test_what_fades_after_the_release_lies_at_the_beginning_and_not_at_its_time_constant() -> None:
+    found, _ = located("release-transient", (0.02, 4.8))
+    assert found.time_s[0] == TIME_S[0]
+    assert 4.8 < found.time_s[1] < 0.5 * TIME_S[-1]
+
+
+def test_an_encoder_that_records_its_counts_makes_no_harmonics_of_a_phase_error() -> None:
+    """Its readings are dense at the crossings: |sin| of the phase, which has a second harmonic."""
+    finer = np.arange(0.0, 60.0, INTERVAL_S / 4.0)
+    speed = np.abs(np.sin(TRUTH[4] * (finer - TRUTH[6])))
+    written = finer[np.random.default_rng(4).uniform(size=len(finer)) < speed]
+    found, slip = located("frequency-drift", (1e-3, 40.0), time_s=written)
+    assert slip > 0.5
+    assert found.harmonics == (1,)
+
+
+@pytest.mark.parametrize(
+    ("frequency_hz", "by_chance"),
+    [
+        (3.5 * FREQUENCY_HZ, 0.9),
+        (3.0 * FREQUENCY_HZ, 0.05),
+        (0.5 / INTERVAL_S - FREQUENCY_HZ, 0.15),
+        (1.0 / INTERVAL_S - 11.0 * FREQUENCY_HZ, 0.15),
+    ],
+)
+def test_a_line_of_every_second_reading_or_an_alias_is_seldom_there_by_chance(
+    frequency_hz: float, by_chance: float
+) -> None:
+    """Lines at a harmonic, about half the sampling rate, and the alias of the eleventh harmonic."""
+    tone = by_identifier("tone-pickup")
+    model = Model(TIME_S, INTERVAL_S, (tone,))
+    truth = np.append(TRUTH, [3e-4, 2e-4, frequency_hz])
+    data, noise = prepared(model.reading(truth) + white(3))
+    found = near_harmonic_by_chance(refine(model, data, noise, truth), tone)
+    assert found > by_chance if by_chance == 0.9 else found < by_chance
+
+
+# The misfit beyond the noise, and its consequences for names and errors.
+
+
+def left_by(extra: FloatArray) -> tuple[Fit, Remainder]:
+    """Eq. 8 fitted to itself, noise, and something more."""
+    data, noise = prepared(other_engine(TRUTH) + white(4) + extra)
+    fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
+    return fit, remainder_of(fit, data, noise)
+
+
+def test_noise_alone_leaves_nothing_and_enlarges_no_error() -> None:
+    found = remainder_of(*null_fit())
+    assert not found.systematic
+    assert found.error_scale == 1.0
+    assert found.over_noise == pytest.approx(1.0, abs=4.0 / math.sqrt(2 * len(TIME_S)))
+
+
+@pytest.mark.parametrize(
+    ("where", "extra"),
+    [
+        ("harmonics", 4e-4 * np.cos(3.0 * 2.0 * np.pi * 0.9 * TIME_S)),
+        ("offset", 6e-4 * np.sin(2.0 * np.pi * 0.02 * TIME_S)),
+        ("between", 4e-4 * np.cos(2.0 * np.pi * 6.1 * TIME_S)),
+    ],
+)
+def test_the_misfit_is_located_where_it_was_put(where: str, extra: FloatArray) -> None:
+    """Its mean square adds to the noise's, and nine tenths of it are there."""
+    _, found = left_by(extra)
+    expected = math.sqrt(1.0 + np.mean(extra**2) / NOISE_RAD**2)
+    assert found.systematic
+    assert found.over_noise == pytest.approx(expected, rel=0.05)
+    assert found.shares[where] > 0.9
+    assert sum(found.shares.values()) == pytest.approx(1.0)
+
+
+def test_errors_grow_with_what_is_left_and_one_line_is_few_numbers() -> None:
+    _, small = left_by(4e-4 * np.cos(2.0 * np.pi * 6.1 * TIME_S))
+    _, large = left_by(8e-4 * np.cos(2.0 * np.pi * 6.1 * TIME_S))
+    assert large.error_scale == pytest.approx(2.0 * small.error_scale, rel=0.2)
+    assert small.error_scale > small.over_noise
+    assert large.numbers < 30.0
+
+
+def of_a_cycle(wave: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """A smooth random function of eight numbers, times a wave."""
+    x = (np.arange(len(wave)) + 0.5) / len(wave)
+    modes = np.cos(np.pi * np.arange(8)[:, None] * x)
+    return np.asarray(3.0 * NOISE_RAD * (rng.standard_normal(8) @ modes) * wave)
+
+
+@pytest.mark.parametrize(
+    ("part", "moved", "still"),
+    [
+        ("amplitude", (A, B, C), (OMEGA, TIME)),
+        ("phase", (OMEGA, TIME), (A, B, C)),
+        ("harmonics", (), (A, B, C)),
+    ],
+)
+def test_errors_are_those_that_a_random_misfit_of_one_part_makes(
+    part: str, moved: tuple[int, ...], still: tuple[int, ...]
+) -> None:
+    """To first order the values move by J^+ r: against the errors stated for each draw."""
+    fit, data, noise = null_fit()
+    turned = fit.at.sampled.phase
+    wave = {"amplitude": np.cos(turned), "phase": np.sin(turned), "harmonics": np.cos(3 * turned)}
+    solve = np.linalg.pinv(fit.jacobian[:, fit.free])
+    rng, pulls, widened = np.random.default_rng(7), [], []
+    for seed in range(80):
+        more = of_a_cycle(wave[part], rng) + white(seed)
+        residual = np.append(noise.whiten(more), 0.0)
+        here = replace(fit, evaluation=replace(fit.evaluation, residual=residual))
+        found = with_errors(here, replace(data, values=fit.at.reading + more), noise)
+        widened.append(np.sqrt(np.diag(found.covariance())[list(fit.free)]))
+        pulls.append(solve @ residual / widened[-1])
+    scatter = dict(zip(fit.free, np.std(pulls, axis=0), strict=True))
+
+    assert max(scatter.values()) < 1.35
+    assert all(scatter[index] > 0.6 for index in moved)
+    noise_alone = np.sqrt(np.diag(fit.covariance())[list(fit.free)])
+    wider = dict(zip(fit.free, np.median(widened, axis=0) / noise_alone, strict=True))
+    assert all(wider[index] > 10.0 for index in moved)
+    assert all(wider[index] < 5.0 for index in still)
+
+
+@pytest.mark.parametrize("harmonic_rad", [2e-4, 4e-4])
+def test_intervals_far_from_a_bound_are_those_of_the_errors(harmonic_rad: float) -> None:
+    """Derivatives by the frequency are 1e8 times those by the share: no direction is lost."""
+    extra = harmonic_rad * np.cos(3.0 * 2.0 * np.pi * 0.9 * TIME_S)
+    data, noise = prepared(other_engine(TRUTH) + white(4) + extra)
+    fit = with_errors(refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH), data, noise)
+    for estimate in constants_of(fit, "rad").values():
+        assert np.ptp(estimate.bounds95) == pytest.approx(2.0 * Z95 * estimate.sd, rel=0.01)

@@ -1,4 +1,4 @@
-"""The rivals that share the probability of an effect: those that the final noise allows."""
+"""Chances, scores, and the rivals that share the probability of an effect."""
 
 import functools
 import math
@@ -6,18 +6,40 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binom, chi2, kstest
 
-from pendpipe.diagnosis.detect import Chance, Lead, Trials
-from pendpipe.diagnosis.refine import refine
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis import blocks, weighing
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.detect import (
+    Bank,
+    Candidate,
+    Chance,
+    Lead,
+    Scanner,
+    Trials,
+    build_bank,
+    detect,
+    draw_chance,
+    prepare,
+)
+from pendpipe.diagnosis.hypothesis import Hypothesis, Step, applicable
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.projection import local_p_values, scores_and_lengths, tangent_basis
+from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.result import Diagnosis, Finding
 from pendpipe.diagnosis.rivals import Rival, Scale, class_width, evidence, probabilities
 from pendpipe.diagnosis.run import diagnose_recording
-from pendpipe.diagnosis.weighing import fault_named, law_of, weigh
+from pendpipe.diagnosis.weighing import Weighed, fault_named, law_of, weigh, with_likelier
 from pendpipe.effects import Effect
-from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.baseline import B
+from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import CURVES
 from pendpipe.effects.model import Model
 
+from .faults import Pendulum, fitted
 from .records import (
     FREQUENCY_HZ,
     INSTANT_S,
@@ -25,10 +47,16 @@ from .records import (
     TIME_S,
     TRUTH,
     Magnet,
+    diagnosed,
     null_fit,
+    other_engine,
+    prepared,
     pulled,
     recording,
+    scanned,
 )
+
+# The rivals that share the probability of an effect: those that the final noise allows.
 
 JUMP_RAD = 1e-3
 """Ten times the noise of a reading."""
@@ -198,3 +226,321 @@ def test_a_random_torque_that_explains_no_more_than_a_smooth_misfit_is_not_confi
     assert chances[1] > 0.98 * chances[0]
     assert chances[2] < 0.5
     assert chances[3] < 0.01
+
+
+# The reported effect is the likelier one in the end, whichever was added first.
+
+
+@functools.cache
+def wrong_loss() -> Diagnosis:
+    """A prediction with a wrong b: nothing is missing."""
+    given = {"b": 1.1 * float(TRUTH[B])}
+    return diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+
+
+def having_taken(outcome: Diagnosis, name: str) -> Hypothesis:
+    """The same search as if it had added another of the refitted effects."""
+    found = outcome.search
+    (step,) = found.steps
+    first = next(rival for rival in step.rivals if rival.identifier == name)
+    rest = tuple(rival for rival in step.rivals if rival is not first)
+    held = found.held
+    if step.winner.lead.effect.kind == "parameter":
+        held = (*held, B)
+    # Its refit was judged by the noise of that moment.
+    fit = refine(first.fit.model, found.data, found.noise, first.fit.value, held=held)
+    return replace(
+        found,
+        fit=fit,
+        steps=(replace(step, rivals=(first, *rest)),),
+        held=held,
+        without_curve=None,
+    )
+
+
+def exchanged(found: Hypothesis) -> tuple[Hypothesis, tuple[Weighed, ...]]:
+    """Put likelier rivals in, until there is none."""
+    seen = set()
+    while True:
+        seen.add(found.key)
+        weighed = tuple(weighing.weigh(found, step) for step in found.steps)
+        after = with_likelier(found, weighed, seen)
+        if after is None:
+            return found, weighed
+        found = after
+
+
+def led(outcome: Diagnosis, name: str) -> tuple[Step, float, dict[str, float], Hypothesis]:
+    """Return the final leader if another was added first, and all probabilities."""
+    found, (weighed,) = exchanged(having_taken(outcome, name))
+    (step,) = found.steps
+    own, *others = weighed.weights[:-1].tolist()
+    mates = {mate.identifier: each for mate, each in zip(weighed.mates, others, strict=True)}
+    return step, own, mates, found
+
+
+@pytest.mark.parametrize("taken", ["cubic-stiffness", "clock-drift", "unnamed-restoring"])
+def test_a_likelier_effect_replaces_the_one_that_was_added(taken: str) -> None:
+    """All fit a pendulum whose torque is sin x; the prior knows that it is."""
+    step, own, mates, found = led(scanned("circular-error"), taken)
+    assert step.winner.identifier == "circular-error"
+    assert own > max(mates.values())
+    assert taken in mates
+    assert [effect.identifier for effect in found.fit.model.effects] == ["circular-error"]
+    assert found.fit.chi2 == pytest.approx(scanned("circular-error").search.fit.chi2)
+
+
+@pytest.mark.parametrize(
+    ("name", "taken"),
+    [
+        ("frequency-drift", "cubic-stiffness"),
+        ("frequency-drift", "clock-drift"),
+        ("sensor-cubic", "sensor-cubic"),
+    ],
+)
+def test_a_name_as_likely_as_its_rivals_stays(name: str, taken: str) -> None:
+    step, own, mates, _ = led(diagnosed(name), taken)
+    assert step.winner.identifier == taken
+    assert 1.5 * own >= max(mates.values())
+
+
+def test_a_wrong_parameter_replaces_missing_physics() -> None:
+    """It is fitted then, and comes out right."""
+    taken = next(
+        rival.identifier
+        for rival in wrong_loss().search.steps[0].rivals
+        if rival.lead.effect.kind != "parameter"
+    )
+    step, _, _, found = led(wrong_loss(), taken)
+    assert step.winner.identifier == "parameter-b"
+    assert B not in found.held
+    sd = float(found.fit.covariance()[B, B]) ** 0.5
+    assert abs(found.fit.value[B] - TRUTH[B]) < 4.0 * sd
+
+
+# How often chance alone does as well somewhere in a scan.
+
+WHITE = Noise(np.ones(60), np.ones(60))
+NOTHING = np.zeros((60, 0))
+
+
+def bank_of(columns: FloatArray) -> Bank:
+    """One effect of as many shapes as there are columns, with nothing fitted."""
+    effect, count = by_identifier("offset-drift"), columns.shape[1]
+    candidates = tuple(Candidate(effect, (float(k),), k, 1) for k in range(count))
+    return Bank(NOTHING, columns.astype(np.float32), candidates, np.zeros(count))
+
+
+def scanner_of(bank: Bank) -> Scanner:
+    """A scan of it without tones."""
+    return Scanner(bank, WHITE, NOTHING)
+
+
+@pytest.mark.parametrize("number", [1, 7, 100])
+def test_the_global_p_value_of_the_smallest_of_independent_ones_is_uniform(number: int) -> None:
+    smallest = np.random.default_rng(number).random((2000, number)).min(axis=1)
+    found = [Trials(float(number), 0.0).global_p_value(float(local)) for local in smallest]
+    assert kstest(found, "uniform").pvalue > 1e-3
+
+
+@given(st.floats(1e-300, 1.0), st.floats(1.0, 1e5), st.floats(0.0, 0.1))
+def test_looking_at_more_makes_nothing_rarer(local: float, trials: float, growth: float) -> None:
+    found = Trials(trials, growth).global_p_value(local)
+    assert local * (1.0 - 1e-9) <= found <= 1.0
+    assert found <= Trials(2.0 * trials, growth).global_p_value(local)
+    assert found <= Trials(trials, growth).global_p_value(min(2.0 * local, 1.0)) * (1.0 + 1e-9)
+    assert Trials(trials, growth).global_p_value(0.0) == 0.0
+
+
+@pytest.mark.parametrize("shapes", [3, 12, 48])
+def test_independent_shapes_are_counted(shapes: int) -> None:
+    """The p-values of fresh noise are uniform then."""
+    bank = bank_of(np.eye(60)[:, :shapes])
+    chance = draw_chance(scanner_of(bank), seed=1, draws=2000)
+    fresh = np.random.default_rng(99).standard_normal((60, 600))
+    smallest = local_p_values(bank.scores(fresh), bank.freedom).min(axis=0)
+    found = [chance.everywhere.global_p_value(float(local)) for local in smallest]
+    assert kstest(found, "uniform").pvalue > 1e-3
+
+
+def test_more_shapes_are_more_trials_but_the_same_shape_again_is_none() -> None:
+    found = []
+    for shapes in (2, 8, 32):
+        chance = draw_chance(scanner_of(bank_of(np.eye(60)[:, :shapes])), seed=2)
+        found.append(chance.own["offset-drift"].global_p_value(1e-4))
+    assert found[0] < found[1] < found[2]
+    same = draw_chance(scanner_of(bank_of(np.repeat(np.eye(60)[:, :1], 32, axis=1))), seed=2)
+    assert same.own["offset-drift"].global_p_value(1e-4) < found[0]
+
+
+def test_the_draws_follow_their_seed() -> None:
+    bank = bank_of(np.eye(60)[:, :5])
+    assert draw_chance(scanner_of(bank), seed=3) == draw_chance(scanner_of(bank), seed=3)
+    assert draw_chance(scanner_of(bank), seed=3) != draw_chance(scanner_of(bank), seed=4)
+
+
+def test_false_alarms_of_the_whole_catalogue_are_as_frequent_as_the_p_value() -> None:
+    """Of 80 fresh residuals a tenth have p < 0.1, and three tenths p < 0.3."""
+    fit, data, noise = null_fit()
+    scanner = prepare(fit, data, noise, applicable(CATALOGUE, fit, "eq8", "rad"))
+    known = detect(scanner, fit, seed=5)
+    generator, count = np.random.default_rng(6), 80
+
+    def p_value() -> float:
+        noise_alone = generator.standard_normal(len(fit.residual))
+        evaluation = replace(fit.evaluation, residual=noise_alone)
+        return detect(scanner, replace(fit, evaluation=evaluation), seed=5, known=known).p_value
+
+    found = np.array([p_value() for _ in range(count)])
+    for level in (0.1, 0.3):
+        below = int(np.count_nonzero(found < level))
+        # The number of trials is itself drawn, to a tenth.
+        assert binom.ppf(1e-3, count, 0.9 * level) <= below <= binom.isf(1e-3, count, 1.1 * level)
+
+
+@pytest.mark.parametrize("name", ["equilibrium-step", "offset-drift"])
+def test_a_gain_too_large_for_p_values_is_worth_as_much_more_as_it_is_larger(name: str) -> None:
+    """P-values underflow at a chi^2 of 1331; the rarer, the more trials are charged beyond it."""
+    fit, _, _ = null_fit()
+    chance = Chance(Trials(1.0, 0.0), {name: Trials(60.0, 0.5)})
+    lead = Lead(by_identifier(name), (), 0.0, 0.0)
+    below, above = (evidence(lead, fit, gain, chance) for gain in (1325.0, 1345.0))
+    assert above - below == pytest.approx(20.0, abs=0.3)
+
+
+def test_who_is_behind_stays_as_far_behind_whatever_else_was_left_at_first() -> None:
+    """Found while fifty times the noise was left, both are refitted where none of that is."""
+    fit, _, _ = null_fit()
+    lead = Lead(by_identifier("circular-error"), (), 0.0, 0.0)
+    best, other = (Rival(lead, fit, gain, gain / 50.0, gain / 50.0 - 8.0) for gain in (9e5, 6e5))
+    scale = Scale(fit.chi2)
+    better = best.again(fit, fit.chi2 + 400.0, scale)
+    worse = other.again(fit, fit.chi2 + 350.0, scale)
+    assert better.evidence == pytest.approx(400.0 - 8.0)
+    assert better.evidence - worse.evidence == pytest.approx(50.0)
+
+
+# Scores: unit columns orthogonal to the derivatives by the baseline's parameters.
+
+
+@functools.cache
+def perfect() -> tuple[Fit, Data, Noise, Bank]:
+    """Readings without noise, to isolate the effect."""
+    data, noise = prepared(Model(TIME_S, INTERVAL_S).reading(TRUTH))
+    fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH, held=(3,))
+    effects = [e for e in applicable(CATALOGUE, fit, "eq8", "rad") if not e.spectral]
+    return fit, data, noise, build_bank(fit, noise, effects)
+
+
+def white_residuals(draws: int) -> tuple[Bank, FloatArray]:
+    """The residual of white noise: nothing in the tangent space of the fit."""
+    _, _, _, bank = perfect()
+    drawn = np.random.default_rng(17).standard_normal((len(bank.basis), draws))
+    return bank, drawn - bank.basis @ (bank.basis.T @ drawn)
+
+
+def test_columns_are_of_unit_length_and_beside_the_models_tangent_space() -> None:
+    """To single precision, in which they are kept."""
+    fit, _, _, bank = perfect()
+    basis = tangent_basis(fit)
+    np.testing.assert_allclose(basis.T @ basis, np.eye(basis.shape[1]), atol=1e-12)
+    columns = bank.columns.astype(float)
+    np.testing.assert_allclose(np.linalg.norm(columns, axis=0), 1.0, atol=1e-6)
+    assert np.abs(basis.T @ columns).max() < 1e-6
+    for candidate in bank.candidates:
+        own = columns[:, candidate.first : candidate.first + candidate.width]
+        np.testing.assert_allclose(own.T @ own, np.eye(candidate.width), atol=1e-5)
+
+
+def test_of_a_long_record_blocks_of_cycles_tell_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A third of the numbers keeps 97 % of what a kick among 1,300 cycles lowers chi^2 by."""
+    long = Pendulum(quality_factor=1500.0, quadratic=0.0, coulomb=0.0, count=30_000)
+    kicked = Model(long.times(), 1.0 / long.rate_hz, effects=(by_identifier("impulse"),))
+    values = np.append(long.values(), [2e-3, 700.0])
+    noise = 1e-3 * np.random.default_rng(18).standard_normal(long.count)
+    record = fitted(long, kicked.reading(values) + noise)
+    effects = [e for e in applicable(CATALOGUE, record.fit, "eq8", "rad") if not e.spectral]
+    found = {}
+    for name, most in (("part", 16_000), ("whole", 10**9)):
+        monkeypatch.setattr(blocks, "_MANY", most)
+        bank = build_bank(record.fit, record.noise, effects)
+        each = bank.scores(bank.compared(record.fit.residual))
+        found[name] = {key: each[rows].max() for key, rows in bank.rows().items()}
+        found[name]["numbers"] = len(bank.columns)
+    assert found["part"]["numbers"] < found["whole"]["numbers"] / 3.0
+    loud = {key: score for key, score in found["whole"].items() if 50.0 < score < 1e4}
+    assert "impulse" in loud
+    for key, score in loud.items():
+        assert found["part"][key] == pytest.approx(score, rel=0.03)
+
+
+WORTH = {
+    "frequency-drift": 8.0,
+    "equilibrium-step": 8.0,
+    "amplitude-step": 8.0,
+    "frequency-step": 8.0,
+    "impulse": 8.0,
+    "sensor-quadratic": 8.0,
+    "sensor-cubic": 8.0,
+    "cubic-stiffness": 8.0,
+    "offset-drift": 8.0,
+    "release-transient": 8.0,
+    "damping-drift": 0.1,
+    "stribeck-friction": 0.1,
+}
+"""Standard deviations. More of the last two would move a and c by as much as they are."""
+
+
+@pytest.mark.parametrize("name", tuple(WORTH))
+def test_an_effect_scores_its_size_times_its_columns_length(name: str) -> None:
+    """Moved nonlinearly and refitted, to 3 %."""
+    fit, data, noise, bank = perfect()
+    rows, worth = bank.rows()[name], WORTH[name]
+    row = rows[len(rows) // 2]
+    candidate = bank.candidates[row]
+    _, (length,) = scores_and_lengths(fit, noise, candidate.effect, [candidate.shape])
+    size = worth / length
+    truth = np.concatenate([TRUTH, [size], candidate.shape])
+    readings = fit.model.adding(candidate.effect).reading(truth)
+    moved = Data(data.time_s, readings, INTERVAL_S, True, data.weight)
+    left = refine(fit.model, moved, noise, TRUTH, held=(3,)).residual
+    assert bank.columns[:, candidate.first] @ left == pytest.approx(worth, rel=0.03)
+    assert bank.scores(left)[row] == pytest.approx(worth**2, rel=0.06)
+
+
+@pytest.mark.parametrize("name", ["sensor-cubic", "frequency-drift", "equilibrium-step"])
+def test_a_score_of_noise_is_chi_squared_of_one_degree_of_freedom(name: str) -> None:
+    bank, drawn = white_residuals(1500)
+    assert kstest(bank.scores(drawn)[bank.rows()[name][0]], chi2(1).cdf).pvalue > 1e-3
+
+
+def test_a_size_that_cannot_be_negative_scores_with_its_own_sign_alone() -> None:
+    bank, drawn = white_residuals(1500)
+    sided = [row for row, c in enumerate(bank.candidates) if c.effect.one_sided]
+    assert sided
+    scores = bank.scores(drawn)[sided[0]]
+    assert abs(np.count_nonzero(scores == 0.0) - 750) < 4.0 * np.sqrt(1500 / 4)
+    assert kstest(scores[scores > 0.0], chi2(1).cdf).pvalue > 1e-3
+
+
+def test_local_p_values_of_noise_are_uniform_whatever_the_columns() -> None:
+    """Two-sided candidates of one column and of several alike."""
+    bank, drawn = white_residuals(600)
+    local = local_p_values(bank.scores(drawn), bank.freedom)
+    several = [row for row, c in enumerate(bank.candidates) if c.width > 1]
+    assert several
+    for row in (several[0], several[-1], bank.rows()["sensor-quadratic"][0]):
+        assert kstest(local[row], "uniform").pvalue > 1e-3
+
+
+def test_the_strongest_tone_leads_where_no_p_value_is_above_zero() -> None:
+    """Two tones so strong that chance has no number for either: the larger one is the lead."""
+    data, noise = prepared(
+        other_engine(TRUTH)
+        + 8e-3 * np.cos(2.0 * np.pi * 2.3 * TIME_S)
+        + 2e-3 * np.cos(2.0 * np.pi * 0.2 * TIME_S)
+    )
+    fit = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
+    tone = by_identifier("tone-pickup")
+    (lead,) = detect(prepare(fit, data, noise, [tone]), fit, seed=1).leads
+    assert lead.shape[0] == pytest.approx(2.3, abs=0.01)

@@ -1,22 +1,36 @@
-"""The engine against slow and trusted ways, over the whole range of pendulums."""
+"""The engine and its derivatives against slow and trusted ways, for pendulums of all kinds."""
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 from mpmath import mp, mpf
+from scipy.special import ellipe, ellipj, ellipk
 
-from pendpipe.dynamics import Eq8, Release, sample, turning_points
+from pendpipe.dynamics import (
+    JACOBIAN_COLUMNS,
+    Eq8,
+    Release,
+    sample,
+    sample_with_jacobian,
+    turning_points,
+    turning_points_with_jacobian,
+)
 
 from .reference import (
     DIGITS,
     MpmathPendulum,
+    heyoka_samples,
     heyoka_turning_points,
     samples_in_stretches,
     turning_points_in_stretches,
 )
+
+# The engine against slow and trusted ways, over the whole range of pendulums.
 
 W = 2.0 * math.pi * 0.516
 REFERENCE = Eq8(W, quadratic=0.45, hysteretic=0.00596, viscous=0.00596, coulomb=1.4e-6)
@@ -147,3 +161,330 @@ def test_a_motion_taken_up_anew_at_a_turning_point_goes_on_alike(
     )
     # At rest the 2e-13 of the amplitude are left, however small the rest is.
     assert np.all(np.abs(difference) < 1e-9 * (envelope + 2e-4 * y) + rounding)
+
+
+# The derivatives by every parameter, exact through all turning points and the stop.
+
+MODEL = Eq8(W, quadratic=0.45, hysteretic=0.02, viscous=0.03, coulomb=2e-4)
+Y = 0.068
+RATES = ("quadratic", "hysteretic", "viscous", "coulomb", "omega")
+STEP = mpf(10) ** -12
+
+
+def changed(pendulum: MpmathPendulum, y: Any, name: str, step: Any) -> tuple[MpmathPendulum, Any]:
+    """Return the pendulum and its release with one of them changed."""
+    if name == "angle":
+        return pendulum, y + step
+    return replace(pendulum, **{name: getattr(pendulum, name) + step}), y
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "model",
+    [MODEL, Eq8(W, 1.0, 0.1, 0.3, 2e-3), Eq8(W, 1e-4, 1e-6, 1e-6, 1e-8)],
+    ids=["Q of 40", "Q of 4, near the stop", "Q of a hundred thousand"],
+)
+def test_turning_points_change_as_forty_digit_differences_say(model: Eq8) -> None:
+    count = 8
+    columns = [*RATES, "angle"]
+    with mp.workdps(DIGITS):
+        pendulum = MpmathPendulum.of(model)
+        by_time, by_angle = [], []
+        for name in columns:
+            up, down = (
+                moved.turning_points(y, count)
+                for moved, y in (changed(pendulum, mpf(Y), name, s) for s in (STEP, -STEP))
+            )
+            by_time.append(
+                [float((a - b) / (2 * STEP)) for a, b in zip(up[0], down[0], strict=True)]
+            )
+            by_angle.append(
+                [float((a - b) / (2 * STEP)) for a, b in zip(up[1], down[1], strict=True)]
+            )
+    # Of a long motion the map is tabulated, of a short one it is not.
+    for long in (count, 40):
+        found = turning_points_with_jacobian(model, Release(0.0, Y), long)
+        points, times, angles = found[0], found[1][:count], found[2][:count]
+        assert points.time_s.size > count - 1
+        assert times.shape == angles.shape == (count, len(JACOBIAN_COLUMNS))
+        for exact, own in ((by_time, times[:, :6]), (by_angle, angles[:, :6])):
+            expected = np.array(exact).T
+            scale = np.abs(expected).max(axis=0)
+            np.testing.assert_allclose(own / scale, expected / scale, rtol=0, atol=1e-10)
+        np.testing.assert_array_equal(times[:, 6:], [[1.0, 0.0]] * count)
+        np.testing.assert_array_equal(angles[:, 6:], [[0.0, 1.0]] * count)
+
+
+@pytest.mark.slow
+def test_samples_change_as_forty_digit_differences_say() -> None:
+    times = np.array([0.7, 2.3, 4.1])
+    step = mpf(10) ** -8
+    with mp.workdps(22):
+        pendulum = MpmathPendulum.of(MODEL)
+        expected = []
+        for name in [*RATES, "angle"]:
+            (up, y_up), (down, y_down) = (changed(pendulum, mpf(Y), name, s) for s in (step, -step))
+            expected.append(
+                [
+                    float((up.angle_at(y_up, mpf(t)) - down.angle_at(y_down, mpf(t))) / (2 * step))
+                    for t in times
+                ]
+            )
+    for more in ([], [200.0]):
+        # Of a long record the map is tabulated.
+        _, jacobian = sample_with_jacobian(MODEL, Release(0.0, Y), np.append(times, more))
+        for column, exact in enumerate(expected):
+            np.testing.assert_allclose(
+                jacobian[: len(times), column], exact, rtol=0, atol=1e-9 * np.abs(exact).max()
+            )
+
+
+def test_the_columns_of_release_and_offset() -> None:
+    time = np.linspace(2.0, 90.0, 1001)
+    release = Release(1.0, -Y, 0.3)
+    angle, jacobian = sample_with_jacobian(MODEL, release, time)
+    np.testing.assert_array_equal(jacobian[:, 7], 1.0)
+    np.testing.assert_allclose(angle, sample(MODEL, release, time), rtol=1e-12)
+    # A later release is the same motion later: minus the velocity.
+    step = 1e-3
+    later, earlier = (sample(MODEL, replace(release, time_s=1.0 + s), time) for s in (step, -step))
+    twice = [sample(MODEL, replace(release, time_s=1.0 + 2 * s), time) for s in (step, -step)]
+    slope = (8 * (later - earlier) - (twice[0] - twice[1])) / (12 * step)
+    quiet = np.abs(jacobian[:, 6]) > 0.2 * np.abs(jacobian[:, 6]).max()  # far from the kinks
+    np.testing.assert_allclose(jacobian[quiet, 6], slope[quiet], rtol=1e-6)
+
+
+@given(
+    st.floats(0.0, 0.5),
+    st.floats(0.0, 0.1),
+    st.floats(0.0, 0.1),
+    st.floats(0.0, 3e-4),
+    st.floats(0.01, 0.4),
+    st.integers(10, 400),
+)
+@example(0.0, 0.0, 1e-16, 0.0, 0.015625, 23)  # hardly any change: ln y at the mercy of rounding
+@settings(max_examples=60, deadline=None)
+def test_every_column_goes_on_alike_where_the_motion_is_taken_up_anew(
+    a: float, b_h: float, b_v: float, c: float, y: float, half_cycles: int
+) -> None:
+    model, release = Eq8(W, a, b_h, b_v, c), Release(0.0, y)
+    time = np.linspace(0.0, half_cycles * math.pi / W, 997)
+    angle, jacobian = sample_with_jacobian(model, release, time)
+    anew, columns = samples_in_stretches(model, release, time)
+    np.testing.assert_allclose(angle, anew, rtol=0, atol=1e-10 * y)
+    scale = np.abs(columns).max(axis=0) + 1e-300
+    np.testing.assert_allclose(jacobian / scale, columns / scale, rtol=0, atol=1e-9)
+
+
+def test_the_rest_level_changes_as_the_last_turning_point() -> None:
+    model = Eq8(W, 0.1, 0.01, 0.01, 3e-3)
+    release = Release(0.0, Y, 0.01)
+    stop = turning_points(model, release)
+    time = np.append(np.linspace(0.0, stop.time_s[-1], 50), stop.time_s[-1] + np.array([0.1, 9.0]))
+    angle, jacobian = sample_with_jacobian(model, release, time)
+    points, _, angles = turning_points_with_jacobian(model, release, 99)
+    assert points.stopped
+    assert angle[-1] == angle[-2] == pytest.approx(points.angle_rad[-1], abs=1e-14)
+    np.testing.assert_allclose(jacobian[-1], angles[-1], rtol=1e-9, atol=1e-12)
+    np.testing.assert_array_equal(jacobian[-1], jacobian[-2])
+    for column, name in enumerate(JACOBIAN_COLUMNS[:4]):
+        value = getattr(model, name)
+        up, down = (
+            turning_points(replace(model, **{name: value * (1 + s)}), release).angle_rad[-1]
+            for s in (1e-5, -1e-5)
+        )
+        assert jacobian[-1, column] == pytest.approx((up - down) / (2e-5 * value), rel=1e-6)
+
+
+def test_the_sign_of_the_friction_makes_no_jump_to_miss() -> None:
+    # Through 200 turning points the change with omega is that of differences; automatic
+    # differentiation through sgn(v) gets it wrong several times over.
+    time = np.linspace(0.0, 200.0, 4001)
+    release = Release(0.0, Y)
+    model = Eq8(W, 0.45, 0.00596, 0.00596, 1.4e-6)
+    _, jacobian = sample_with_jacobian(model, release, time)
+    step = 1e-5
+    up, down, up2, down2 = (
+        sample(replace(model, angular_frequency=W + s), release, time)
+        for s in (step, -step, 2 * step, -2 * step)
+    )
+    difference = (8 * (up - down) - (up2 - down2)) / (12 * step)
+    error = np.abs(difference - jacobian[:, 4]) / np.abs(difference).max()
+    # Where a turning point lies between the differences, these are off by its kink.
+    assert np.quantile(error, 0.9) < 1e-8
+    assert error.max() < 1e-6
+
+
+# Eq. 8 with the torque omega^2 sin x, against heyoka, elliptic functions and its energy law.
+
+SWINGS_FAR = Eq8(W, quadratic=0.02, hysteretic=0.004, viscous=0.006, coulomb=1e-4, restoring="sine")
+STENCIL = {2: -1.0, 1: 8.0, -1: -8.0, -2: 1.0}
+"""Weights of a derivative to fourth order, over 12 steps."""
+
+
+def moves_by_sine(model: Eq8, y: float) -> bool:
+    """Say whether the restoring torque at rest exceeds the friction."""
+    w, s = model.angular_frequency, 2.0 * math.sin(0.5 * y)
+    friction = (
+        math.pi / 2 * (w * model.coulomb + model.hysteretic * w * s + model.quadratic * w * s**2)
+    )
+    return friction < w**2 * math.sin(y)
+
+
+@pytest.mark.parametrize("y", [0.01, 0.29, 0.31, 1.0, 2.0, 2.9, 3.1])
+def test_without_losses_it_is_jacobis_elliptic_function(y: float) -> None:
+    k = math.sin(0.5 * y)
+    time = np.linspace(0.0, 100.0, 5001)
+    sn, _, dn, _ = ellipj(W * time + ellipk(k * k), k * k)
+    assert np.all(dn > 0.0)
+    angle = sample(Eq8(W, restoring="sine"), Release(0.0, y), time)
+    np.testing.assert_allclose(angle, 2.0 * np.arcsin(k * sn), rtol=0, atol=1e-9 * y)
+
+
+@st.composite
+def far_pendulums(draw: st.DrawFn) -> tuple[Eq8, float]:
+    """Draw a pendulum with Q from 10 to 1e5, and the amplitude of the release up to 2.9 rad."""
+    omega = 10.0 ** draw(st.floats(-1.0, 2.0))
+    y = draw(st.floats(0.01, 2.9))
+    rate = omega / 20.0 * 10.0 ** -draw(st.floats(0.0, 4.0))
+    shares = np.array([draw(st.sampled_from([0.0, 0.1, 1.0])) for _ in range(4)]) + 1e-6
+    rates = rate * shares / shares.sum()
+    return Eq8(omega, rates[0] / y, rates[1], rates[2], rates[3] * y, restoring="sine"), y
+
+
+@given(far_pendulums())
+@example((replace(SWINGS_FAR, coulomb=0.0), 2.9))
+@example((SWINGS_FAR, 0.3))
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_turning_points_agree_with_heyoka(drawn: tuple[Eq8, float]) -> None:
+    model, y = drawn
+    times, angles = heyoka_turning_points(model, y, 60, lambda angle: moves_by_sine(model, angle))
+    points = turning_points(model, Release(0.0, y), count=60)
+    assert points.time_s.size == times.size
+    np.testing.assert_allclose(points.angle_rad, angles, rtol=0, atol=1e-10 * y)
+    # How long it takes from near the top hangs on the last digit of the amplitude.
+    late = np.abs(points.time_s - times) * model.angular_frequency
+    assert np.max(late) < 1e-9
+
+
+@pytest.mark.parametrize("y", [0.3, 1.0, 2.0, 2.9])
+def test_samples_agree_with_heyoka_to_a_billionth_of_the_amplitude(y: float) -> None:
+    time = np.linspace(0.0, 200.0, 997)
+    expected = heyoka_samples(SWINGS_FAR, y, time)
+    angle = sample(SWINGS_FAR, Release(0.0, y), time)
+    np.testing.assert_allclose(angle, expected, rtol=0, atol=1e-9 * y)
+
+
+def test_to_the_stop_from_any_amplitude() -> None:
+    model = replace(SWINGS_FAR, coulomb=0.03)
+    for y in (0.2, 1.5, 2.8):
+        times, angles = heyoka_turning_points(
+            model, y, 999, lambda angle: moves_by_sine(model, angle)
+        )
+        points = turning_points(model, Release(0.0, y))
+        assert points.stopped
+        assert points.time_s.size == times.size
+        assert abs(points.angle_rad[-1]) < model.stop_rad
+        np.testing.assert_allclose(points.angle_rad, angles, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(points.time_s, times, rtol=1e-9)
+
+
+def test_friction_holds_it_where_it_exceeds_the_torque_also_near_the_top() -> None:
+    model = replace(SWINGS_FAR, coulomb=0.03)
+    for y in np.linspace(0.001, 3.14, 400):
+        turned = turning_points(model, Release(0.0, float(y)), count=2).time_s.size
+        assert turned == (2 if moves_by_sine(model, float(y)) else 1)
+    assert moves_by_sine(model, 1.0)
+    assert not moves_by_sine(model, model.stop_rad * (1.0 - 1e-9))
+    assert moves_by_sine(model, model.stop_rad * (1.0 + 1e-9))
+    assert Eq8(W, coulomb=0.7 * W, restoring="sine").stop_rad == math.inf
+
+
+def test_small_amplitudes_are_the_linear_pendulum() -> None:
+    time = np.linspace(0.0, 60.0, 501)
+    linear = sample(replace(SWINGS_FAR, restoring="linear", coulomb=1e-9), Release(0.0, 1e-5), time)
+    sine = sample(replace(SWINGS_FAR, coulomb=1e-9), Release(0.0, 1e-5), time)
+    np.testing.assert_allclose(sine, linear, rtol=0, atol=1e-5 * 1e-9)
+
+
+@pytest.mark.parametrize("y", [0.05, 1.0, 2.0, 2.9])
+@pytest.mark.parametrize("name", JACOBIAN_COLUMNS[:4])
+def test_each_loss_takes_from_the_amplitude_what_its_documentation_states(
+    name: str, y: float
+) -> None:
+    rate = 1e-7
+    model = replace(Eq8(W, restoring="sine"), **{name: rate})
+    points = turning_points(model, Release(0.0, y), count=3)
+    loss = (y - points.angle_rad[2]) / points.time_s[2]
+    k = math.sin(0.5 * y)
+    big_k, big_e = ellipk(k * k), ellipe(k * k)
+    work = {
+        "quadratic": math.pi * y * 4.0 * k * k,
+        "hysteretic": math.pi * y * 2.0 * k,
+        "viscous": 16.0 * (big_e - (1.0 - k * k) * big_k),
+        "coulomb": math.pi * y,
+    }[name]
+    assert loss == pytest.approx(rate * work / (2.0 * big_k * math.sin(y)), rel=1e-4)
+    if y < 0.1:  # Eq. 13
+        power = {"quadratic": 2, "hysteretic": 1, "viscous": 1, "coulomb": 0}[name]
+        assert loss == pytest.approx(rate * y**power, rel=1e-3)
+
+
+@pytest.mark.parametrize("y", [0.4, 1.5, 2.9])
+def test_turning_points_change_as_differences_of_heyokas_do(y: float) -> None:
+    model, count = replace(SWINGS_FAR, coulomb=1e-3), 12
+    values = {name: getattr(model, name) for name in JACOBIAN_COLUMNS[:5]} | {"angle": y}
+    _, times, angles = turning_points_with_jacobian(model, Release(0.0, y), count)
+    for column, (name, value) in enumerate(values.items()):
+        step = 2e-4 * value * (0.1 if name == "angle" else 1.0)
+        moved = [
+            weight
+            * np.array(
+                heyoka_turning_points(model, y + s * step, count)
+                if name == "angle"
+                else heyoka_turning_points(replace(model, **{name: value + s * step}), y, count)
+            )
+            for s, weight in STENCIL.items()
+        ]
+        by_time, by_angle = sum(moved) / (12.0 * step)
+        for own, other in ((times[:, column], by_time), (angles[:, column], by_angle)):
+            np.testing.assert_allclose(own, other, rtol=0, atol=2e-6 * np.abs(other).max())
+
+
+@pytest.mark.parametrize("y", [0.31, 1.0, 2.9])
+def test_samples_change_as_their_differences_do(y: float) -> None:
+    model, release = replace(SWINGS_FAR, coulomb=1e-3), Release(0.5, -y, 0.02)
+    time = np.linspace(1.0, 120.0, 2001)
+    angle, jacobian = sample_with_jacobian(model, release, time)
+    anew = samples_in_stretches(model, release, time)[1]
+    scale = np.abs(anew).max(axis=0)
+    np.testing.assert_allclose(jacobian / scale, anew / scale, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(angle, sample(model, release, time), rtol=0, atol=1e-10)
+    for column, name in enumerate(JACOBIAN_COLUMNS[:7]):
+        rate = name in JACOBIAN_COLUMNS[:5]
+        step = 1e-3 * getattr(model, name) if rate else 1e-4
+        if name == "angular_frequency":
+            step *= 0.01
+        where = {"angle": "angle_rad", "time": "time_s"}.get(name, name)
+        moved = [
+            weight
+            * (
+                sample(replace(model, **{name: getattr(model, name) + s * step}), release, time)
+                if rate
+                else sample(
+                    model, replace(release, **{where: getattr(release, where) + s * step}), time
+                )
+            )
+            for s, weight in STENCIL.items()
+        ]
+        error = np.abs(sum(moved) / (12.0 * step) - jacobian[:, column]) / scale[column]
+        # Where a turning point lies between the differences, these are off by its kink.
+        assert np.quantile(error, 0.9) < 1e-6
+        assert error.max() < 1e-3
+
+
+def test_a_release_beyond_the_top_and_an_unknown_torque_are_refused() -> None:
+    with pytest.raises(ValueError, match="within pi"):
+        sample(SWINGS_FAR, Release(0.0, 3.15), np.arange(3.0))
+    with pytest.raises(ValueError, match="restoring"):
+        Eq8(W, restoring="cubic")  # type: ignore[arg-type]

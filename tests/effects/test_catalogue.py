@@ -1,7 +1,8 @@
-"""The catalogue as a whole: complete, without effect at size zero, its derivatives right."""
+"""The catalogue as a whole, and effects of other packages."""
 
 import math
 import re
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pendpipe.commands.small import catalogue_manual as manual
-from pendpipe.effects import Effect
+from pendpipe.effects import Effect, catalogue
 from pendpipe.effects.baseline import OFFSET, OMEGA, START, TIME, A, B, C, pendulum_of
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
@@ -19,8 +20,9 @@ from pendpipe.errors import InputError
 
 from .pendulums import VALUES, baseline, times
 
-Floats = NDArray[np.float64]
+# The catalogue as a whole: complete, without effect at size zero, its derivatives right.
 
+Floats = NDArray[np.float64]
 DYNAMICS = [
     "circular-error",
     "cubic-stiffness",
@@ -75,7 +77,6 @@ MEASUREMENT = [
     "coloured-noise",
 ]
 """The identifiers that people outside rely on."""
-
 BASE = baseline(a=7.2e-3, b=7.8e-3, c=1.3e-4, share=0.4, offset=0.01)
 RECORD = times(60.0)
 WITH_TEMPLATE = [effect.identifier for effect in CATALOGUE if effect.has_signature]
@@ -308,3 +309,29 @@ def test_what_is_tried_of_an_effect_is_what_is_believed(effect: Effect) -> None:
         behind = bounds[len(bounds) - len(values) :]
         for value, (low, high) in zip(values, behind, strict=True):
             assert value is None or low <= value <= high
+
+
+# Other packages add effects; one that can't be loaded is named in a line and passed over.
+
+
+@dataclass(order=True)
+class Entry:
+    """An entry point of a package that is installed."""
+
+    name: str
+    effect: Effect | None = None
+
+    def load(self) -> Effect:
+        if self.effect is None:
+            raise ImportError(f"no module named {self.name}")
+        return self.effect
+
+
+def test_an_effect_of_another_package_is_found(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    known = tuple(catalogue.CATALOGUE)
+    entries = [Entry("absent"), Entry("other", known[0])]
+    monkeypatch.setattr(catalogue, "entry_points", lambda **_: entries)
+    assert tuple(catalogue._found()) == (*known, known[0])
+    assert "the plugin 'absent' is passed over" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""What changes slowly, suddenly, or periodically."""
+"""What happens in the course of a record; two modes; parts of the loss that are held."""
 
 import math
 from collections.abc import Callable
@@ -6,14 +6,23 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from pendpipe.analysis.free_decay import measure_recording
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.noise import white_noise
+from pendpipe.diagnosis.refine import refine
+from pendpipe.dynamics import Eq8, Release, sample
+from pendpipe.effects.baseline import HYSTERETIC, SHARE, VISCOUS, B, pendulum_of
 from pendpipe.effects.baseline import TIME as TIME_S
-from pendpipe.effects.baseline import pendulum_of
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.effect import STRAIGHT_S, Span
 from pendpipe.effects.model import Model
+from pendpipe.effects.two_modes import two_modes
+from pendpipe.recording import Recording
 
 from .lock_in import lock_in
 from .pendulums import OMEGA, baseline, evaluated, plain, reading, times
+
+# What changes slowly, suddenly, or periodically.
 
 TIME = times(60.0, 0.04)
 CYCLE = 2.0 * math.pi / OMEGA
@@ -277,3 +286,120 @@ def test_a_drive_that_keeps_in_step_is_a_loss() -> None:
     assert unlikely == sorted(unlikely, reverse=True)
     assert unlikely[0] == pytest.approx(2.0 * math.log(2500.0), rel=0.01)
     assert unlikely[2:] == pytest.approx([0.0] * 3, abs=1e-6)
+
+
+# Two damped modes are told apart by their readings.
+
+MODES_TIME = np.arange(0.0, 80.0, 0.01)
+TRUTH = ((0.80, 0.02, 0.5), (0.86, 0.03, 0.3))
+
+
+def motion(time: np.ndarray) -> np.ndarray:
+    return sum(
+        size * np.exp(-loss * time) * np.cos(2.0 * np.pi * hertz * time)
+        for hertz, loss, size in TRUTH
+    )
+
+
+def test_frequencies_losses_and_amplitudes_are_within_their_errors() -> None:
+    pulls = []
+    keep = (MODES_TIME < 30.0) | (MODES_TIME > 33.0)
+    for seed in range(20):
+        noise = 0.02 * np.random.default_rng(seed).standard_normal(len(MODES_TIME))
+        modes = two_modes(MODES_TIME[keep], (0.1 + motion(MODES_TIME) + noise)[keep], 0.61)
+        assert modes is not None
+        for mode, truth in zip(modes, TRUTH, strict=True):
+            found = (mode.frequency, mode.loss, mode.amplitude)
+            pulls += [
+                (each.value - true) / each.sd for each, true in zip(found, truth, strict=True)
+            ]
+            assert not mode.driven
+    assert np.std(pulls) == pytest.approx(1.0, abs=0.25)
+
+
+def test_one_pendulum_is_not_two_modes() -> None:
+    # sin x slows it at first; Coulomb friction bends its envelope: no two modes explain that.
+    values = sample(Eq8(5.0, 0.05, 0.0, 0.0, 0.02, "sine"), Release(-0.1, 2.5), MODES_TIME)
+    assert two_modes(MODES_TIME, values, 0.65) is None
+    noise = np.random.default_rng(1).standard_normal(len(MODES_TIME))
+    assert two_modes(MODES_TIME, noise, 0.6) is None
+
+
+def test_a_mode_without_loss_is_driven() -> None:
+    free = 0.3 * np.exp(-0.05 * MODES_TIME) * np.cos(5.0 * MODES_TIME)
+    noise = 1e-3 * np.random.default_rng(2).standard_normal(len(MODES_TIME))
+    modes = two_modes(MODES_TIME, free + 0.2 * np.cos(5.3 * MODES_TIME) + noise, 0.62)
+    assert modes is not None
+    assert [mode.driven for mode in modes] == [False, True]
+
+
+def test_a_knock_is_not_two_modes_where_one_decay_may_do() -> None:
+    # Half of the amplitude is regained at once: one mode explains most of it, and so do two.
+    one = 0.3 * np.exp(-0.05 * MODES_TIME) * np.cos(5.0 * MODES_TIME)
+    later = np.maximum(MODES_TIME - 30.0, 0.0)
+    knocked = one + 0.05 * (MODES_TIME > 30.0) * np.exp(-0.05 * later) * np.sin(5.0 * later)
+    noise = 1e-3 * np.random.default_rng(2).standard_normal(len(MODES_TIME))
+    assert two_modes(MODES_TIME, knocked + noise, 0.62, may_be_one=True) is None
+    beat = motion(MODES_TIME) + noise
+    assert two_modes(MODES_TIME, beat, 0.61, may_be_one=True) is not None
+
+
+@pytest.mark.parametrize("phase", [0.0, 2.8, np.pi])
+def test_a_beat_may_begin_at_its_node_or_at_its_top(phase: float) -> None:
+    time = np.arange(700) * 0.0507
+    first = 0.1 * np.exp(-0.018 * time) * np.cos(2.0 * np.pi * 0.7075 * time)
+    second = 0.09 * np.exp(-0.018 * time) * np.cos(2.0 * np.pi * 0.7345 * time + phase)
+    noise = 8e-4 * np.random.default_rng(3).standard_normal(len(time))
+    points, _ = measure_recording(Recording(time, first + second + noise, "angle_rad"), "the test")
+    assert any(note.startswith("two modes beat: 0.707") for note in points.notes)
+
+
+# b = b_h + b_v with a part held: what is left of b, and what it does to the readings.
+
+HELD_TIME_S = np.arange(600) / 15.0
+VALUE = np.array([7.2e-3, 9.6e-3, 1.3e-4, 0.4, 2.0 * np.pi * 0.9, 0.15, -0.3, 0.01])
+RATE = {HYSTERETIC: 0.4 * 9.6e-3, VISCOUS: 0.6 * 9.6e-3}
+
+
+def model_with(*parts: str) -> Model:
+    return Model(HELD_TIME_S, 1.0 / 15.0, parts={part: RATE[part] for part in parts})
+
+
+@pytest.mark.parametrize("part", [HYSTERETIC, VISCOUS])
+@pytest.mark.parametrize("factor", [1.0, 1.5, 4.0])
+def test_a_held_part_stays_whatever_the_whole_is(part: str, factor: float) -> None:
+    value = VALUE.copy()
+    value[B] *= factor
+    pendulum = pendulum_of(model_with(part).settled(value))
+    assert getattr(pendulum, part) == pytest.approx(RATE[part], rel=1e-12)
+    assert pendulum.linear == pytest.approx(value[B], rel=1e-12)
+
+
+def test_two_held_parts_make_the_whole() -> None:
+    value = VALUE.copy()
+    value[[B, SHARE]] = 0.1, 0.9
+    pendulum = pendulum_of(model_with(HYSTERETIC, VISCOUS).settled(value))
+    assert pendulum.hysteretic == pytest.approx(RATE[HYSTERETIC], rel=1e-12)
+    assert pendulum.viscous == pytest.approx(RATE[VISCOUS], rel=1e-12)
+
+
+@pytest.mark.parametrize("part", [HYSTERETIC, VISCOUS])
+def test_b_acts_on_the_readings_as_its_other_part_does(part: str) -> None:
+    """The fit's derivative by b is that of readings with the held part kept."""
+    model, rms = model_with(part), 1e-4
+    data = Data(HELD_TIME_S, model.reading(VALUE), 1.0 / 15.0, True, np.ones(len(HELD_TIME_S)))
+    fit = refine(model, data, white_noise(data, rms), VALUE, rounds=0)
+    assert SHARE not in fit.free
+    step = 1e-6
+    low, high = VALUE.copy(), VALUE.copy()
+    low[B] -= step
+    high[B] += step
+    change = model.reading(model.settled(high)) - model.reading(model.settled(low))
+    slope = change / (2.0 * step)
+    by_other = slope - rms * fit.jacobian[:-1, B]
+    assert np.linalg.norm(by_other) < 1e-4 * np.linalg.norm(slope)
+    # The share's part of it is small, but seen.
+    alone = (
+        rms * refine(model_with(), data, white_noise(data, rms), VALUE, rounds=0).jacobian[:-1, B]
+    )
+    assert np.linalg.norm(slope - alone) > 3.0 * np.linalg.norm(by_other)

@@ -1,11 +1,13 @@
-"""The compound pendulum: textbook bodies, the paper's apparatus, and water."""
+"""The pendulum in its fluid: inertia, drag, walls, and its free decay."""
 
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
+from pendpipe import physics
 from pendpipe.physics import (
     STANDARD_GRAVITY_M_PER_S2,
     Fluid,
@@ -14,16 +16,32 @@ from pendpipe.physics import (
     Rod,
     Sphere,
     added_inertia,
+    added_mass_coefficient,
     bearing_friction_rate,
+    harmonic_drag,
     inertia_from_frequency,
     moment_of_inertia,
+    penetration_depth,
     period_lengthening,
+    quadratic_drag_rate,
     restoring_torque,
     sphere_volume,
     static_moment,
+    stokes_drag,
     swing,
     viscous_quality_factor,
+    water_density,
+    water_viscosity,
 )
+from pendpipe.physics.confinement import (
+    Confined,
+    Surface,
+    _side_images,
+    sphere_between_planes,
+    sphere_in_tank,
+)
+
+# The compound pendulum: textbook bodies, the paper's apparatus, and water.
 
 WATER = Fluid(1000.0, 1.0016e-3)
 G = STANDARD_GRAVITY_M_PER_S2
@@ -166,3 +184,355 @@ def test_units_scale_out_of_the_frequency() -> None:
     small = swing([Rod(0.1, 0.5, 0.1), PointMass(0.7, 0.3)])
     large = swing([Rod(0.3, 1.0, 0.2), PointMass(2.1, 0.6)])
     assert large.frequency_hz * np.sqrt(2.0) == pytest.approx(small.frequency_hz, rel=1e-14)
+
+
+# Properties of water, and what a sphere loses in it (Eqs. 2 to 4, 16).
+
+
+def test_viscosity_at_20_c_is_the_papers() -> None:
+    assert round(float(water_viscosity(20.0)) * 1e3, 4) == 1.0016
+
+
+def test_viscosity_of_the_saturated_liquid_tables() -> None:
+    # IAPWS values for the saturated liquid at 290, 300, 320 and 340 K, in uPa s.
+    kelvin = np.array([290.0, 300.0, 320.0, 340.0])
+    np.testing.assert_allclose(
+        water_viscosity(kelvin - 273.15) * 1e6, [1084.0, 853.84, 577.02, 421.97], rtol=1e-3
+    )
+
+
+def test_density_of_the_recommended_table() -> None:
+    # Tanaka et al. 2001: largest at 3.983035 C; 998.2067 at 20 C, 997.0470 at 25 C.
+    np.testing.assert_allclose(
+        water_density([3.983035, 20.0, 25.0]), [999.97495, 998.2067, 997.0470], rtol=5e-8
+    )
+    assert np.argmax(water_density(np.linspace(0.0, 10.0, 1001))) == 398
+
+
+def test_outside_the_formulas_range_there_is_no_value() -> None:
+    assert np.isnan(water_viscosity([-21.0, 111.0])).all()
+    assert np.isnan(water_density([-1.0, 41.0])).all()
+
+
+def test_a_kelvin_changes_the_viscous_quality_factor_by_about_a_percent() -> None:
+    q = viscous_quality_factor(
+        0.099, 3.24, 0.01895, 0.452, water_viscosity([20.0, 21.0]), water_density([20.0, 21.0])
+    )
+    assert 0.010 < q[1] / q[0] - 1.0 < 0.014
+
+
+VISCOSITY, DENSITY = 1.0016e-3, 1000.0
+RADIUS, DISTANCE, INERTIA = 0.01895, 0.452, 0.099
+OMEGA = 2.0 * np.pi * 0.516
+
+
+def decades(low: int, high: int) -> st.SearchStrategy[float]:
+    return st.floats(low, high).map(lambda power: 10.0**power)
+
+
+@pytest.mark.parametrize(("frequency", "ratio"), [(0.516, 24.1), (0.05, 7.5), (1.06, 34.6)])
+def test_sphere_is_many_penetration_depths_in_radius(frequency: float, ratio: float) -> None:
+    depth = penetration_depth(2.0 * np.pi * frequency, VISCOSITY, DENSITY)
+    assert RADIUS / depth == pytest.approx(ratio, abs=0.05)
+
+
+def test_history_term_at_the_papers_record_is_25_times_steady_stokes() -> None:
+    harmonic = harmonic_drag(0.01, 0.019, OMEGA, VISCOSITY, DENSITY)
+    assert harmonic / stokes_drag(0.01, 0.019, VISCOSITY) == pytest.approx(25.2, abs=0.05)
+
+
+def test_eq16_at_the_papers_record() -> None:
+    values = viscous_quality_factor(
+        INERTIA, OMEGA, np.array([0.019, 0.01895]), DISTANCE, VISCOSITY, DENSITY
+    )
+    np.testing.assert_allclose(values, [174.0, 174.9], atol=0.05)
+
+
+def test_eq16_is_the_energy_over_the_loss_of_a_radian() -> None:
+    y = 0.01
+    phase = 2.0 * np.pi * np.arange(64) / 64
+    velocity = DISTANCE * OMEGA * y * np.cos(phase)
+    power = harmonic_drag(velocity, RADIUS, OMEGA, VISCOSITY, DENSITY) * velocity
+    loss_in_cycle = np.mean(power) * 2.0 * np.pi / OMEGA
+    quality = 2.0 * np.pi * 0.5 * INERTIA * (OMEGA * y) ** 2 / loss_in_cycle
+    theory = viscous_quality_factor(INERTIA, OMEGA, RADIUS, DISTANCE, VISCOSITY, DENSITY)
+    assert theory == pytest.approx(quality, rel=1e-13)
+
+
+@given(omega=decades(-2, 3), radius=decades(-4, 0), viscosity=decades(-6, 0), rho=decades(0, 4))
+def test_drag_and_added_mass_are_the_two_parts_of_the_stokes_solution(
+    omega: float, radius: float, viscosity: float, rho: float
+) -> None:
+    # Force on a sphere moving as exp(-i omega t): 6 pi eta a (1 + z + z^2/9) v with
+    # z = sqrt(-i omega rho a^2/eta); its imaginary part is -omega times the added mass.
+    z = np.sqrt(-1j * omega * rho / viscosity) * radius
+    impedance = 6.0 * np.pi * viscosity * radius * (1.0 + z + z**2 / 9.0)
+    displaced = rho * sphere_volume(radius)
+    assert harmonic_drag(1.0, radius, omega, viscosity, rho) == pytest.approx(
+        impedance.real, rel=1e-12
+    )
+    assert added_mass_coefficient(radius, omega, viscosity, rho) == pytest.approx(
+        -impedance.imag / omega / displaced, rel=1e-12
+    )
+
+
+def test_drag_falls_to_steady_stokes_at_zero_frequency_and_without_history() -> None:
+    steady = stokes_drag(1.0, RADIUS, VISCOSITY)
+    assert harmonic_drag(1.0, RADIUS, 1e-16, VISCOSITY, DENSITY) == pytest.approx(steady, rel=1e-6)
+    assert harmonic_drag(1.0, RADIUS, OMEGA, VISCOSITY, DENSITY, 0.0) == steady
+
+
+def test_added_mass_at_the_papers_record() -> None:
+    assert added_mass_coefficient(RADIUS, OMEGA, VISCOSITY, DENSITY) == pytest.approx(
+        0.593, abs=5e-4
+    )
+    assert added_mass_coefficient(RADIUS, OMEGA, 0.0, DENSITY) == 0.5
+
+
+def test_quadratic_drag_of_the_papers_record() -> None:
+    rate = quadratic_drag_rate(0.62, INERTIA, OMEGA, RADIUS, DISTANCE, DENSITY)
+    assert rate == pytest.approx(0.45, abs=0.002)
+
+
+def test_quadratic_drag_rate_is_the_energy_loss_of_harmonic_motion() -> None:
+    y, coefficient = 0.05, 0.62
+    phase = 2.0 * np.pi * np.arange(4096) / 4096
+    speed = np.abs(DISTANCE * OMEGA * y * np.cos(phase))
+    force = 0.5 * DENSITY * coefficient * np.pi * RADIUS**2 * speed**2
+    mean_power = np.mean(force * speed)
+    # d(I omega^2 y^2/2)/dt = -power, so y' = -power/(I omega^2 y) = -a y^2.
+    a = mean_power / (INERTIA * OMEGA**2 * y**3)
+    assert quadratic_drag_rate(
+        coefficient, INERTIA, OMEGA, RADIUS, DISTANCE, DENSITY
+    ) == pytest.approx(a, rel=1e-6)
+
+
+# A sphere oscillating near walls: published limits, symmetry, convergence.
+
+A = 1.0
+
+
+def impedance(found: Confined, depth: float) -> complex:
+    """Force per velocity in units of 6 pi eta a, for a = 1."""
+    alpha = (1.0 - 1.0j) / depth
+    return found.force_factor * (1.0 + alpha + alpha**2 / 9.0)
+
+
+@pytest.mark.parametrize("depth", [1e-3, 0.1, 1.0])
+def test_distant_walls_leave_the_unbounded_sphere(depth: float) -> None:
+    found = sphere_between_planes(A, 1e3, depth)
+    assert found.force_factor == pytest.approx(1.0, abs=2e-3 * depth + 1e-9)
+    assert found.added_mass_coefficient == pytest.approx(0.5 + 2.25 * depth, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("distance", "published"),
+    [(10.0677, 1.0591), (3.7622, 1.1738), (2.3524, 1.3079), (1.5431, 1.5675)],
+)
+def test_slow_sphere_near_a_floor_has_the_steady_resistance(
+    distance: float, published: float
+) -> None:
+    # Goldman, Cox and Brenner (1967): translation without rotation, parallel to a wall.
+    found = sphere_between_planes(A, distance, 1e3, order=20)
+    assert impedance(found, 1e3).real == pytest.approx(published, abs=2e-4)
+
+
+def test_slow_sphere_far_from_a_floor_follows_lorentz() -> None:
+    found = sphere_between_planes(A, 30.0, 1e3)
+    assert impedance(found, 1e3).real == pytest.approx(1.0 + 9.0 / 16.0 / 30.0, abs=4e-4)
+
+
+@pytest.mark.parametrize(("surface", "sign"), [("film", 1.0), ("slip", 1.0)])
+def test_thin_layers_leave_lambs_image_of_the_sphere(surface: Surface, sign: float) -> None:
+    distance = 5.0
+    found = sphere_between_planes(A, 60.0, 1e-5, surface_m=distance, surface=surface)
+    image = 0.5 * (1.0 + sign * 3.0 / 16.0 / distance**3)
+    assert found.added_mass_coefficient - 2.25e-5 == pytest.approx(image, abs=2e-5)
+
+
+def test_floor_and_lid_can_be_exchanged() -> None:
+    one = sphere_between_planes(A, 1.4, 0.05, surface_m=2.5)
+    other = sphere_between_planes(A, 2.5, 0.05, surface_m=1.4)
+    assert one.force_factor == pytest.approx(other.force_factor, rel=1e-9)
+
+
+@pytest.mark.parametrize("surface", ["film", "slip"])
+def test_distant_surface_leaves_the_floor_alone(surface: Surface) -> None:
+    alone = sphere_between_planes(A, 1.4, 0.05)
+    covered = sphere_between_planes(A, 1.4, 0.05, surface_m=80.0, surface=surface)
+    assert covered.force_factor == pytest.approx(alone.force_factor, rel=1e-5)
+
+
+@pytest.mark.parametrize("surface", ["film", "slip"])
+def test_layers_cost_added_mass_as_much_as_drag(surface: Surface) -> None:
+    """The force is analytic in alpha: its term of first order has equal real and imaginary part."""
+    thin, thinner = (
+        sphere_between_planes(A, 1.32, depth, surface_m=1.32, surface=surface)
+        for depth in (2e-4, 1e-4)
+    )
+    slope = (thin.added_mass_coefficient - thinner.added_mass_coefficient) / 1e-4
+    assert slope / 2.25 == pytest.approx(thinner.drag_factor, rel=2e-3)
+
+
+@pytest.mark.parametrize("depth", [0.03, 0.3])
+def test_orders_converge_geometrically(depth: float) -> None:
+    best = sphere_between_planes(A, 1.32, depth, surface_m=1.32, order=32).force_factor
+    errors = [
+        abs(sphere_between_planes(A, 1.32, depth, surface_m=1.32, order=order).force_factor - best)
+        for order in (4, 8, 16)
+    ]
+    assert errors[1] < 0.05 * errors[0]
+    assert errors[2] < 0.05 * errors[1]
+    assert errors[2] < 1e-7
+
+
+# The paper's tank, 23 cm by 11 cm by 5 cm, and its sphere.
+SPHERE, MIDDLE = 0.01895, 0.025
+
+
+@pytest.mark.parametrize(("length", "width", "expected"), [(0.23, 0.11, 0.67), (0.11, 0.23, 0.64)])
+def test_tank_with_thin_layers_has_the_added_mass_of_potential_flow(
+    length: float, width: float, expected: float
+) -> None:
+    # Laplace's equation in the box by fundamental solutions, which shares nothing with this.
+    found = sphere_in_tank(
+        SPHERE, MIDDLE, 1e-6, surface_m=MIDDLE, length_m=length, width_m=width, surface="film"
+    )
+    assert found.added_mass_coefficient == pytest.approx(expected, rel=0.025)
+
+
+def test_side_walls_act_as_the_images_of_the_dipole_in_them() -> None:
+    length, width, aside = 0.2, 0.11, 0.015
+    n, m = np.arange(-400, 401)[:, None], np.arange(-400, 401)
+    x, y = n * length, m * width - np.where(m % 2, 2.0 * aside, 0.0)
+    square = np.where((n == 0) & (m == 0), np.inf, x**2 + y**2)
+    # The rows farther and farther along cancel in pairs: half the last ones.
+    weight = np.where(np.abs(n) == 400, 0.5, 1.0) * (-1.0) ** n
+    direct = np.sum(weight * (y**2 - x**2) / square**2)
+    assert _side_images(length, width, aside) == pytest.approx(direct, rel=1e-3)
+
+
+def test_left_and_right_of_the_middle_are_the_same_and_a_near_side_wall_adds() -> None:
+    def force(aside: float) -> complex:
+        return sphere_in_tank(
+            SPHERE,
+            MIDDLE,
+            5e-4,
+            surface_m=MIDDLE,
+            length_m=0.23,
+            width_m=0.11,
+            off_centre_m=aside,
+        ).force_factor
+
+    assert force(0.015) == pytest.approx(force(-0.015), rel=1e-12)
+    assert force(0.0).real < force(0.015).real < force(0.03).real
+
+
+def test_large_tank_is_two_planes() -> None:
+    wide = sphere_in_tank(
+        SPHERE, MIDDLE, 5e-4, surface_m=MIDDLE, length_m=90.0, width_m=90.0, surface="film"
+    )
+    planes = sphere_between_planes(SPHERE, MIDDLE, 5e-4, surface_m=MIDDLE)
+    assert wide.force_factor == pytest.approx(planes.force_factor, rel=1e-5)
+
+
+def test_walls_inside_the_sphere_are_refused() -> None:
+    with pytest.raises(ValueError, match="outside the sphere"):
+        sphere_between_planes(0.02, 0.019, 1e-3)
+    with pytest.raises(ValueError, match="side walls"):
+        sphere_in_tank(0.02, 0.03, 1e-3, surface_m=0.03, length_m=0.2, width_m=0.03)
+    with pytest.raises(ValueError, match="side walls"):
+        sphere_in_tank(
+            0.02, 0.03, 1e-3, surface_m=0.03, length_m=0.2, width_m=0.06, off_centre_m=0.02
+        )
+
+
+# A free decay in a fluid that remembers.
+
+MOMENT, STEADY, HISTORY, TORQUE = 0.0988, 7.3e-5, 3.0e-3, 1.04
+
+
+def test_root_is_that_of_an_independent_solver() -> None:
+    mpmath.mp.dps = 30
+
+    def equation(s: mpmath.mpc) -> mpmath.mpc:
+        return MOMENT * s**2 + STEADY * s + HISTORY * s ** mpmath.mpf("1.5") + TORQUE
+
+    exact = mpmath.findroot(equation, mpmath.mpc(0, mpmath.sqrt(TORQUE / MOMENT)))
+    root = physics.free_decay_root(MOMENT, STEADY, HISTORY, TORQUE)
+    assert root.real == pytest.approx(float(exact.real), rel=1e-13)
+    assert root.imag == pytest.approx(float(exact.imag), rel=1e-13)
+
+
+@pytest.mark.parametrize("exponent", [0.0, -2.0])
+def test_solid_friction_is_inside_the_root(exponent: float) -> None:
+    mpmath.mp.dps = 30
+    torque = 0.02
+
+    def equation(real: mpmath.mpf, imaginary: mpmath.mpf) -> list[mpmath.mpf]:
+        s = mpmath.mpc(real, imaginary)
+        solid = torque * abs(s) ** (exponent - 1.0) * s
+        left = MOMENT * s**2 + (STEADY * s + solid) + HISTORY * s ** mpmath.mpf("1.5") + TORQUE
+        return [left.real, left.imag]
+
+    exact = mpmath.findroot(equation, (-0.02, mpmath.sqrt(TORQUE / MOMENT)))
+    root = physics.free_decay_root(MOMENT, STEADY, HISTORY, TORQUE, torque, exponent)
+    assert root.real == pytest.approx(float(exact[0]), rel=1e-12)
+    assert root.imag == pytest.approx(float(exact[1]), rel=1e-12)
+
+
+def test_without_memory_it_is_the_damped_oscillator() -> None:
+    root = physics.free_decay_root(0.1, 0.02, 0.0, 1.0)
+    assert -root.real == pytest.approx(0.1, rel=1e-14)  # D/(2 I)
+    assert abs(root) ** 2 == pytest.approx(10.0, rel=1e-14)  # K/I
+
+
+def test_a_weak_memory_gives_the_drag_of_a_harmonic_motion_over_less_inertia() -> None:
+    """The rate is D/(2 (I_all - I_layer/4)), to first order in the memory's inertia."""
+    history = 1e-6 * np.array([1.0, 4.0])
+    omega = np.sqrt(TORQUE / MOMENT)
+    drag = history * np.sqrt(omega / 2.0)  # D2 s^(3/2) at s = i omega, in phase with velocity
+    layer = history / np.sqrt(2.0 * omega)
+    first = drag / (2.0 * (MOMENT + layer - 0.25 * layer))
+    omega_all = np.sqrt(TORQUE / (MOMENT + layer))
+    first *= np.sqrt(omega_all / omega)
+    rate = -physics.free_decay_root(MOMENT, 0.0, history, TORQUE).real
+    off = rate / first - 1.0
+    assert np.all(np.abs(off) < (history / MOMENT) ** 2)  # second order is all that is left
+
+
+def test_memory_of_stokes_drag_is_eq_2_and_the_added_mass() -> None:
+    """The two parts of D2 s^(3/2) at s = i omega are Eq. 2's history term and 9 delta/(4 a)."""
+    radius, omega, viscosity, density = 0.019, 3.24, 1.0016e-3, 1000.0
+    history = 6.0 * np.pi * radius**2 * np.sqrt(density * viscosity)
+    force = history * (1j * omega) ** 1.5
+    drag = physics.harmonic_drag(1.0, radius, omega, viscosity, density)
+    drag -= physics.stokes_drag(1.0, radius, viscosity)
+    coefficient = physics.added_mass_coefficient(radius, omega, viscosity, density) - 0.5
+    assert force.imag / omega == pytest.approx(float(drag), rel=1e-12)
+    mass = float(coefficient) * density * float(physics.sphere_volume(radius))
+    assert -force.real / omega**2 == pytest.approx(mass, rel=1e-12)
+
+
+def test_cylinder_with_a_thin_layer_and_with_none() -> None:
+    thin = physics.cylinder_drag(0.1, 100.0, 1e-3, 1000.0)
+    depth = physics.penetration_depth(100.0, 1e-3, 1000.0)
+    assert thin == pytest.approx(4.0 * np.pi * 1e-3 * (0.1 / depth + 0.5), rel=1e-5)
+
+
+def test_cylinder_by_bessel_functions() -> None:
+    from scipy.special import kv
+
+    radius, omega = np.array([2e-4, 2.6e-3, 1e-2]), 0.8
+    viscosity, density = 1.825e-5, 1.204
+    argument = radius * np.sqrt(1j * omega * density / viscosity)
+    ratio = kv(1, argument) / (argument * kv(0, argument))
+    expected = np.pi * density * omega * radius**2 * np.real(4j * ratio)
+    assert physics.cylinder_drag(radius, omega, viscosity, density) == pytest.approx(
+        expected, rel=1e-12
+    )
+
+
+def test_rotation_is_a_ninth_of_a_sphere_twice_as_close() -> None:
+    assert physics.rotation_of_sphere(0.019, 0.452) == pytest.approx(7.853e-4, rel=1e-3)
+    assert physics.rotation_of_sphere(1.0, 2.0) == pytest.approx(1.0 / 9.0)

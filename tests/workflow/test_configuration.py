@@ -1,6 +1,8 @@
-"""The configuration refuses what it does not know, and says what was meant."""
+"""The configuration, results on disk, and places where nothing can be written."""
 
 import copy
+import json
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,9 +11,14 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from benchmarks.acquisition import recorded_bytes
 
+from pendpipe import manifest
+from pendpipe.acquisition.raw import lock
 from pendpipe.analysis.fit.result import FitResult
+from pendpipe.cli import main
 from pendpipe.commands import small
+from pendpipe.commands.doctor import examine
 from pendpipe.configuration import jobs
 from pendpipe.configuration.apparatus import pendulum
 from pendpipe.configuration.load import (
@@ -22,8 +29,11 @@ from pendpipe.configuration.load import (
     read_records,
 )
 from pendpipe.errors import InputError
+from pendpipe.files import check_writable, replaced, sha256, write_json
 from pendpipe.stages.results import RecordResult, placed
 from pendpipe.stages.separate import common_relative_sd
+
+# The configuration refuses what it does not know, and says what was meant.
 
 ROOT = Path(__file__).parents[2]
 
@@ -258,3 +268,271 @@ def test_a_change_of_the_truth_touches_the_records_it_concerns(content: dict[str
     assert {name for name, kept in same.items() if kept} == {
         record.record for record in before.records if record.fluid == "air"
     }
+
+
+# Where nothing can be written, each command says so in one line and ends with status 2.
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A project whose configuration is the default one, with a file where a folder should be."""
+    shutil.copytree(ROOT / "config", tmp_path / "config")
+    (tmp_path / "file").write_text("kept")
+    (tmp_path / "comparison.json").write_text(json.dumps({"records": []}))
+    (tmp_path / "table.csv").write_text("angle_rad,volts\n0,0\n0.1,0.4\n0.2,0.8\n0.3,1.2\n")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "separate --campaign config/config.yaml --out file/x.json",
+        "compare --campaign config/config.yaml --separation s.json --out file/x --summary file/y",
+        "figures --campaign campaign.json --comparison comparison.json --out file/figures",
+        "report --campaign campaign.json --comparison comparison.json --summary comparison.json"
+        " --out file/page.html",
+        "calibrate table.csv --out file/sensor.json",
+        "acquire --device simulated:di2108 --rate 100 --duration 0.2 --out file/x.csv",
+        "acquire --campaign config/config.yaml --caliper --out file/caliper.csv",
+        "acquire --campaign config/config.yaml --record air-01 --out file/x.csv",
+    ],
+)
+def test_a_place_that_cannot_be_written_is_one_line(
+    folder: Path, call: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "campaign.json").write_text(json.dumps({"results": "file"}))
+    configuration = folder / "config/config.yaml"
+    text = configuration.read_text(encoding="utf-8")
+    configuration.write_text(text.replace("results: results", "results: r"), encoding="utf-8")
+    assert main(call.split()) == 2
+    lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("pendpipe")]
+    assert len(lines) == 1
+    assert "file" in lines[0]
+    assert (folder / "file").read_text() == "kept"
+
+
+def test_a_full_disk_is_named_and_leaves_no_half_file(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"x\.csv: .*[Nn]o space"), replaced(tmp_path / "x.csv"):
+        raise OSError(28, "No space left on device")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_name_that_is_too_long_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="too long"), replaced(tmp_path / ("x" * 300)):
+        raise AssertionError
+
+
+def test_results_are_tried_before_a_run(tmp_path: Path) -> None:
+    check_writable(tmp_path / "new")
+    assert list((tmp_path / "new").iterdir()) == []
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="not a folder"):
+        check_writable(tmp_path / "file")
+
+
+# `pendpipe doctor` names what is wrong with results, and changes nothing.
+
+
+@pytest.fixture
+def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Results of one record: a recording, a fit made from it, and a separation."""
+    monkeypatch.chdir(tmp_path)
+    record = tmp_path / "results/air-01"
+    record.mkdir(parents=True)
+    recording, fit = record / "recording.csv", record / "fit.json"
+    with manifest.job(record, "acquire") as written:
+        recording.write_text("time_s,volts\n0.0,1.0\n")
+        written.append(recording)
+    with manifest.job(record, "fit", inputs=[recording]) as written:
+        write_json(fit, {"a": 1, "provenance": {"input_sha256": sha256(recording)}})
+        written.append(fit)
+    with manifest.job(record.parent, "separate", inputs=[fit]) as written:
+        write_json(record.parent / "separation.json", {"k": 3940})
+        written.append(record.parent / "separation.json")
+    return record.parent
+
+
+def kinds(results: Path) -> set[tuple[str, str]]:
+    return {(found.kind, Path(found.path).name) for found in examine(results)}
+
+
+def put(name: str, content: str = "x") -> Callable[[Path], object]:
+    def change(results: Path) -> None:
+        path = results / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(content)
+
+    return change
+
+
+def other_recording(results: Path) -> None:
+    with manifest.job(results / "air-01", "acquire") as written:
+        (results / "air-01/recording.csv").write_text("time_s,volts\n0.0,2.0\n")
+        written.append(results / "air-01/recording.csv")
+
+
+def killed_stage(results: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), manifest.job(results / "air-01", "calibrate"):
+        raise KeyboardInterrupt
+
+
+def test_sound_results_have_no_finding(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor", str(results), "--fail-on", "findings"]) == 0
+    assert "as their stages wrote them" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (put("air-01/fit.json", "{}"), ("altered", "fit.json")),
+        (put("air-01/manifest/fit.json", "{"), ("altered", "fit.json")),
+        (lambda results: (results / "air-01/fit.json").unlink(), ("incomplete", "fit.json")),
+        (killed_stage, ("incomplete", "air-01")),
+        (other_recording, ("stale", "fit.json")),
+        (put("air-01/notes.csv"), ("orphaned", "notes.csv")),
+        (put("notes.json"), ("orphaned", "notes.json")),
+        (put("air-01/.notes.20240101"), ("orphaned", ".notes.20240101")),
+        (put("air-01/.fit.json.ab120f3c"), ("temporary", ".fit.json.ab120f3c")),
+        (put("air-01/fit.json.damaged-1a2b3c4d"), ("set-aside", "fit.json.damaged-1a2b3c4d")),
+        (put("live/raw/2026.raw"), ("raw", "2026.raw")),
+        (put("decay.raw"), ("raw", "decay.raw")),
+        (put("../.snakemake/locks/0.input.lock"), ("locked", "locks")),
+        (put("../.snakemake/incomplete/YQ=="), ("incomplete", "incomplete")),
+    ],
+)
+def test_each_thing_that_is_wrong_is_named(
+    results: Path,
+    change: Callable[[Path], object],
+    expected: tuple[str, str],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    change(results)
+    before = {path: path.stat().st_mtime_ns for path in results.rglob("*")}
+    assert expected in kinds(results)
+    assert main(["doctor", str(results), "--fail-on", "findings"]) == 3
+    for line in capsys.readouterr().out.splitlines():
+        assert line.count("; ") >= 1, "each line ends with what is safe to do"
+    assert {path: path.stat().st_mtime_ns for path in results.rglob("*")} == before
+
+
+def other_campaign(results: Path) -> None:
+    """Results of another campaign in a folder of these, as config/recordings.yaml has them."""
+    record = results / "recordings/steel"
+    with manifest.job(record, "fit") as written:
+        for name in ("fit.json", "diagnosis/diagnosis.json"):
+            write_json(record / name, {})
+            written.append(record / name)
+    with manifest.job(record.parent, "compare") as written:
+        write_json(record.parent / "comparison.json", {})
+        written.append(record.parent / "comparison.json")
+    put("recordings/steel/logs/fit.log")(results)
+    put("recordings/steel/raw/README.md")(results)
+    put("recordings/report-of-mine/notes.txt")(results)
+
+
+def record_named_raw(results: Path) -> None:
+    with manifest.job(results / "raw", "fit") as written:
+        write_json(results / "raw/fit.json", {})
+        written.append(results / "raw/fit.json")
+
+
+@pytest.mark.parametrize("change", [other_campaign, record_named_raw, put("my notes/plan.txt")])
+def test_other_campaigns_and_the_users_own_folders_are_no_findings(
+    results: Path, change: Callable[[Path], object]
+) -> None:
+    change(results)
+    assert examine(results) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "damaged"),
+    [
+        (other_campaign, "recordings/steel/fit.json"),
+        (other_campaign, "recordings/comparison.json"),
+        (record_named_raw, "raw/fit.json"),
+    ],
+)
+def test_what_is_damaged_is_named_in_every_folder(
+    results: Path, change: Callable[[Path], object], damaged: str
+) -> None:
+    change(results)
+    put(damaged, "torn")(results)
+    assert kinds(results) == {("altered", Path(damaged).name)}
+
+
+def test_the_diagnosis_of_a_pendulum_is_a_result_as_all_others(results: Path) -> None:
+    files = []
+    for name in ("air-01", "air-02"):
+        put(f"{name}/refused.json", '{"reason": "short", "stage": "acquire"}')(results)
+        put(f"{name}/swing.csv", "time_s,angle_rad\n0.0,0.1\n")(results)
+        files.append(str(results / name / "swing.csv"))
+    out = results / "pendulums/steel"
+    words = ["diagnose", *files, "--record", "steel", "--out", str(out), "--refused", "-"]
+    assert main(words) == 0
+    assert "pendulums" not in "".join(each.path for each in examine(results))
+    for content in ("", '{"torn": ', '{"schema_version": 1}'):
+        put("pendulums/steel/diagnosis.json", content)(results)
+        assert ("altered", "diagnosis.json") in kinds(results)
+        found = manifest.look_through(manifest.manifests(out))
+        assert "diagnosis.json" in found.repaired
+        assert "makes it again" in str(found.damages[0])
+
+
+def test_nothing_sound_is_called_deletable(results: Path) -> None:
+    """Only what a killed process had not finished may be deleted."""
+    for change in (
+        other_recording,
+        put("air-01/mine.csv"),
+        put("air-01/fit.json.damaged-1a2b3c4d"),
+    ):
+        change(results)
+    put("air-01/raw/1.raw")(results)
+    assert len(found := examine(results)) >= 3
+    assert not [each for each in found if "delete" in f"{each.problem} {each.safe}"]
+
+
+def test_a_folder_without_results_is_the_users_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    put("holiday/picture.svg")(tmp_path)
+    assert [main(["doctor", folder]) for folder in ("holiday", "none")] == [2, 2]
+    assert "no stage has left results here" in capsys.readouterr().err
+
+
+def test_programs_get_json(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    put("air-01/fit.json", "")(results)
+    assert main(["doctor", str(results), "--json"]) == 0
+    findings = json.loads(capsys.readouterr().out)["findings"]
+    assert {"kind", "path", "problem", "safe"} == set(findings[0])
+
+
+def test_a_raw_file_is_decoded_left_alone_or_deleted(
+    results: Path,
+) -> None:
+    """What is safe depends on whether it holds a scan, and on whether it still grows."""
+    pytest.importorskip("fcntl", reason="this system has no such lock")
+    raw = results / "decay.raw"
+
+    def advice() -> str:
+        (found,) = (each for each in examine(results) if each.kind == "raw")
+        return str(found)
+
+    raw.write_bytes(recorded_bytes("di2108"))
+    assert f"pendpipe acquire --recover {raw}" in advice()
+    with raw.open("ab") as stream:
+        lock(stream)
+        assert "wait for its end" in advice()
+    raw.write_bytes(raw.read_bytes().partition(b"\n")[0] + b"\n")
+    assert "it holds no scan; no stage reads it: keep it" in advice()
+
+
+def test_a_lock_is_named_before_there_are_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    put(".snakemake/locks/0.input.lock")(tmp_path)
+    (found,) = examine(Path("results"))
+    assert found.kind == "locked"
+    assert "--unlock" in found.safe

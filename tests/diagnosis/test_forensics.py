@@ -1,32 +1,47 @@
-"""Each fault of the measurement is found, measured, and not taken for another."""
+"""Tests of the measurement: what they find, in any unit, and what they leave alone."""
 
 import math
-from dataclasses import replace
+import re
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 import pendpipe as pp
-from pendpipe.analysis.turning_points.measure import prepare
+from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import gather
 from pendpipe.diagnosis.faults import _applied, correct
 from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.glitches import find_in_misfit, smallest_p_value
-from pendpipe.diagnosis.forensics.lost_samples import LostSamples, find_lost_samples
+from pendpipe.diagnosis.forensics.lost_samples import LostSamples, find_lost_samples, loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
-from pendpipe.diagnosis.result import Finding
+from pendpipe.diagnosis.result import Confirmation, Finding
 from pendpipe.effects.catalogue import CATALOGUE
 from pendpipe.effects.catalogue.restoring import cubic_stiffness
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
 
-from .decays import FREQUENCY_HZ, Fitted, Pendulum, fitted, rounded
-from .examine import TESTS, examine
-from .faults import AIR, FAULTS, NOISE, STEP_12, STEP_16, speed, white
-from .records import hypothesis_of, null_fit, task_of
+from .faults import (
+    AIR,
+    FAULTS,
+    NOISE,
+    STEP_12,
+    STEP_16,
+    TESTS,
+    Fitted,
+    Pendulum,
+    drawn_white,
+    examine,
+    fitted,
+    rounded,
+    speed,
+)
+from .records import FREQUENCY_HZ, hypothesis_of, null_fit, task_of
+
+# Each fault of the measurement is found, measured, and not taken for another.
 
 FOUND = 1e-3
 
@@ -75,7 +90,7 @@ GLITCHES = {
 @pytest.mark.parametrize("kind", GLITCHES)
 def test_glitches_are_counted_and_masked(kind: str, clean: FloatArray) -> None:
     where, signs, size = GLITCHES[kind]
-    noise = white(generator(3), AIR.count)
+    noise = drawn_white(generator(3), AIR.count)
     noise[where] = size * NOISE * np.resize(signs, len(where))
     finding = found(fitted(AIR, clean + noise))["glitches"]
     assert finding.mask is not None
@@ -89,7 +104,7 @@ def test_glitches_stand_out_of_noise_with_memory_and_of_a_sensor_that_bends(
     clean: FloatArray,
 ) -> None:
     """Wrong readings at random places are masked; those at the tops are left to the sensor."""
-    noisy = clean + white(generator(), AIR.count)
+    noisy = clean + drawn_white(generator(), AIR.count)
     remembering = FAULTS["memory 0.5"].make(clean, generator()).data.values.copy()
     bent = noisy - 1e-3 * np.exp((clean - clean.max()) / 1e-3)
     assert "glitches" not in found(fitted(AIR, bent))
@@ -111,14 +126,14 @@ def test_more_glitches_are_more_certain() -> None:
 
 
 def test_a_step_of_the_offset_is_not_a_glitch(clean: FloatArray) -> None:
-    readings = clean + white(generator(), AIR.count)
+    readings = clean + drawn_white(generator(), AIR.count)
     readings[1500:] += 10.0 * NOISE
     finding = found(fitted(AIR, readings)).get("glitches")
     assert finding is None or finding.mask is None or np.count_nonzero(finding.mask) < 3
 
 
 def test_the_ends_of_a_range_are_found_where_they_are(clean: FloatArray) -> None:
-    readings = rounded(np.clip(clean + white(generator(), AIR.count), -0.125, 0.13), STEP_16)
+    readings = rounded(np.clip(clean + drawn_white(generator(), AIR.count), -0.125, 0.13), STEP_16)
     finding = found(fitted(AIR, readings))["clipping"]
     assert finding.parameters["upper_level"].value == pytest.approx(0.13, abs=STEP_16)
     assert finding.parameters["lower_level"].value == pytest.approx(-0.125, abs=STEP_16)
@@ -130,7 +145,9 @@ def test_the_ends_of_a_range_are_found_where_they_are(clean: FloatArray) -> None
 
 @pytest.mark.parametrize("codes", [(20,), (-40, -7, 11)])
 def test_codes_that_never_occur_are_named(codes: tuple[int, ...], clean: FloatArray) -> None:
-    exact = np.round((clean + 10.0 * white(generator(), AIR.count)) / STEP_12).astype(np.int64)
+    exact = np.round((clean + 10.0 * drawn_white(generator(), AIR.count)) / STEP_12).astype(
+        np.int64
+    )
     finding = found(fitted(AIR, STEP_12 * (exact - np.isin(exact, codes))))["missing-codes"]
     assert finding.location.adc_codes == codes
     missed = np.mean(np.isin(exact, codes))
@@ -140,7 +157,7 @@ def test_codes_that_never_occur_are_named(codes: tuple[int, ...], clean: FloatAr
 
 @pytest.mark.parametrize("bit", [2, 4])
 def test_a_stuck_bit_is_named(bit: int, clean: FloatArray) -> None:
-    code = np.round((clean + white(generator(), AIR.count)) / STEP_16).astype(np.int64)
+    code = np.round((clean + drawn_white(generator(), AIR.count)) / STEP_16).astype(np.int64)
     finding = found(fitted(AIR, STEP_16 * (code & ~(1 << bit))))["missing-codes"]
     assert finding.parameters["bit"].value == bit
 
@@ -165,7 +182,7 @@ def test_jitter_is_measured(sigma_t: float, step: float, clean: FloatArray) -> N
     pulls = []
     for seed in range(4):
         draw = generator(seed)
-        readings = clean + white(draw, AIR.count)
+        readings = clean + drawn_white(draw, AIR.count)
         readings = readings + sigma_t * speed(clean) * draw.standard_normal(AIR.count)
         record = fitted(AIR, rounded(readings, step) if step else readings)
         finding = TESTS["jitter"](record.data, record.fit, record.noise, record.samples)
@@ -177,7 +194,7 @@ def test_jitter_is_measured(sigma_t: float, step: float, clean: FloatArray) -> N
 def test_noise_that_dies_with_the_amplitude_is_no_jitter(clean: FloatArray) -> None:
     draw = generator()
     envelope = 0.15 * np.exp(-AIR.times() / 60.0)
-    readings = clean + white(draw, AIR.count) * (1.0 + 10.0 * envelope)
+    readings = clean + drawn_white(draw, AIR.count) * (1.0 + 10.0 * envelope)
     assert "jitter" not in found(fitted(AIR, readings))
 
 
@@ -186,14 +203,14 @@ def test_a_constant_amplitude_shows_no_jitter_and_stops_nothing(seed: int) -> No
     """As in a recording that is driven first: the mean of v^2 looks like the noise's variance."""
     held = Pendulum(quality_factor=1e10, quadratic=0.0, coulomb=0.0)
     clean = held.model().reading(held.values())
-    record = fitted(held, clean + white(generator(seed), held.count))
+    record = fitted(held, clean + drawn_white(generator(seed), held.count))
     finding = TESTS["jitter"](record.data, record.fit, record.noise, record.samples)
     assert finding.p_value > 1e-4
 
 
 def test_gain_noise_is_no_jitter(clean: FloatArray) -> None:
     draw = generator()
-    readings = clean * (1.0 + 2e-3 * draw.standard_normal(AIR.count)) + white(draw, AIR.count)
+    readings = clean * (1.0 + 2e-3 * draw.standard_normal(AIR.count)) + drawn_white(draw, AIR.count)
     assert "jitter" not in found(fitted(AIR, readings))
 
 
@@ -216,7 +233,7 @@ def test_a_random_torque_is_measured(clean: FloatArray) -> None:
 
 def test_missing_stiffness_is_not_a_random_torque() -> None:
     stiff = Model(AIR.times(), 1.0 / AIR.rate_hz, (cubic_stiffness,))
-    readings = stiff.reading(np.append(AIR.values(), 3e-3)) + white(generator(), AIR.count)
+    readings = stiff.reading(np.append(AIR.values(), 3e-3)) + drawn_white(generator(), AIR.count)
     record = fitted(AIR, readings)
     assert record.fit.chi2 > 1.1 * AIR.count
     assert found(record) == {}
@@ -227,7 +244,7 @@ def test_time_stamps_are_used_where_they_are_right(share: float, clean: FloatArr
     draw = generator()
     stamps = AIR.times() + draw.uniform(-5e-4, 5e-4, AIR.count)
     true = stamps + share * (AIR.times() - stamps)
-    readings = Model(true, 1.0 / AIR.rate_hz).reading(AIR.values()) + white(draw, AIR.count)
+    readings = Model(true, 1.0 / AIR.rate_hz).reading(AIR.values()) + drawn_white(draw, AIR.count)
     record = fitted(AIR, readings, stamps)
     finding = TESTS["time-stamps"](record.data, record.fit, record.noise, record.samples)
     estimate = finding.parameters["share"]
@@ -240,7 +257,7 @@ def test_time_stamps_are_used_where_they_are_right(share: float, clean: FloatArr
 def test_gaps_in_the_time_stamps_are_noted_and_are_not_a_fault(clean: FloatArray) -> None:
     kept = np.ones(AIR.count, dtype=bool)
     kept[1000:1050] = kept[3000] = False
-    record = fitted(AIR, (clean + white(generator(), AIR.count))[kept], AIR.times()[kept])
+    record = fitted(AIR, (clean + drawn_white(generator(), AIR.count))[kept], AIR.times()[kept])
     assert not found(record)
     note = gap_note(record.samples.time_s, 0.5 / FREQUENCY_HZ, counts=False)
     assert note is not None
@@ -253,7 +270,7 @@ def test_lost_samples_are_found_before_they_spoil_the_rest(lost: dict[int, int])
     motion, row = longer.model().reading(longer.values()), np.arange(AIR.count)
     for place, number in lost.items():
         row = row + number * (row >= place)
-    readings = motion[row] + white(generator(), AIR.count)
+    readings = motion[row] + drawn_white(generator(), AIR.count)
     record = fitted(AIR, readings)
     candidates = find_lost_samples(record.data, record.fit)
     assert [candidate.number for candidate in candidates] == list(lost.values())
@@ -309,7 +326,7 @@ def test_the_codes_of_averaged_readings_are_tested() -> None:
 
 
 def test_the_range_of_averaged_readings_is_tested() -> None:
-    noisy = FAST.model().reading(FAST.values()) + white(generator(), FAST.count)
+    noisy = FAST.model().reading(FAST.values()) + drawn_white(generator(), FAST.count)
     record = folded(FAST, rounded(np.minimum(noisy, 0.15), STEP_16))
     findings = found(record)
     assert list(findings) == ["clipping"]
@@ -321,7 +338,7 @@ def test_the_range_of_averaged_readings_is_tested() -> None:
 
 def test_glitches_need_no_model(clean: FloatArray) -> None:
     """The clock is wrong by a hundredth; single readings are found, a shifted stretch is none."""
-    noisy = clean + white(generator(), AIR.count)
+    noisy = clean + drawn_white(generator(), AIR.count)
     right = fitted(AIR, noisy)
     off = right.fit.model.evaluate(1.01 * right.fit.value)
     far = replace(right.fit, evaluation=replace(right.fit.evaluation, at=off))
@@ -358,7 +375,7 @@ def test_a_loss_that_is_placed_a_reading_off_makes_no_glitch(
     longer, place = Pendulum(count=AIR.count + 10), 1234
     row = np.arange(AIR.count)
     motion = longer.model().reading(longer.values())[row + 2 * (row >= place)]
-    record = fitted(AIR, motion + white(generator(), AIR.count))
+    record = fitted(AIR, motion + drawn_white(generator(), AIR.count))
     (lost,) = find_lost_samples(record.data, record.fit)
     placed = lost._replace(time_s=float(AIR.times()[place + late]))
     monkeypatch.setattr(
@@ -412,3 +429,83 @@ def test_a_short_record_of_coloured_noise_is_tested_for_glitches_without_a_filte
             swing = np.round(swing / (amplitude / 200)) * (amplitude / 200)
     recording = pp.Recording(time_s=angle / (2 * np.pi * hertz), angle_rad=swing)
     assert pp.diagnose(recording).verdict == "consistent"
+
+
+# The tests of the measurement know no second and no radian: Eq. 8 looks the same in any unit.
+
+
+@dataclass(frozen=True)
+class Scaled(Pendulum):
+    """The same decay, slower and larger by two factors."""
+
+    slower: float = 1.0
+    larger: float = 1.0
+
+    def values(self) -> FloatArray:
+        a, b, c, share, omega, angle, start, offset = super().values()
+        slow, large = self.slower, self.larger
+        losses = a / (slow * large), b / slow, c * large / slow
+        motion = omega / slow, angle * large, start * slow, offset * large
+        return np.array([*losses, share, *motion])
+
+
+def judged(record: Fitted) -> dict[str, tuple[float, float]]:
+    """By test: the p-value's logarithm, and the gain."""
+    found = {}
+    for name, find in TESTS.items():
+        finding = find(record.data, record.fit, record.noise, record.samples)
+        found[name] = float(np.log(max(finding.p_value, 1e-290))), finding.delta_chi2
+    return found
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize(("slower", "larger"), [(1.0 / 16.0, 64.0), (8.0, 1.0 / 32.0)])
+def test_a_fault_is_as_clear_in_other_units(
+    fault: str, slower: float, larger: float, clean: FloatArray
+) -> None:
+    record = FAULTS[fault].make(clean, np.random.default_rng([17, 5]))
+    scaled = fitted(
+        Scaled(rate_hz=AIR.rate_hz / slower, slower=slower, larger=larger),
+        larger * record.data.values,
+        slower * record.data.time_s,
+    )
+    expected, found = judged(record), judged(scaled)
+    for name in TESTS:
+        assert found[name] == pytest.approx(expected[name], rel=1e-3, abs=1e-3), name
+
+
+# A clock that jumps moves angle and velocity along one path; a knock or an offset does not.
+
+OMEGA, LOSS, AT = 5.3, 0.006, 31.0
+PERIOD_S = 2.0 * math.pi / OMEGA
+STAMPS = np.arange(6000) / 100.0
+
+
+def swing(time_s: FloatArray) -> FloatArray:
+    return np.asarray(0.4 * np.exp(-LOSS * time_s) * np.cos(OMEGA * time_s))
+
+
+def second_test(angle: FloatArray, seed: int) -> Confirmation:
+    noise = 2e-4 * np.random.default_rng(seed).standard_normal(len(angle))
+    return loss_confirmed(Samples(STAMPS, angle + noise, "rad", None, 2e-4), AT + 0.02, PERIOD_S)
+
+
+@pytest.mark.parametrize("lost_s", [0.03, -0.05, 0.07])
+def test_a_jump_of_the_clock_is_confirmed_and_its_size_told(lost_s: float) -> None:
+    found = second_test(swing(STAMPS + np.where(STAMPS >= AT, lost_s, 0.0)), 1)
+    assert found.p_value < 1e-3
+    for value, sd in re.findall(r"by (\S+) ± (\S+) ms", found.summary):
+        assert abs(float(value) - 1e3 * lost_s) < 4.0 * float(sd) + 0.02 * abs(1e3 * lost_s)
+
+
+def test_neither_a_knock_nor_an_offset_nor_nothing_is_a_jump_of_the_clock() -> None:
+    after = np.where(STAMPS >= AT, STAMPS - AT, 0.0)
+    knock = 0.05 * np.exp(-LOSS * after) * np.sin(OMEGA * after)
+    offset = np.where(STAMPS >= AT, 0.02, 0.0)
+    for change in (knock, offset, 0.0 * after):
+        assert min(second_test(swing(STAMPS) + change, seed).p_value for seed in range(5)) > 1e-3
+
+
+def test_too_few_readings_say_nothing() -> None:
+    samples = Samples(STAMPS[::20], swing(STAMPS[::20]), "rad", None, 1e-4)
+    assert loss_confirmed(samples, AT, PERIOD_S).p_value == 1.0
