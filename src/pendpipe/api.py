@@ -4,25 +4,30 @@
 packages are imported by the function that needs them.
 """
 
-from __future__ import annotations
-
 import importlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pendpipe.errors import refuse_if
 from pendpipe.files import distinct_names
 from pendpipe.options import (
-    Acquiring,
-    Diagnosing,
-    Fitting,
-    Reading,
-    Simulating,
-    takes,
+    A_GUESS,
+    ALTERNATIVES,
+    NATURAL,
+    POSITIVE,
+    SENSOR,
+    Baseline,
+    Fixed,
+    Number,
+    Option,
+    Restoring,
+    VoltsPerRadian,
+    checked,
+    measured_number,
 )
 from pendpipe.recording import Recording
 
@@ -49,8 +54,49 @@ _FIGURES_OF_A_DIAGNOSIS: Final = partial(importlib.import_module, "pendpipe.figu
 """Who draws a result, imported when it is drawn: the result itself knows no figures."""
 
 
-@takes(Reading)
-def read(path: str | Path, **options: Unpack[Reading]) -> Recording:
+@checked
+def read(
+    path: str | Path,
+    *,
+    channel: Annotated[
+        str | int | None,
+        Option("number (from 1) or name of the channel, see inspect", "CHANNEL", heading=A_GUESS),
+    ] = None,
+    column: Annotated[
+        str | int | None,
+        Option(
+            "number (from 1) or name of the column; X,Y for a position seen from the pivot;"
+            " TIME:COLUMN names both",
+            "COLUMN",
+            heading=A_GUESS,
+        ),
+    ] = None,
+    unit: Annotated[
+        str | None,
+        Option(
+            "of the readings: rad, deg, V, mm, counts, ...; of both: ms:deg",
+            "UNIT",
+            heading=A_GUESS,
+        ),
+    ] = None,
+    sample_rate: Annotated[
+        float | None,
+        Option("samples a second, instead of the time column", "HZ", heading=A_GUESS),
+    ] = None,
+    decimal: Annotated[
+        str | None, Option("decimal sign, '.' or ','", "SIGN", heading=A_GUESS)
+    ] = None,
+    delimiter: Annotated[
+        str | None, Option("sign between cells, or tab, space", "SIGN", heading=A_GUESS)
+    ] = None,
+    volts_per_radian: VoltsPerRadian = None,
+    start: Annotated[
+        float | None, Option("first time to read, s, by the file's clock", "S", heading=A_GUESS)
+    ] = None,
+    stop: Annotated[
+        float | None, Option("last time to read, s, by the file's clock", "S", heading=A_GUESS)
+    ] = None,
+) -> Recording:
     """Read a recording from a file in any supported format.
 
     The layout is guessed, and each guess stands in the recording's `notes`. The options
@@ -77,18 +123,45 @@ def read(path: str | Path, **options: Unpack[Reading]) -> Recording:
     """
     from pendpipe.formats import read as read_file
 
-    return read_file(path, _read_options(options))
+    return read_file(
+        path,
+        _read_options(
+            channel=channel,
+            column=column,
+            unit=unit,
+            sample_rate=sample_rate,
+            decimal=decimal,
+            delimiter=delimiter,
+            volts_per_radian=volts_per_radian,
+            start=start,
+            stop=stop,
+        ),
+    )
 
 
-@takes(Acquiring)
+@checked
 def acquire(
     port: str,
     *,
+    model: Annotated[
+        str | None,
+        Option("the instrument: di154rs, di2108, ...; it is asked when not given", "MODEL"),
+    ] = None,
+    rate_hz: Annotated[float, Option("scans a second", "HZ", flag="--rate")] = 60.0,
+    duration_s: Annotated[float, Option("length, s", "S", flag="--duration")] = 60.0,
+    range_volts: Annotated[float | None, Option("the signal stays within +-V", "V")] = None,
+    reconnect_s: Annotated[
+        float,
+        Option("how long a device that was unplugged is waited for, s", "S", flag="--reconnect"),
+    ] = 30.0,
+    clock_scale: Annotated[
+        float, Option("simulated seconds in a real one", "FACTOR", POSITIVE)
+    ] = 1.0,
+    volts_per_radian: Annotated[float | None, Option(SENSOR, "V")] = None,
     channel: int = 1,
-    signal: Signal | None = None,
+    signal: "Signal | None" = None,
     raw_path: str | Path | None = None,
-    progress: ProgressLine | None = None,
-    **options: Unpack[Acquiring],
+    progress: "ProgressLine | None" = None,
 ) -> Recording:
     """Record from a Dataq instrument, or from a simulated one.
 
@@ -97,6 +170,7 @@ def acquire(
     port
         A device file, a COM port, ``socket://HOST:PORT`` or ``rfc2217://HOST:PORT``;
         ``"simulated:di2108"`` needs none.
+    {options}
     channel
         As printed on the box.
     signal
@@ -105,7 +179,6 @@ def acquire(
         A new file that keeps the bytes off the wire; in memory only where not given.
     progress
         A display that is kept up to date.
-    {options}
 
     Returns
     -------
@@ -124,9 +197,16 @@ def acquire(
     """
     from pendpipe.acquisition.recorder import acquire_simulated, example_signal, record
 
-    request: dict[str, Any] = {**options, "channels": (channel,)}
-    request |= {"raw_path": raw_path, "progress": progress}
-    clock_scale, model = request.pop("clock_scale"), request.pop("model")
+    request: dict[str, Any] = {
+        "channels": (channel,),
+        "rate_hz": rate_hz,
+        "duration_s": duration_s,
+        "range_volts": range_volts,
+        "reconnect_s": reconnect_s,
+        "volts_per_radian": volts_per_radian,
+        "raw_path": raw_path,
+        "progress": progress,
+    }
     where, _, kind = port.partition(":")
     if where == "simulated":
         signal = signal or example_signal()
@@ -134,15 +214,15 @@ def acquire(
     return record(port, model, **request)
 
 
-@takes(Reading)
-def inspect(path: str | Path, **options: Unpack[Reading]) -> Inspection:
+def inspect(path: str | Path, **options: Any) -> "Inspection":
     """Describe a file: format, channels, rate, gaps, clipping, and what was guessed.
 
     Parameters
     ----------
     path
         As for `read`.
-    {options}
+    **options
+        As for `read`.
 
     Examples
     --------
@@ -152,10 +232,10 @@ def inspect(path: str | Path, **options: Unpack[Reading]) -> Inspection:
     """
     from pendpipe.formats import inspect as inspect_file
 
-    return inspect_file(path, _read_options(options))
+    return inspect_file(path, _read_options(**options))
 
 
-def find_free_decay(recording: Source) -> FreeDecay:
+def find_free_decay(recording: Source) -> "FreeDecay":
     """Find the part of a recording in which the pendulum swings by itself.
 
     Returns
@@ -179,7 +259,7 @@ def find_free_decay(recording: Source) -> FreeDecay:
     return find(_motion(recording), _place(recording))
 
 
-def turning_points(recording: Source) -> TurningPoints:
+def turning_points(recording: Source) -> "TurningPoints":
     """Find the free decay of a recording and measure its turning points.
 
     Each turning point uses all the samples of its half cycle and has a standard deviation.
@@ -195,15 +275,56 @@ def turning_points(recording: Source) -> TurningPoints:
     return measure_recording(_motion(recording), _place(recording))[0]
 
 
-@takes(Fitting)
+@checked
 def fit(
-    recording: Source | TurningPoints | ArrayLike | DataFrame,
-    angle_rad: ArrayLike | None = None,
+    recording: "Source | TurningPoints | ArrayLike | DataFrame",
+    angle_rad: "ArrayLike | None" = None,
     *,
-    points: TurningPoints | None = None,
+    method: Annotated[
+        Literal["auto", "waveform", "turning-points"] | None,
+        Option("waveform or turning-points to have only that one"),
+    ] = "auto",
+    restoring: Restoring = "auto",
+    baseline: Baseline = "eq8",
+    fixed: Fixed = None,
+    volts_per_radian: VoltsPerRadian = None,
+    clock_ppm: Annotated[
+        float | None,
+        Option(
+            "what the clock may be off by, parts per million: it enters the errors", "PPM", POSITIVE
+        ),
+    ] = None,
+    scale_percent: Annotated[
+        float | None,
+        Option(
+            "what V/rad, or a camera's scale, may be off by, in percent: in the errors of a, c and"
+            " the amplitude",
+            "P",
+            Number(0, 100),
+        ),
+    ] = None,
+    length_m: Annotated[
+        float | None,
+        Option(
+            "length of a simple pendulum, m, as 0.600 or 0.600(1): gives g, and angles of"
+            " positions",
+            "M",
+            measured_number,
+            flag="--length",
+        ),
+    ] = None,
+    period: Annotated[
+        "float | Estimate | None",
+        Option(
+            "period of small swings, s, as 1.42 or 1.42(1), where amplitudes alone are given",
+            "S",
+            measured_number,
+            heading=ALTERNATIVES,
+        ),
+    ] = None,
+    points: "TurningPoints | None" = None,
     name: str | None = None,
-    **options: Unpack[Fitting],
-) -> FitResult:
+) -> "FitResult":
     """Fit a, b, c, frequency and amplitude to the free decay of a recording.
 
     Eq. 8 is fitted to all readings of the decay: angles and their rates swing by sin x, unless x
@@ -252,8 +373,8 @@ def fit(
     Copy: T0 = (1.1454712 ± 0.0000028) s; Q = 162.27 ± 0.20 at 73.4 mrad; 62 % of the loss ...
     Next: pendpipe page FILE makes a sheet to hand out; --figure draws it, --json is for programs
     """
-    baseline, fixed, length_m = options["baseline"], options["fixed"], options["length_m"]
-    restoring = None if options["restoring"] == "auto" else options["restoring"]
+    method = None if method == "auto" else method
+    restoring = None if restoring == "auto" else restoring
     from pendpipe.analysis.fit import fit_recording, fit_turning_points
     from pendpipe.analysis.fit.by_amplitudes import fit_amplitudes
     from pendpipe.analysis.fit.by_points import as_angles
@@ -271,12 +392,12 @@ def fit(
         found = fit_turning_points(recording, restoring=restoring, baseline=baseline, fixed=fixed)
         return replace(found, name=name or "", drawn_by=_FIGURES_OF_A_FIT)
     recording = _source(recording, angle_rad)
-    place, motion = name or _place(recording), _motion(recording, options["volts_per_radian"])
+    place, motion = name or _place(recording), _motion(recording, volts_per_radian)
     own = "" if isinstance(recording, Recording) else Path(recording).name
     if motion.holds_amplitudes and points is None:
         found = fit_amplitudes(
             motion,
-            period=_given_period(options["period"]),
+            period=_given_period(period),
             length_m=length_m,
             baseline=baseline,
             fixed=fixed,
@@ -284,7 +405,7 @@ def fit(
         )
         return replace(found, name=own, drawn_by=_FIGURES_OF_A_FIT)
     refuse_if(
-        options["period"] is not None,
+        period is not None,
         "period",
         "the recording shows its own",
         "leave it out (--fix holds it)",
@@ -296,17 +417,15 @@ def fit(
     result = fit_recording(
         decay,
         points=points,
-        method=None if options["method"] == "auto" else options["method"],
+        method=method,
         restoring=restoring,
         baseline=baseline,
         fixed=fixed,
         length_m=length_m,
         place=place,
     )
-    if (clock_ppm := options["clock_ppm"]) is not None:
-        result = with_clock(result, clock_ppm)
-    if (scale_percent := options["scale_percent"]) is not None:
-        result = with_scale(result, scale_percent)
+    result = result if clock_ppm is None else with_clock(result, clock_ppm)
+    result = result if scale_percent is None else with_scale(result, scale_percent)
     if points.unit != result["amplitude"].unit:
         # Of its rate, or of a position, the angle was fitted.
         points, _ = as_angles(points, position=points.unit == "m")
@@ -319,7 +438,7 @@ def fit(
     )
 
 
-def _given_period(period: float | Estimate | None) -> Estimate | None:
+def _given_period(period: "float | Estimate | None") -> "Estimate | None":
     from pendpipe.estimate import Estimate
 
     if period is None:
@@ -331,16 +450,32 @@ def _given_period(period: float | Estimate | None) -> Estimate | None:
     return given
 
 
-@takes(Diagnosing)
+@checked
 def diagnose(
     recording: Source | Sequence[Source] | Mapping[str, Source],
     *,
-    points: TurningPoints | None = None,
+    restoring: Restoring = "auto",
+    baseline: Baseline = "eq8",
+    fixed: Fixed = None,
+    volts_per_radian: VoltsPerRadian = None,
+    level: Annotated[
+        float,
+        Option("false-alarm probability for a recording that lacks nothing", "P", Number(0, 1)),
+    ] = 0.01,
+    seed: Annotated[int, Option("of the random draws", "N", NATURAL)] = 0,
+    together: Annotated[bool, Option("several recordings are of one pendulum")] = False,
+    own: Annotated[
+        Sequence[str],
+        Option("of several recordings: what each has of its own (a, b, c, frequency)", "NAME"),
+    ] = (),
+    same_sensor: Annotated[
+        bool, Option("of several recordings: the sensor's errors are shared as well")
+    ] = False,
+    points: "TurningPoints | None" = None,
     name: str | None = None,
     provenance: Mapping[str, Any] | None = None,
-    progress: Progress | None = None,
-    **options: Unpack[Diagnosing],
-) -> Diagnosis:
+    progress: "Progress | None" = None,
+) -> "Diagnosis":
     """Find what physics a fit of Eq. 8 leaves out of a recording.
 
     Eq. 8 is fitted to the free decay; its residual is searched for every effect of the catalogue
@@ -385,17 +520,16 @@ def diagnose(
     from pendpipe.diagnosis.several import diagnose_several
 
     common: dict[str, Any] = {
-        "baseline": options["baseline"],
-        "restoring": None if options["restoring"] == "auto" else options["restoring"],
-        "level": options["level"],
-        "seed": options["seed"],
+        "baseline": baseline,
+        "restoring": None if restoring == "auto" else restoring,
+        "level": level,
+        "seed": seed,
         "provenance": provenance,
         "progress": progress or silent,
     }
-    constant, fixed = options["volts_per_radian"], options["fixed"]
     if not isinstance(recording, Recording | str | Path):
         refuse_if(
-            not options["together"],
+            not together,
             "diagnose",
             f"{len(recording)} recordings are given",
             "say together=True if they are of one pendulum; else diagnose them one by one",
@@ -408,16 +542,16 @@ def diagnose(
             ]
             recording = dict(zip(distinct_names(files), recording, strict=True))
         found = diagnose_several(
-            [_motion(each, constant) for each in recording.values()],
+            [_motion(each, volts_per_radian) for each in recording.values()],
             list(recording),
             diagnose=diagnose_recording,
-            own=options["own"],
-            same_sensor=options["same_sensor"],
+            own=own,
+            same_sensor=same_sensor,
             **common,
         )
         return replace(found, drawn_by=_FIGURES_OF_A_DIAGNOSIS)
     common |= {"fixed": fixed, "place": name or _place(recording)}
-    motion = _motion(recording, constant)
+    motion = _motion(recording, volts_per_radian)
     if points is None:
         found = diagnose_recording(motion, **common)
     else:
@@ -426,8 +560,14 @@ def diagnose(
     return replace(found, drawn_by=_FIGURES_OF_A_DIAGNOSIS)
 
 
-@takes(Simulating)
-def simulate(model: str | Path | Mapping[str, Any], **options: Unpack[Simulating]) -> Recording:
+@checked
+def simulate(
+    model: str | Path | Mapping[str, Any],
+    *,
+    seed: Annotated[
+        int | None, Option("seed of the noise, instead of the model's", "N", NATURAL)
+    ] = None,
+) -> Recording:
     """Simulate a recording from a described pendulum and measurement chain.
 
     Parameters
@@ -449,14 +589,14 @@ def simulate(model: str | Path | Mapping[str, Any], **options: Unpack[Simulating
     """
     from pendpipe.simulation import model as models
 
-    described, seed = models.read_model(model), options["seed"]
+    described = models.read_model(model)
     if seed is not None:
         described = described.model_copy(update={"seed": seed})
     place = "model" if isinstance(model, Mapping) else str(model)
     return models.simulate(described, f"simulated: {Path(place).name}", place=place)
 
 
-def _source(recording: Any, angle_rad: ArrayLike | None = None) -> Source:
+def _source(recording: Any, angle_rad: "ArrayLike | None" = None) -> Source:
     """Return a recording or a path, from arrays or a DataFrame as well."""
     if angle_rad is not None:
         return Recording(time_s=recording, angle_rad=angle_rad)
@@ -476,14 +616,16 @@ def _source(recording: Any, angle_rad: ArrayLike | None = None) -> Source:
     return Recording(time_s=recording["time_s"].to_numpy(), **readings)
 
 
-def _read_options(options: Reading) -> ReadOptions:
+def _read_options(
+    start: float | None = None, stop: float | None = None, **given: Any
+) -> "ReadOptions":
     """Turn the overrides into the readers' options; numbers of columns are words there."""
     from pendpipe.formats import ReadOptions
 
-    named: dict[str, Any] = dict(options)
-    named |= {"start_s": named.pop("start"), "stop_s": named.pop("stop")}
-    named |= {key: str(named[key]) for key in ("channel", "column") if named[key] is not None}
-    return ReadOptions(**named)
+    given |= {
+        key: str(given[key]) for key in ("channel", "column") if isinstance(given.get(key), int)
+    }
+    return ReadOptions(start_s=start, stop_s=stop, **given)
 
 
 def _motion(recording: Source, volts_per_radian: float | None = None) -> Recording:

@@ -10,15 +10,23 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
 
+from pendpipe import api
 from pendpipe.errors import InputError
 from pendpipe.files import check_output, is_stream, json_text, read_json, writing
-from pendpipe.options import ALTERNATIVES, Flags, Reading, given
+from pendpipe.options import ALTERNATIVES, INPUT, Flags, flags_of, given
 from pendpipe.version import __version__
 
 if TYPE_CHECKING:
     from pendpipe.configuration.load import Campaign
     from pendpipe.recording import Recording
 
+_RECORDING: Final = {
+    "metavar": "FILE",
+    "help": "a recording in any supported format; - is standard input",
+}
+FILE: Final[Flags] = {"file": _RECORDING | INPUT} | flags_of(api.read)
+FILES: Final[Flags] = {"files": _RECORDING | {"nargs": "+"} | INPUT} | flags_of(api.read)
+"""The argument of a command that reads a recording, or several, with the overrides."""
 Arguments: TypeAlias = argparse.Namespace
 """What one call gave for a command's arguments."""
 
@@ -113,10 +121,9 @@ def read_motion(
         ``input_sha256`` (of what came through standard input too), ``version``,
         ``volts_per_radian`` (None where none was used).
     """
-    from pendpipe import api
     from pendpipe.formats.reading import file_bytes
 
-    recording = api.read(arguments.file, **given(arguments, Reading))
+    recording = api.read(arguments.file, **given(arguments, api.read))
     constant = arguments.volts_per_radian or _calibrated(arguments.calibration)
     was_volts = recording.quantity == "volts"
     recording = recording.as_motion(constant, arguments.file)

@@ -18,6 +18,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, Final
 
+from pendpipe import api
 from pendpipe.arguments import Arguments, load, tell_written
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import check_output, check_writable, is_stream
@@ -27,7 +28,6 @@ from pendpipe.options import (
     NATURAL,
     OUTPUTS,
     POSITIVE,
-    Acquiring,
     Flags,
     flags,
     flags_of,
@@ -86,7 +86,7 @@ _OF_A_STAGE: Final[Flags] = flags("--campaign", "--record", "--refused") | {
 ARGUMENTS: Final = (
     under(ALTERNATIVES, _SOURCES)
     | _OWN
-    | flags_of(Acquiring)
+    | flags_of(api.acquire)
     | {
         "--seed": {
             "type": NATURAL,
@@ -248,7 +248,6 @@ def _stage(arguments: Arguments) -> None:
 
 def _from_device(arguments: Arguments, raw: Path) -> None:
     """Record into a raw file."""
-    from pendpipe import api
     from pendpipe.acquisition.recorder import ProgressLine, example_signal
 
     device, where = arguments.device, arguments.device or arguments.port
@@ -264,7 +263,7 @@ def _from_device(arguments: Arguments, raw: Path) -> None:
         "only simulated devices go here",
         "give simulated:di2108",
     )
-    options, simulated = given(arguments, Acquiring), None
+    options, simulated = given(arguments, api.acquire), None
     if device:
         options["volts_per_radian"] = arguments.volts_per_radian or 3.85
         simulated = example_signal(arguments.seed, options["volts_per_radian"])

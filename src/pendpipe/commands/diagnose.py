@@ -17,13 +17,13 @@ from typing import Any, Final
 from pendpipe import api
 from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.analysis.turning_points import read_turning_points
-from pendpipe.arguments import Arguments, print_answer, print_json, read_motion, tell
+from pendpipe.arguments import FILES, Arguments, print_answer, print_json, read_motion, tell
 from pendpipe.diagnosis.result import FILE_NAME, Diagnosis, not_analysable
 from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_A_DIAGNOSIS
 from pendpipe.files import check_output, distinct_names, make_folder, write_json
 from pendpipe.manifest import check, job
-from pendpipe.options import FILES, OUTPUTS, Diagnosing, Flags, flags, flags_of, given
+from pendpipe.options import OUTPUTS, Flags, flags, flags_of, given
 from pendpipe.process import keep_memory
 from pendpipe.quantities import listed
 from pendpipe.stages.refusal import reason_of, within_results
@@ -52,7 +52,7 @@ _OWN: Final[Flags] = {
 ARGUMENTS: Final = (
     FILES
     | _OWN
-    | flags_of(Diagnosing)
+    | flags_of(api.diagnose)
     | flags("--verbose", "-v", "--json", "--turning-points", "--record", "--refused")
     # With several FILEs one for all, or one for each.
     | flags("--calibration", nargs="+", default=[])
@@ -185,7 +185,7 @@ def _diagnose_several(arguments: Arguments) -> int:
 def _outcome(arguments: Arguments, recording: Any, **more: Any) -> Diagnosis:
     """Diagnose a recording, or several together."""
     points = arguments.turning_points and read_turning_points(arguments.turning_points)
-    options = given(arguments, Diagnosing) | {"fixed": None} | more
+    options = given(arguments, api.diagnose) | {"fixed": None} | more
     return api.diagnose(recording, points=points, progress=_print_progress, **options)
 
 

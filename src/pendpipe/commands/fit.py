@@ -21,17 +21,15 @@ from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.analysis.fit.printed import gravity_line, lines
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.turning_points import is_turning_points, read_turning_points
-from pendpipe.arguments import Arguments, print_answer, print_json, read_motion, tell
+from pendpipe.arguments import FILES, Arguments, print_answer, print_json, read_motion, tell
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import over
 from pendpipe.files import is_stream, read_json, write_json
 from pendpipe.options import (
     ALTERNATIVES,
-    FILES,
     NATURAL,
     OUTPUT,
     POSITIVE,
-    Fitting,
     Flags,
     flags,
     flags_of,
@@ -66,7 +64,7 @@ _OWN: Final[Flags] = {
 ARGUMENTS: Final = (
     FILES
     | _OWN
-    | flags_of(Fitting)
+    | flags_of(api.fit)
     | {
         "--frequency": {
             "type": measured_number,
@@ -141,7 +139,7 @@ def _fit(arguments: Arguments, say: Callable[[str], None] = tell) -> FitResult:
     recording, provenance = read_motion(arguments, quiet=not arguments.verbose, say=say)
     points = arguments.turning_points and read_turning_points(arguments.turning_points)
     period, frequency, length = arguments.period, arguments.frequency, arguments.length_m
-    options = given(arguments, Fitting) | {
+    options = given(arguments, api.fit) | {
         "fixed": fixed,
         "length_m": length.value if length else None,
         "scale_percent": _scale_percent(arguments),

@@ -9,9 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from pendpipe.arguments import Arguments, read_motion, tell
+from pendpipe import api
+from pendpipe.arguments import FILES, Arguments, read_motion, tell
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.options import FILES, OUTPUT, flags
+from pendpipe.options import OUTPUT, flags
 from pendpipe.process import cores, in_order
 
 ARGUMENTS: Final = (
@@ -63,7 +64,6 @@ def run(arguments: Arguments) -> int:
 
 def _sheet(arguments: Arguments, file: str) -> Sheet:
     """Make the page of one recording."""
-    from pendpipe import api
     from pendpipe.report.class_table import Fitted
     from pendpipe.report.page import render_recording
 

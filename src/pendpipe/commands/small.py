@@ -16,7 +16,9 @@ from inspect import getdoc
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from pendpipe import api
 from pendpipe.arguments import (
+    FILE,
     Arguments,
     Command,
     announce,
@@ -25,18 +27,7 @@ from pendpipe.arguments import (
     tell_written,
 )
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.options import (
-    ALTERNATIVES,
-    FILE,
-    INPUT,
-    OUTPUT,
-    Flags,
-    Reading,
-    Simulating,
-    flags,
-    flags_of,
-    given,
-)
+from pendpipe.options import ALTERNATIVES, INPUT, OUTPUT, Flags, flags, flags_of, given
 from pendpipe.project import CONFIGURATION, PROJECT, SNAKEFILE
 
 if TYPE_CHECKING:
@@ -64,9 +55,7 @@ def command(arguments: Flags) -> Callable[[_Run], _Run]:
 )
 def inspect(arguments: Arguments) -> None:
     """Print what a recording holds: format, channels, rate, gaps, markers, clipping, step."""
-    from pendpipe import api
-
-    found = api.inspect(arguments.file, **given(arguments, Reading))
+    found = api.inspect(arguments.file, **given(arguments, api.read))
     lines = [arguments.file, *("  " + line for line in found.why)]
     text = lines if arguments.why else _lines(arguments.file, found)
     print_answer(arguments, found.as_json(), "\n".join(text))
@@ -127,11 +116,10 @@ def _lines(file: str, found: "Inspection") -> list[str]:
 )
 def convert(arguments: Arguments) -> None:
     """Write any supported recording in the plain CSV form, or as a WinDaq file (.wdh)."""
-    from pendpipe import api
     from pendpipe.formats.writing import check_name, write
 
     check_name(arguments.out)
-    recording = api.read(arguments.file, **given(arguments, Reading))
+    recording = api.read(arguments.file, **given(arguments, api.read))
     announce(arguments, recording)
     for note in write(arguments.out, recording):
         print(f"{arguments.out}: {note}", file=sys.stderr)
@@ -143,7 +131,7 @@ def convert(arguments: Arguments) -> None:
         "model": {"metavar": "MODEL.toml", "help": "what to simulate"} | INPUT,
         "out": {"metavar": "OUT.csv", "type": Path, "help": "the recording, plain form"} | OUTPUT,
     }
-    | flags_of(Simulating)
+    | flags_of(api.simulate)
 )
 def simulate(arguments: Arguments) -> None:
     """Make a recording from a described pendulum and measurement chain.
@@ -152,10 +140,9 @@ def simulate(arguments: Arguments) -> None:
     [[effects]] (what is left out of Eq. 8: see docs/effects.md); config/model.toml is an example
     with every key.
     """
-    from pendpipe import api
     from pendpipe.recording import write_plain
 
-    recording = api.simulate(arguments.model, **given(arguments, Simulating))
+    recording = api.simulate(arguments.model, **given(arguments, api.simulate))
     write_plain(arguments.out, recording)
     tell_written(arguments.out, f"{len(recording)} samples in {recording.unit}")
 

@@ -10,8 +10,8 @@ from typing import Final
 
 from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.analysis.turning_points import write_turning_points
-from pendpipe.arguments import Arguments, read_motion, tell, tell_written
-from pendpipe.options import FILE, OUTPUT, flags
+from pendpipe.arguments import FILE, Arguments, read_motion, tell, tell_written
+from pendpipe.options import OUTPUT, flags
 from pendpipe.quantities import after_number
 from pendpipe.stages.refusal import run_stage
 
