@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any, Final, Literal, Self
 
@@ -296,7 +296,7 @@ class Model:
             If it stops, or runs away, before the last reading.
         """
         omega, start, begin = float(value[OMEGA]), float(value[START]), float(value[TIME])
-        law: Law = lambda m: self.acceleration(m, value)  # noqa: E731
+        law: Law = partial(self.acceleration, value=value)
         motion = self._smooth(law, value)
         self._last["motion"] = motion
         pieces = [(-math.inf, motion)]
@@ -370,7 +370,7 @@ class Model:
             motion.time_s
         ):
             raise NoMotionError("the readings' clock is out of reach")
-        tangent = Tangent(lambda m: self.acceleration(m, value), motion)
+        tangent = Tangent(partial(self.acceleration, value=value), motion)
         span, seen = self.span(value, sampled), self.as_seen(sampled, value)
         return Evaluated(self.read(seen, value), seen, tangent, span)
 
@@ -396,7 +396,7 @@ class Model:
             # A mean of neighbours is x + k x''; x'' = -omega^2 x + f, and -k omega^2 x is above.
             bent = self.acceleration(sampled.motion, value)
             if self.seen == "rate":
-                law: Law = lambda m: self.acceleration(m, value)  # noqa: E731
+                law: Law = partial(self.acceleration, value=value)
                 pace = rates(law, sampled.motion).pace
                 bent = sampled.motion.clock.derivative(bent) / pace
             reading = reading + (1.0 - left) / float(value[OMEGA]) ** 2 * sampled.at_nodes(bent)
