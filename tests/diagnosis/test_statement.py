@@ -21,7 +21,7 @@ from pendpipe.diagnosis.summary import statement
 from pendpipe.diagnosis.values import constants_of, curve_values
 from pendpipe.effects.baseline import OMEGA, TIME, A, B, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
-from pendpipe.effects.curves import Curve, damping_curve, drive_curve
+from pendpipe.effects.curves import CURVES, Curve, damping_curve, drive_curve
 from pendpipe.effects.model import Model
 from pendpipe.estimate import Z95, Estimate
 
@@ -88,6 +88,24 @@ def test_a_class_is_listed_with_the_likeliest_first() -> None:
         "Drifting frequency 67 %, drifting clock 20 %, a restoring torque of unknown form < 1 %"
         " (not told apart); rate = "
     )
+
+
+@pytest.mark.parametrize(
+    ("own", "rival", "p", "says"),
+    [
+        ("clock-drift", "frequency-drift", 0.67, "frequency-drift"),
+        ("clock-drift", "frequency-drift", 0.1, "clock-drift"),
+        ("presliding-friction", "unnamed-damping", 0.55, "unnamed-damping"),
+    ],
+)
+def test_the_likeliest_of_a_class_says_what_decides(
+    own: str, rival: str, p: float, says: str
+) -> None:
+    """A name of probability near 0 must send nobody to the bench."""
+    tests = {each.identifier: each.discriminating_test for each in (*reversed(CURVES), *CATALOGUE)}
+    fitted = replace(named(own), probability=0.2, indistinguishable=((rival, p),))
+    assert details(fitted)[1].removesuffix(".").endswith(f"decide by: {tests[says]}")
+    assert diagnosis(fitted).summary.decide_by == tests[says]
 
 
 def test_what_eq_8_describes_needs_no_effect() -> None:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pendpipe.analysis.fit.printed import short_size
 from pendpipe.analysis.fit.quality import period_of_frequency, seen_qualities
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
+from pendpipe.effects.curves import CURVES
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, in_columns, with_error
 
@@ -464,6 +465,20 @@ def _excluded(diagnosis: Diagnosis, found: Sequence[FoundEffect]) -> tuple[str, 
     return tuple(name_of(each) for each in (*first, *(x for x in left if x not in first)))
 
 
+def _leader(effect: FoundEffect) -> tuple[float, str]:
+    """The most probable member of an effect's class: its probability and identifier."""
+    rivals = [(p, identifier) for identifier, p in effect.indistinguishable]
+    return max([(effect.probability, effect.identifier), *rivals], key=lambda member: member[0])
+
+
+def _test_of(effect: FoundEffect) -> str:
+    """The measurement that decides about an effect: that of the leader of its class."""
+    tests = {each.identifier: each.discriminating_test for each in reversed(CURVES)}
+    tests |= {each.identifier: each.discriminating_test for each in CATALOGUE}
+    tests[effect.identifier] = effect.discriminating_test
+    return tests.get(_leader(effect)[1], effect.discriminating_test)
+
+
 def _decide_by(found: Sequence[FoundEffect]) -> str:
     """The test of what is least sure among the named, or of the first candidate."""
     doubted = [
@@ -471,10 +486,9 @@ def _decide_by(found: Sequence[FoundEffect]) -> str:
         for each in found
         if each.probability < _SURE or any(p > 1.0 - _SURE for _, p in each.indistinguishable)
     ]
-    if not doubted:
-        return ""
-    open_to_doubt = max(doubted, key=lambda each: (each.kind != "unnamed", each.probability))
-    return open_to_doubt.discriminating_test
+    leaders = [(*_leader(each), each) for each in doubted]
+    best = max(leaders, key=lambda one: (one[1] not in UNNAMED, one[0]), default=None)
+    return _test_of(best[2]) if best else ""
 
 
 def _quote(diagnosis: Diagnosis, changes: Sequence[Change]) -> str:
@@ -641,7 +655,7 @@ def _effect(effect: FoundEffect) -> str:
     if effect.confirmed is not None:
         sure = "confirmed" if effect.confirmed.p_value < _CONFIRMED else "not confirmed"
         parts.append(f"{sure} without the fit: {effect.confirmed.summary}")
-    decide = f"decide by: {effect.discriminating_test}"
+    decide = f"decide by: {_test_of(effect)}"
     text = f"{_capital('; '.join(part for part in (*parts, decide) if part))}"
     return text if text.endswith("?") else f"{text}."
 

@@ -197,8 +197,8 @@ def stribeck_friction(motion: Motion, pendulum: Pendulum, size: float, v_s: floa
     parameters=(Parameter("k_d", "1", 0.0, 10.0), Parameter("z_c", "rad", 1e-7, 10.0)),
     example=(1e-3, 0.02),
     discriminating_test=(
-        "swing it at ever smaller amplitudes: the frequency must rise, and the damping fall, "
-        "below z_c"
+        "swing it at ever smaller amplitudes: far below the breakaway angle z_c the frequency "
+        "rises and the damping falls"
     ),
     # From far below the smallest amplitude to the largest.
     shapes=lambda span: rows(np.geomspace(0.2 * span.last_amplitude, span.first_amplitude, 4)),
