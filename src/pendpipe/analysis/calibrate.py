@@ -7,7 +7,6 @@ in the angle it is ordinary (weighted) least squares.
 """
 
 import csv
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -15,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 from scipy.special import fdtrc, stdtrit
 
+from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Z95, Estimate, chi_square_p_value
@@ -295,7 +295,9 @@ def calibrate(
         residual_sd_volts=float(np.sqrt(np.sum(residual**2) / (count - 2))),
         chi2_p_value=chi_square_p_value(chi2, count - 2) if known else float("nan"),
         # What is left of one degree of freedom says nothing of its own size.
-        linearity=_linearity(placed, residual, weights, slope, _rounding(volts), known=known)
+        linearity=_linearity(
+            placed, residual, weights, slope, quantisation_rms(decimal_step(volts)), known=known
+        )
         if count >= (5 if known else 6) and len(np.unique(angle_rad)) >= 4
         else None,
     )
@@ -327,11 +329,6 @@ def _line(
     mixed = -mean * slope_variance
     covariance = np.array([[offset_variance, mixed], [mixed, slope_variance]])
     return slope, float(centre[1] - slope * centre[0]), weights, placed, covariance
-
-
-def _rounding(volts: FloatArray) -> float:
-    """Rms of the rounding to the digits that are written."""
-    return (decimal_step(volts) or 0.0) / math.sqrt(12.0)
 
 
 def _linearity(

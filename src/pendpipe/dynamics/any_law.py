@@ -48,7 +48,11 @@ class Clock:
     @property
     def half_cycles(self) -> IntArray:
         """Numbers of the half cycles with nodes, shape (rows,)."""
-        return _with_nodes(self.count, self.every)
+        numbers: IntArray = np.arange(self.count)
+        if self.every == 1:
+            return numbers
+        cycle, whole = numbers // 2, self.count // 2 // self.every * self.every
+        return np.asarray(numbers[(cycle < whole) & (cycle % self.every == self.every // 2)])
 
     @property
     def psi(self) -> FloatArray:
@@ -86,15 +90,6 @@ class Clock:
         parts[..., ::2, :] += before[..., None]
         parts[..., 1::2, :] += (before + first)[..., None]
         return np.asarray(parts)
-
-
-def _with_nodes(count: int, every: int) -> IntArray:
-    numbers: IntArray = np.arange(count)
-    if every == 1:
-        return numbers
-    cycle = numbers // 2
-    whole = cycle < count // 2 // every * every
-    return np.asarray(numbers[whole & (cycle % every == every // 2)])
 
 
 @lru_cache(maxsize=8)
@@ -455,8 +450,6 @@ class Sampled:
     sine: FloatArray
     _first: IntArray
     _weights: FloatArray
-    ahead_rad: float = 0.0
-    """By how much the phase is ahead of the motion's."""
     _slope: FloatArray | None = None
 
     @property
@@ -488,7 +481,6 @@ class Sampled:
             amplitude=self.motion.angular_frequency * self.amplitude,
             cosine=-self.sine,
             sine=self.cosine,
-            ahead_rad=0.5 * math.pi,
             _slope=acceleration,
         )
 

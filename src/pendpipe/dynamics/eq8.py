@@ -370,7 +370,7 @@ def sample(model: Eq8, release: Release, time_s: FloatArray) -> FloatArray:
 
 
 def sample_with_jacobian(
-    model: Eq8, release: Release, time_s: FloatArray
+    model: Eq8, release: Release, time_s: FloatArray, *, more: int = 0
 ) -> tuple[FloatArray, FloatArray]:
     """Return the readings and their exact derivatives by every parameter.
 
@@ -378,19 +378,21 @@ def sample_with_jacobian(
     ----------
     model, release, time_s
         As in `sample`.
+    more
+        Columns of zeros behind the others, for parameters of the caller's own.
 
     Returns
     -------
     angle_rad
         (n,).
     jacobian
-        (n, 8), with the columns `JACOBIAN_COLUMNS`, stored by columns. At c = 0 the derivative
-        by c is that towards c > 0.
+        (n, 8 + more), with the columns `JACOBIAN_COLUMNS`, stored by columns. At c = 0 the
+        derivative by c is that towards c > 0.
     """
     times = _checked_times(time_s, release)
-    readings = np.empty((1 + _COLUMNS, times.size))
+    readings = np.empty((1 + _COLUMNS + more, times.size))
     _run(model, release, readings, derivatives=True, time_s=times)
-    readings[-1] = 1.0
+    readings[_COLUMNS], readings[_COLUMNS + 1 :] = 1.0, 0.0
     return readings[0], readings[1:].T
 
 

@@ -120,13 +120,14 @@ def fit_recording(
         "cut bursts and jumps out with --start and --stop, or see pendpipe diagnose",
         NotAnalysableError,
     )
-    if result.settled:
-        return result
-    raise NotAnalysableError(
+    refuse_if(
+        not result.settled,
         place,
         f"the {result.method.replace('-', ' ')} fit did not settle",
         "cut the recording with --start and --stop, or see pendpipe diagnose",
+        NotAnalysableError,
     )
+    return result
 
 
 def fit_turning_points(
@@ -138,9 +139,7 @@ def fit_turning_points(
 ) -> FitResult:
     """Fit Eq. 14 to turning points whose readings are not there; see `fit_recording`."""
     points, _ = as_angles(points)
-    if restoring is None and not may_be_sine(points):
-        restoring = "linear"
-    torque = restoring or restoring_of(points, stated=True)
+    torque = restoring or restoring_of(points)
     found = fit_points(points, baseline=baseline, fixed=fixed, restoring=torque)
     return replace(found, points=points, cuts=tuple(cut._asdict() for cut in points.cuts))
 
@@ -156,14 +155,14 @@ def _fit(
     place: str | Path,
     stated: bool,
 ) -> FitResult:
-    if restoring == "sine" and not may_be_sine(points):
-        largest = float(np.max(points.amplitude_rad))
-        raise NotAnalysableError(
-            place,
-            f"sin x needs three turning points below pi rad (the largest is"
-            f" {largest:.3g}{after_number(points.unit)})",
-            "use --restoring linear",
-        )
+    refuse_if(
+        restoring == "sine" and not may_be_sine(points),
+        place,
+        "sin x needs three turning points below pi rad (the largest is"
+        f" {np.max(points.amplitude_rad):.3g}{after_number(points.unit)})",
+        "use --restoring linear",
+        NotAnalysableError,
+    )
     if method == "turning-points":
         torque = restoring or restoring_of(points, stated=stated)
         return fit_points(points, baseline=baseline, fixed=fixed, restoring=torque)
@@ -212,10 +211,8 @@ def _waveform(
         lost = fit_points(points, baseline=baseline, fixed=fixed, restoring=torque)
         return replace(lost, method="waveform", settled=False)
 
-    if restoring is None and not may_be_sine(points):
-        restoring = "linear"
-    if restoring is None and not stated:
-        restoring = restoring_of(points, stated=False)
+    if restoring is None and not (stated and may_be_sine(points)):
+        restoring = restoring_of(points, stated=stated)
     if restoring is not None:
         return result(fitted(restoring), restoring)
     first = restoring_of(points)

@@ -86,9 +86,7 @@ def _seen_period(points: TurningPoints, law: Eq8) -> Check:
     )
 
 
-def judged(
-    result: FitResult, points: TurningPoints, law: Eq8, *, enlarged: float, refuted: bool
-) -> FitResult:
+def judged(result: FitResult, points: TurningPoints, law: Eq8, *, enlarged: float) -> FitResult:
     """Light a fit, and leave its errors as wide as the turning points ask.
 
     Parameters
@@ -99,8 +97,6 @@ def judged(
         What was fitted.
     enlarged
         By what the variances were multiplied.
-    refuted
-        Whether the test of fit finds more than noise.
     """
     periods, checks = check_period(points, law), result.decrement_check
     root = math.sqrt(enlarged)
@@ -116,7 +112,6 @@ def judged(
     ]
     # Turning points that are fitted alone may be late as no law is, and fall as one does.
     late = result.method == "turning-points" and bool(periods) and periods[0].scatter > _LATE
-    refuted = refuted or late
     if enlarged > 1.0 or late:
         widening = Widening(
             max(_asked(of_times), _scattered(periods, enlarged)),

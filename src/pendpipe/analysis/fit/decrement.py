@@ -11,7 +11,6 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.goodness import normal_tail
 from pendpipe.analysis.noise import of_neighbours
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
@@ -72,7 +71,7 @@ class Check(NamedTuple):
         off = abs(self.fitted - self.seen)
         if off <= TOLERANCE * abs(self.seen):
             return 1.0
-        return normal_tail(off / self.seen_sd) if self.seen_sd > 0.0 else 0.0
+        return math.erfc(off / self.seen_sd * math.sqrt(0.5)) if self.seen_sd > 0.0 else 0.0
 
     @property
     def confirms(self) -> bool:
@@ -180,8 +179,7 @@ def seen_loss(points: TurningPoints) -> tuple[float, float, float, float]:
 
 def loss_of(law: Eq8, amplitude: float) -> float:
     """Relative loss of a law, 1/s, averaged over the cycle in whose middle y is `amplitude`."""
-    cycle = _cycle(law, amplitude)
-    return sum(_slow_losses(law, amplitude)) if cycle is None else cycle[1]
+    return losses_of(law, amplitude)[0]
 
 
 def losses_of(law: Eq8, amplitude: float) -> tuple[float, FloatArray]:
@@ -189,8 +187,13 @@ def losses_of(law: Eq8, amplitude: float) -> tuple[float, FloatArray]:
 
     A part is what the cycle would keep without it, to first order.
     """
-    cycle, slow = _cycle(law, amplitude), np.array(_slow_losses(law, amplitude))
+    b = law.hysteretic + law.viscous
+    cycle, slow = (
+        _cycle(law, amplitude),
+        np.array([law.quadratic * amplitude, b, law.coulomb / amplitude]),
+    )
     if cycle is None:
+        # Eq. 13.
         return float(slow.sum()), slow
     start, loss = cycle
     turning, _, by_angle = turning_points_with_jacobian(law, Release(0.0, start), 3)
@@ -222,12 +225,6 @@ def _cycle(law: Eq8, amplitude: float) -> tuple[float, float] | None:
         if not start > 0.0:
             return None
     return found
-
-
-def _slow_losses(law: Eq8, amplitude: float) -> tuple[float, float, float]:
-    """Eq. 13: a y, b, c/y."""
-    b = law.hysteretic + law.viscous
-    return law.quadratic * amplitude, b, law.coulomb / amplitude
 
 
 _OFF: Final = 2.4

@@ -81,11 +81,6 @@ def tail(ratio: float, freedom: float, of_noise: float) -> float:
     return 0.5 * math.erfc(deviate * math.sqrt(0.5))
 
 
-def normal_tail(deviate: float) -> float:
-    """Probability that a normal number exceeds another in size."""
-    return math.erfc(abs(deviate) * math.sqrt(0.5))
-
-
 def judge(
     time_s: FloatArray,
     residual: FloatArray,

@@ -98,19 +98,15 @@ def qualities(result: FitResult) -> tuple[Quality, ...]:
 
 def seen_qualities(result: FitResult) -> tuple[Quality, ...]:
     """Return the amplitudes and quality factors that the turning points show without a law."""
-    found = [
-        (check, period_of(result, check.amplitude_rad))
-        for check in result.decrement_check
-        if check.seen > 0.0
-    ]
     return tuple(
         Quality(
             check.amplitude_rad,
             Estimate(1.0 / check.seen, check.seen_sd / check.seen**2, "s"),
-            period,
+            period_of(result, check.amplitude_rad),
             {},
         )
-        for check, period in found
+        for check in result.decrement_check
+        if check.seen > 0.0
     )
 
 

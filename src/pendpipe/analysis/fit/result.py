@@ -291,9 +291,7 @@ class FitResult:
         omega = math.tau * frequency
         if not math.isfinite(omega):
             omega = fast_beside(a, b, c, self.value("amplitude"))
-        law = Eq8(omega, a, hysteretic, b - hysteretic, c, restoring=self.restoring)
-        speed = self.drag == "speed"
-        return replace(law, drag="speed") if speed else law
+        return Eq8(omega, a, hysteretic, b - hysteretic, c, self.restoring, self.drag)
 
     def plot(self, ax: Axes | None = None) -> Figure:
         """Draw the decay with its fit, what the fit leaves, and Q against amplitude.
@@ -559,15 +557,14 @@ def result_of(
         covariance=covariance,
         restoring=law.restoring,
         hysteretic_share=law.hysteretic / b.value if b.value > 0.0 else 0.5,
-        drag=getattr(law, "drag", "energy"),
+        drag=law.drag,
         noise_rms_rad=goodness.noise_rms,
         chi2_per_dof=goodness.chi2_per_dof,
         fit_p_value=combined(p_values),
         decrement_check=checks,
         **rest,
     )
-    refuted = combined(p_values) < LEVEL
-    result = judged(result, points, law, enlarged=goodness.enlarged, refuted=refuted)
+    result = judged(result, points, law, enlarged=goodness.enlarged)
     return replace(result, warnings=(*points.notes, *_warnings(result, goodness.enlarged), *said))
 
 

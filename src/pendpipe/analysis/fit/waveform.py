@@ -79,9 +79,7 @@ class Waveform:
         a, b, c, share, omega, angle, time, offset = value[:DRIFT].tolist()
         told = share_of(self.split, b)
         share = share if told is None else told
-        law = Eq8(omega, a, share * b, (1.0 - share) * b, c, self.restoring)
-        if self.drag == "speed":
-            law = replace(law, drag="speed")
+        law = Eq8(omega, a, share * b, (1.0 - share) * b, c, self.restoring, self.drag)
         return law, Release(time, angle, offset if self.seen == "angle" else 0.0)
 
     @property
@@ -93,10 +91,13 @@ class Waveform:
             low[START], high[START] = -TOP, TOP
         return Bounds(low, high)
 
+    def _late(self, time_s: FloatArray) -> FloatArray:
+        """Time since the middle of the readings: what the drift is multiplied by."""
+        return np.asarray(time_s - 0.5 * (self.time_s[0] + self.time_s[-1]))
+
     def _zero(self, value: FloatArray, time_s: FloatArray) -> FloatArray | float:
         """What the zero adds beyond the engine's offset."""
-        middle = 0.5 * float(self.time_s[0] + self.time_s[-1])
-        drift = value[DRIFT] * (time_s - middle) if value[DRIFT] != 0.0 else 0.0
+        drift = value[DRIFT] * self._late(time_s) if value[DRIFT] != 0.0 else 0.0
         return drift if self.seen == "angle" else drift + value[OFFSET]
 
     def residual(self, value: FloatArray) -> FloatArray:
@@ -144,30 +145,29 @@ class Waveform:
         return float(rounded(left, 0.5 * self.step, self.noise_rms, *unused))
 
     def read(self, value: FloatArray, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Readings of the law, shape (n,), and their derivatives by the engine's parameters.
+        """Readings of the law, shape (n,), and their derivatives by the engine's and the drift.
 
         The motion depends on the time since its release alone, so that its rate is the derivative
         by the release's time, with the other sign.
         """
         model, release = self.model(value)
-        if self.seen != "rate":
-            reading, jacobian = sample_with_jacobian(model, release, time_s)
-            if self.seen == "position":
-                slope = self.length_m * np.cos(reading)
-                reading, jacobian = self.length_m * np.sin(reading), jacobian * slope[:, None]
-                jacobian[:, -1] = 1.0
-            return reading + self._zero(value, time_s), jacobian
-        beside = _BESIDE / model.angular_frequency
-        earlier = replace(release, time_s=release.time_s - beside)
-        later = replace(release, time_s=release.time_s + beside)
-        after, by_after = sample_with_jacobian(model, earlier, time_s)
-        before, by_before = sample_with_jacobian(model, later, time_s)
-        jacobian = (by_after - by_before) / (2.0 * beside)
-        # Both means of the rate miss it by its second derivative, one by three times the other.
-        mean = -0.5 * (by_after[:, -2] + by_before[:, -2])
-        rate = 1.5 * (after - before) / (2.0 * beside) - 0.5 * mean
-        jacobian[:, -1] = 1.0
-        return rate + self._zero(value, time_s), jacobian
+        if self.seen == "rate":
+            beside = _BESIDE / model.angular_frequency
+            earlier = replace(release, time_s=release.time_s - beside)
+            later = replace(release, time_s=release.time_s + beside)
+            after, by_after = sample_with_jacobian(model, earlier, time_s, more=1)
+            before, by_before = sample_with_jacobian(model, later, time_s, more=1)
+            jacobian = (by_after - by_before) / (2.0 * beside)
+            # Both means of the rate miss it by its second derivative, one by three times the other.
+            mean = -0.5 * (by_after[:, TIME] + by_before[:, TIME])
+            reading = 1.5 * (after - before) / (2.0 * beside) - 0.5 * mean
+        else:
+            reading, jacobian = sample_with_jacobian(model, release, time_s, more=1)
+        if self.seen == "position":
+            jacobian = jacobian * (self.length_m * np.cos(reading))[:, None]
+            reading = self.length_m * np.sin(reading)
+        jacobian[:, OFFSET], jacobian[:, DRIFT] = 1.0, self._late(time_s)
+        return reading + self._zero(value, time_s), jacobian
 
     def curved(self, value: FloatArray, step: FloatArray) -> FloatArray:
         """Return where a step ends: omega makes up for the square of what b's share changes."""
@@ -181,9 +181,7 @@ class Waveform:
         refused = Quadratic(np.inf, np.zeros(len(value)), np.eye(len(value)))
         if not self._has_motion(value):
             return refused
-        chi2, gradient, normal = 0.0, np.zeros(8), np.zeros((8, 8))
-        by_drift, drifts = np.zeros(8), np.zeros(2)
-        middle = 0.5 * float(self.time_s[0] + self.time_s[-1])
+        chi2, slope, normal = 0.0, np.zeros(len(value)), np.zeros((len(value), len(value)))
         for first in range(0, len(self.values), _PIECE):
             piece = slice(first, first + _PIECE)
             try:
@@ -191,31 +189,21 @@ class Waveform:
             except ValueError:
                 # Overdamped: far from anything that turns.
                 return refused
-            left, weights = self.values[piece] - reading, None
+            left = self.values[piece] - reading
             if self.step == 0.0:
-                chi2 += self.noise_rms**-2 * float(left @ left)
-                score = left
+                part, score, weighted = float(left @ left), left, jacobian
             else:
                 score, weights = np.empty_like(left), np.empty_like(left)
-                chi2 += float(rounded(left, 0.5 * self.step, self.noise_rms, score, weights))
-            weighted = jacobian if weights is None else jacobian * weights[:, None]
-            late = self.time_s[piece] - middle
-            gradient += jacobian.T @ score
+                part = rounded(left, 0.5 * self.step, self.noise_rms, score, weights)
+                weighted = jacobian * weights[:, None]
+            chi2 += part
+            slope += jacobian.T @ score
             normal += jacobian.T @ weighted
-            by_drift += weighted.T @ late
-            own = late if weights is None else late * weights
-            drifts += float(late @ score), float(late @ own)
-        if self.step == 0.0:
-            unit = self.noise_rms**-2
-            gradient, normal = unit * gradient, unit * normal
-            by_drift, drifts = unit * by_drift, unit * drifts
-        full, slope = np.zeros((9, 9)), np.zeros(9)
-        full[:DRIFT, :DRIFT], slope[:DRIFT] = normal, gradient
-        full[DRIFT, :DRIFT] = full[:DRIFT, DRIFT] = by_drift
-        slope[DRIFT], full[DRIFT, DRIFT] = drifts
-        self._last[:] = [(value.copy(), slope, full)]
+        unit = self.noise_rms**-2 if self.step == 0.0 else 1.0
+        chi2, slope, normal = unit * chi2, unit * slope, unit * normal
+        self._last[:] = [(value.copy(), slope, normal)]
         change = self.change(value)
-        return Quadratic(chi2, change.T @ slope, change.T @ full @ change)
+        return Quadratic(chi2, change.T @ slope, change.T @ normal @ change)
 
     def by_parts(self, value: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Gradient and normal matrix by the engine's parameters, the two parts of b among them.

@@ -17,7 +17,7 @@ import numpy as np
 from pendpipe.analysis.coarse import Between, between
 from pendpipe.analysis.half_cycles import half_cycles, usual_half_period
 from pendpipe.analysis.noise import quantisation_rms, undithered_rms
-from pendpipe.analysis.turning_points.harmonics import far_points, odd_harmonics, own_square
+from pendpipe.analysis.turning_points.harmonics import far_points, mean_square, odd_harmonics
 from pendpipe.analysis.turning_points.long_records import follow
 from pendpipe.analysis.turning_points.measure import (
     HARMONICS,
@@ -372,13 +372,21 @@ def _measured(samples: Samples, place: str | Path) -> TurningPoints:
     rough, stride = rough_half_cycles(samples)
     _refuse_few(samples, len(rough.number), place)
     gaps = np.diff(samples.time_s) > _GAP * float(np.median(np.diff(rough.time_s)))
-    bursts = 2 * np.count_nonzero(gaps) > len(rough.number)
-    problem, remedy = "most half cycles have a gap in them", "record without pauses"
-    refuse_if(bursts, place, problem, remedy, NotAnalysableError)
+    refuse_if(
+        2 * np.count_nonzero(gaps) > len(rough.number),
+        place,
+        "most half cycles have a gap in them",
+        "record without pauses",
+        NotAnalysableError,
+    )
     places, first = _locate(samples, rough, stride)
-    few, remedy = not np.any(_known(first)), "sample faster"
-    problem = "too few readings in a cycle (four at least, twelve where they are uneven)"
-    refuse_if(few, place, problem, remedy, NotAnalysableError)
+    refuse_if(
+        not np.any(_known(first)),
+        place,
+        "too few readings in a cycle (four at least, twelve where they are uneven)",
+        "sample faster",
+        NotAnalysableError,
+    )
     amplitude, rates, level = _losses(places, first, samples.noise_rms, rough.level)
     places, measured, shape = _shaped(samples, places, amplitude, rates, level, stride)
     samples = replace(samples, noise_rms=_noise(samples, measured))
@@ -389,12 +397,21 @@ def _measured(samples: Samples, place: str | Path) -> TurningPoints:
 
 def _refuse_few(samples: Samples, found: int, place: str | Path) -> None:
     """Refuse a record without three half cycles."""
-    swing, noise = float(samples.values.max() - samples.values.min()), samples.noise_rms
-    problem = f"no motion stands out of the noise ({noise:.3g} rms)"
-    remedy = "raise the amplitude, or pick another channel"
-    refuse_if(found < 3 and swing < 12.0 * noise, place, problem, remedy, NotAnalysableError)
-    problem = f"fewer than three half cycles ({found} turning points)"
-    refuse_if(found < 3, place, problem, "record longer", NotAnalysableError)
+    swing, noise = float(np.ptp(samples.values)), samples.noise_rms
+    refuse_if(
+        found < 3 and swing < 12.0 * noise,
+        place,
+        f"no motion stands out of the noise ({noise:.3g} rms)",
+        "raise the amplitude, or pick another channel",
+        NotAnalysableError,
+    )
+    refuse_if(
+        found < 3,
+        place,
+        f"fewer than three half cycles ({found} turning points)",
+        "record longer",
+        NotAnalysableError,
+    )
 
 
 @np.errstate(divide="ignore")  # bursts of readings tell no half period
@@ -458,17 +475,10 @@ def _shaped(
 
 def _noise(samples: Samples, measured: Measured) -> float:
     """Rms of one reading about the fitted half cycles, never below step/sqrt(12)."""
-    size = 2 + measured.harmonics.shape[1]
-    # A level of its own is taken off each: one reading more must be left to tell the noise.
-    told = measured.readings > size + 1
-    known = np.isfinite(measured.amplitude) & told & ~measured.single
-    # The level is common; what a half cycle wants of its own is not noise of the readings.
-    square = own_square(measured)
-    freedom = float(np.sum(measured.readings[known] - size - 1))
+    square, freedom = mean_square(measured, 3 + measured.harmonics.shape[1])
     if freedom < 8:
         return samples.noise_rms
-    pooled = float(np.sqrt(max(float(np.sum(square[known])), 0.0) / freedom))
-    return max(pooled, quantisation_rms(samples.step))
+    return max(math.sqrt(max(square, 0.0)), quantisation_rms(samples.step))
 
 
 _WINDOWS: Final = (6, 10, 16, 26, 42, 68)

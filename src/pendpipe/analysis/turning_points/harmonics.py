@@ -61,7 +61,7 @@ def odd_harmonics(
         As given, where a cosine with its losses is enough.
     """
     noise = _white(samples, places)
-    before = _misfit(measured)
+    before, _ = mean_square(measured)
     if before < (1.0 + _CLEARLY) * noise**2 and not _expected(samples, measured, noise):
         return shape, measured, places
     count = float(np.nansum(measured.readings))
@@ -71,7 +71,7 @@ def odd_harmonics(
         longer = shape.copy()
         longer[:, 4 : 4 + free] += _shares(places, tried, free)
         shared = measure(samples, places, level, longer, amplitude=amplitude)
-        after = _misfit(shared)
+        after, _ = mean_square(shared)
         if (before - after) * count < _SIGNIFICANT * max(after, noise**2):
             break
         shape, measured, before = longer, shared, after
@@ -198,12 +198,14 @@ def _white(samples: Samples, places: Places) -> float:
     return max(white_rms(part) if len(part) > 16 else 0.0, samples.noise_rms)
 
 
-def _misfit(measured: Measured) -> float:
-    """Mean square of the readings about the fitted half cycles, each at its own level."""
-    known = np.isfinite(measured.amplitude) & (measured.readings > 8)
-    square = own_square(measured)[known]
-    freedom = (measured.readings - measured.harmonics.shape[1] - 3)[known]
-    return float(np.sum(square) / max(float(np.sum(freedom)), 1.0))
+def mean_square(measured: Measured, least: int = 8) -> tuple[float, float]:
+    """Mean square of the readings about half cycles fitted as wholes, each at its own level.
+
+    Of half cycles with more readings than `least`; and its degrees of freedom.
+    """
+    known = np.isfinite(measured.amplitude) & (measured.readings > least) & ~measured.single
+    freedom = float(np.sum((measured.readings - measured.harmonics.shape[1] - 3)[known]))
+    return float(np.sum(own_square(measured)[known])) / max(freedom, 1.0), freedom
 
 
 def _shares(places: Places, measured: Measured, free: int) -> FloatArray:
