@@ -365,31 +365,7 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     NotAnalysableError
         When there is no free decay of at least three half cycles: one line that says why.
     """
-    if recording.holds_amplitudes:
-        why = "it holds amplitudes, not a recording of the swing"
-        raise NotAnalysableError(place, why, "pendpipe fit takes Eq. 14 of them")
-    # A whole recording is not copied.
-    usable = slice(None) if recording.usable.all() else recording.usable
-    time, values = recording.time_s[usable], recording.values[usable]
-    span = float(np.ptp(values)) if len(values) else 0.0
-    if len(values) < 8 or span == 0:
-        why = "the reading never changes" if len(values) >= 8 else f"{len(values)} samples only"
-        raise NotAnalysableError(place, why, "is this the right channel?")
-    step = recording.resolution
-    noise = noise_rms(values, step, quieter=0.1)
-    if (fine := between(time, values, HARDLY)) is not None:
-        time, values, noise = fine.time_s, fine.values, fine.noise_rms
-    least = max(SEEN * noise, 1.6 * (step or 0.0))
-    half_period = usual_half_period(time, values)
-    # Noise alone spans about `least`. What hardly exceeds it many half cycles can prove.
-    if half_period is None or span < 1.5 * least:
-        why = (
-            f"no oscillation: the reading moves by {span:.3g}{after_number(recording.unit)},"
-            f" its noise and step hide {least:.2g}"
-            if span < 10.0 * least
-            else "no oscillation: the reading does not swing to and fro"
-        )
-        raise NotAnalysableError(place, why, "give a recording of a free decay")
+    time, values, least, half_period = _looked_at(recording, place)
     pieces = [piece for piece in _pieces(time, 2.0 * half_period) if piece.stop - piece.start >= 8]
     parts = [half_cycles(time[piece], values[piece], least, half_period) for piece in pieces]
     gapless = pieces == [slice(0, len(time))]
@@ -426,33 +402,88 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
         told = max(longer, key=lambda run: run.worth)
         used = _chained(found, told)
     _refuse_without_fall(place, time[told.piece], values[told.piece], told, least)
+    others = [run for run in found if run.path > 0.05 * told.path and run not in used]
+    may_turn_over = recording.quantity == "angle_rad"
+    return _described(time, values, used, others, least, may_turn_over=may_turn_over)
+
+
+def _looked_at(
+    recording: Recording, place: str | Path
+) -> tuple[FloatArray, FloatArray, float, float]:
+    """Times and readings in which a decay is looked for, the least swing, and the half period."""
+    refuse_if(
+        recording.holds_amplitudes,
+        place,
+        "it holds amplitudes, not a recording of the swing",
+        "pendpipe fit takes Eq. 14 of them",
+        NotAnalysableError,
+    )
+    # A whole recording is not copied.
+    usable = slice(None) if recording.usable.all() else recording.usable
+    time, values = recording.time_s[usable], recording.values[usable]
+    span = float(np.ptp(values)) if len(values) else 0.0
+    refuse_if(
+        len(values) < 8 or span == 0.0,
+        place,
+        "the reading never changes" if len(values) >= 8 else f"{len(values)} samples only",
+        "is this the right channel?",
+        NotAnalysableError,
+    )
+    noise = noise_rms(values, recording.resolution, quieter=0.1)
+    if (fine := between(time, values, HARDLY)) is not None:
+        time, values, noise = fine.time_s, fine.values, fine.noise_rms
+    least = max(SEEN * noise, 1.6 * (recording.resolution or 0.0))
+    half_period = usual_half_period(time, values)
+    # Noise alone spans about `least`. What hardly exceeds it many half cycles can prove.
+    if half_period is None or span < 1.5 * least:
+        why = (
+            f"no oscillation: the reading moves by {span:.3g}{after_number(recording.unit)},"
+            f" its noise and step hide {least:.2g}"
+            if span < 10.0 * least
+            else "no oscillation: the reading does not swing to and fro"
+        )
+        raise NotAnalysableError(place, why, "give a recording of a free decay")
+    return time, values, least, half_period
+
+
+def _described(
+    time: FloatArray,
+    values: FloatArray,
+    used: list[Run],
+    others: list[Run],
+    least: float,
+    *,
+    may_turn_over: bool,
+) -> FreeDecay:
+    """Say where a decay begins and ends, what is cut off it, and what else was noticed."""
     run = used[0]
     flat = _flat_turns(time[run.piece], values[run.piece], run)
     if flat is not None and run.legs - flat > _MANY:
         run = used[0] = replace(run, first=run.first + flat)
     start, stop = _start(time[run.piece], values[run.piece], run), _stop(time, used[-1])
-    notes = [
-        f"nothing was recorded from {time[end - 1]:.6g} to {time[end]:.6g} s; the decay goes on"
-        for end in (part.piece.stop for part in used[:-1])
-    ]
     half, swing = run.half_period_s, float(run.swing[0])
-    quiet = max(2.0 * least, 0.02 * swing)
     before = "driven: the amplitude is held up" if run.driven else _BY_HAND
     centre = float(np.mean(run.cycles.turn[run.first : run.first + 2]))
     wide = np.abs(values[time < start] - centre).max(initial=0.0)
     if flat is not None:
         before = "the sensor reads no further on one side: larger swings are left out"
-    if recording.quantity == "angle_rad" and wide > np.pi > 0.5 * swing:
+    if may_turn_over and wide > np.pi > 0.5 * swing:
         before = "it went over the top before it settled"
+    quiet = max(2.0 * least, 0.02 * swing)
     cuts = stretches(time, values, start, stop, quiet=quiet, window_s=half, before=before)
-    notes += [
-        f"another decay of {other.legs} half cycles from {other.middle_s[0]:.6g} s is not used"
-        for other in found
-        if other.path > 0.05 * told.path and other not in used
-    ]
     bridged = sum(part.bridged for part in used)
-    if bridged:
-        notes.append(f"{bridged} disturbed half cycle(s) inside the decay are kept")
+    gaps = [part.piece.stop for part in used[:-1]]
+    notes = [
+        *(
+            f"nothing was recorded from {time[end - 1]:.6g} to {time[end]:.6g} s; the decay goes on"
+            for end in gaps
+        ),
+        *(
+            f"another decay of {other.legs} half cycles from {other.middle_s[0]:.6g} s is not used"
+            for other in others
+        ),
+        *([f"{bridged} disturbed half cycle(s) inside the decay are kept"] if bridged else []),
+    ]
     return FreeDecay(start, stop, cuts, half, sum(part.legs for part in used), notes)
 
 
@@ -585,15 +616,8 @@ def _beating(
         f" (Q = {math.pi * mode.frequency.value / mode.loss.value:.3g})"
         for mode in modes
     )
-    cuts = stretches(
-        time,
-        values,
-        start,
-        stop,
-        quiet=2.0 * cycles.step,
-        window_s=half_period,
-        before=_BY_HAND,
-    )
+    quiet = 2.0 * cycles.step
+    cuts = stretches(time, values, start, stop, quiet=quiet, window_s=half_period, before=_BY_HAND)
     return FreeDecay(start, stop, cuts, half_period, last - first, [f"{BEAT}: {each}"])
 
 

@@ -22,8 +22,8 @@ from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness
 from pendpipe.analysis.fit.period import Period
 from pendpipe.analysis.fit.result import PARAMETERS, fast_beside, result_of
+from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.analysis.turning_points import TurningPoints
-from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
@@ -68,50 +68,24 @@ def fit_amplitudes(
     NotAnalysableError
         If there are fewer than five.
     """
-    usable = recording.usable
-    time, sizes = recording.time_s[usable], sizes_of(recording.values[usable])
-    refuse_if(
-        len(time) < _FEWEST,
-        place,
-        f"{len(time)} amplitudes tell no a, b and c",
-        f"give {_FEWEST} or more",
-        NotAnalysableError,
-    )
-    sizes, unit, step = _angles(sizes, recording.unit, recording.resolution or 0.0, length_m)
-    first = float(sizes[0])
-
-    def points_of(sd: float) -> TurningPoints:
-        return TurningPoints(
-            half_cycle=2 * np.arange(len(time)),
-            time_s=time,
-            time_sd_s=np.full(len(time), np.nan),
-            angle_rad=sizes,
-            angle_sd_rad=np.full(len(time), sd),
-            level_rad=np.zeros(len(time)),
-            step_rad=step,
-            start_s=float(time[0]),
-            stop_s=float(time[-1]),
-            samples=len(time),
-            unit=unit,
-        )
-
+    points = _points_of(recording, length_m, place)
+    first, step, unit = float(points.angle_rad[0]), points.step_rad, points.unit
     fixed = dict(fixed or {})
     if "frequency" in fixed and period is None:
         period = Estimate(1.0 / fixed["frequency"], 0.0, "s")
     turning = math.tau / period.value if period else math.nan
     held = Held(fixed, baseline, 0.5 * turning / math.pi)
-    free = 4 - len([name for name in held.envelope if name != "offset"])
-    freedom = max(len(time) - free, 1)
-    least = max(step / math.sqrt(12.0), _FINEST * first)
-    rough = fit_envelope(points_of(max(least, 0.01 * first)), held.envelope)
-    scatter = math.sqrt(float(rough.residual @ rough.residual) / freedom)
-    points = points_of(max(scatter, least) * _students(freedom))
+    freedom = max(len(points) - 4 + len(held.envelope.keys() - {"offset"}), 1)
+    rough = fit_envelope(points, held.envelope).residual
+    scatter = max(math.sqrt(float(rough @ rough) / freedom), quantisation_rms(step))
+    sd = max(scatter, _FINEST * first) * _students(freedom)
+    points = replace(points, angle_sd_rad=np.full(len(points), sd))
     envelope = fit_envelope(points, held.envelope)
     a, b, c = (float(rate) for rate in envelope.value[:3])
     share = held.share(b)
     hysteretic = (0.5 if share is None else share) * b
     spread = turning * period.sd / period.value if period else math.nan
-    times = Period(turning, float(time[0]), np.diag([spread**2, 0.0]), math.nan, np.empty(0))
+    times = Period(turning, points.start_s, np.diag([spread**2, 0.0]), math.nan, np.empty(0))
     value, matrix, intervals = numbers_of(points, envelope, times, 1.0)
     phase = PARAMETERS.index("phase")
     value[phase] = matrix[phase] = matrix[:, phase] = math.nan
@@ -134,14 +108,14 @@ def fit_amplitudes(
         method="amplitudes",
         baseline=baseline,
         residual_rms_rad=float(np.sqrt(np.mean(envelope.residual**2))),
-        samples=len(time),
-        turning_points=len(time),
+        samples=len(points),
+        turning_points=len(points),
         settled=envelope.converged,
     )
     quantities: dict[str, Quantity] = {"rad": "angle_rad", "m": "displacement_m"}
     shown = Recording(
-        time,
-        sizes,
+        points.time_s,
+        points.angle_rad,
         quantities.get(unit, "reading"),
         metadata={"unit": unit},
         resolution=step or None,
@@ -156,16 +130,34 @@ def _students(freedom: int) -> float:
     return float(stdtrit(freedom, 0.975)) / 1.959964
 
 
-def _angles(
-    values: FloatArray, unit: str, step: float, length_m: float | None
-) -> tuple[FloatArray, str, float]:
-    """Amplitudes as angles where a length makes them so; their unit and step."""
-    if length_m is None or unit not in ("m", "m/s"):
-        return values, unit, step
-    if unit == "m":
-        scale = length_m
-        angle = np.arcsin(np.clip(values / scale, -1.0, 1.0))
-    else:
-        scale = math.sqrt(GRAVITY * length_m)
-        angle = 2.0 * np.arcsin(np.clip(0.5 * values / scale, -1.0, 1.0))
-    return np.asarray(angle), "rad", step / scale
+def _points_of(recording: Recording, length_m: float | None, place: str | Path) -> TurningPoints:
+    """The amplitudes, as angles where a length makes them so, each known to a hundredth or so."""
+    time = recording.time_s[recording.usable]
+    sizes, unit = sizes_of(recording.values[recording.usable]), recording.unit
+    refuse_if(
+        len(time) < _FEWEST,
+        place,
+        f"{len(time)} amplitudes tell no a, b and c",
+        f"give {_FEWEST} or more",
+        NotAnalysableError,
+    )
+    scale = 1.0
+    if length_m is not None and unit in ("m", "m/s"):
+        # x = l sin y, and v = 2 sqrt(g l) sin(y/2).
+        scale, part = (length_m, 1.0) if unit == "m" else (math.sqrt(GRAVITY * length_m), 2.0)
+        sizes = part * np.arcsin(np.clip(sizes / (part * scale), -1.0, 1.0))
+        unit = "rad"
+    step = (recording.resolution or 0.0) / scale
+    return TurningPoints(
+        half_cycle=2 * np.arange(len(time)),
+        time_s=time,
+        time_sd_s=np.full(len(time), np.nan),
+        angle_rad=sizes,
+        angle_sd_rad=np.full(len(time), max(quantisation_rms(step), 0.01 * float(sizes[0]))),
+        level_rad=np.zeros(len(time)),
+        step_rad=step,
+        start_s=float(time[0]),
+        stop_s=float(time[-1]),
+        samples=len(time),
+        unit=unit,
+    )
