@@ -67,3 +67,10 @@ def scaled_qr(matrix: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     for own, start, stop in zip(turned.reshape(small.shape), parts[:-1], parts[1:], strict=True):
         basis[start:stop] = basis[start:stop] @ own
     return basis, triangle, scale
+
+
+def of_neighbours(residual: FloatArray, most: float) -> float:
+    """By how much more a mean varies where neighbours are alike, with a correlation of `most`."""
+    alike = float(residual[1:] @ residual[:-1]) / max(float(residual @ residual), 1e-300)
+    alike = min(max(alike, 0.0), most)
+    return (1.0 + alike) / (1.0 - alike)

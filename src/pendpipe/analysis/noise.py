@@ -75,13 +75,6 @@ def _fourth_differences(values: FloatArray) -> FloatArray:
     return np.asarray(weighted.reshape(values.shape)[..., :-_ORDER])
 
 
-def of_neighbours(residual: FloatArray, most: float) -> float:
-    """By how much more a mean varies where neighbours are alike, with a correlation of `most`."""
-    alike = float(residual[1:] @ residual[:-1]) / max(float(residual @ residual), 1e-300)
-    alike = min(max(alike, 0.0), most)
-    return (1.0 + alike) / (1.0 - alike)
-
-
 def undithered_rms(amplitude: FloatArray, step: float | None, noise: float) -> FloatArray:
     """Error of a sine's amplitude by rounding that too little noise dithers.
 

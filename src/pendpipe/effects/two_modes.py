@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.arrays import AnyArray, FloatArray
+from pendpipe.arrays import AnyArray, FloatArray, of_neighbours
 from pendpipe.estimate import Estimate
 
 _WINDOWS: Final = 120
@@ -90,9 +90,7 @@ def two_modes(
             return None
     inverse = np.linalg.pinv(design)
     # What two modes leave is smooth: its neighbours tell the same.
-    alike = float(residual[1:] @ residual[:-1]) / max(float(residual @ residual), 1e-300)
-    alike = min(max(alike, 0.0), 0.98)
-    scale = math.sqrt(float(np.var(residual)) * (1.0 + alike) / (1.0 - alike))
+    scale = math.sqrt(float(np.var(residual)) * of_neighbours(residual, 0.98))
     error = scale * np.linalg.norm(inverse, axis=1)
     modes = [
         Mode(

@@ -20,8 +20,8 @@ import numpy as np
 from pendpipe.analysis.fit.decrement import TOLERANCE, Check, Light, is_off
 from pendpipe.analysis.fit.period import fit_period
 from pendpipe.analysis.fit.quality import relative_loss_sd
-from pendpipe.analysis.noise import of_neighbours
 from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.arrays import of_neighbours
 from pendpipe.dynamics import Eq8
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact

@@ -11,9 +11,8 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.noise import of_neighbours
 from pendpipe.analysis.turning_points import TurningPoints
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, of_neighbours
 from pendpipe.dynamics import Eq8, Release, turning_points, turning_points_with_jacobian
 from pendpipe.quantities import compact, with_error
 

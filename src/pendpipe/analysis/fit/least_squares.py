@@ -48,11 +48,8 @@ def bounded_step(
     held
         Entries that stay zero.
     """
-    free = [j for j in range(len(gradient)) if j not in held]
-    step, part = np.zeros(len(gradient)), normal[np.ix_(free, free)]
-    # Parameters differ by many orders of size.
-    scale = 1.0 / np.sqrt(np.maximum(part.diagonal(), 1e-300))
-    scaled, right = part * scale[:, None] * scale, gradient[free] * scale
+    free, scaled, scale = _scaled(normal, held)
+    step, right = np.zeros(len(gradient)), gradient[free] * scale
     step[free] = np.linalg.lstsq(scaled, right, rcond=1e-14)[0] * scale
     if bool(((step >= bounds.lower) & (step <= bounds.upper)).all()):
         return step
@@ -110,16 +107,24 @@ def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
     A bound is not used: what it would take off the standard deviations depends on where
     the truth lies, so they are those of the free estimate.
     """
+    free, scaled, scale = _scaled(normal, held)
+    if not np.isfinite(scaled).all():
+        # A search that got to where nothing moves has no errors, and does not count as settled.
+        return np.full_like(normal, np.nan)
+    result, own = np.zeros_like(normal), np.linalg.pinv(scaled, rcond=1e-14, hermitian=True)
+    result[np.ix_(free, free)] = own * scale[:, None] * scale
+    return result
+
+
+def _scaled(normal: FloatArray, held: Sequence[int]) -> tuple[list[int], FloatArray, FloatArray]:
+    """What is free, its normal matrix with a diagonal of ones, and the scale of each entry.
+
+    Parameters differ by many orders of size.
+    """
     free = [j for j in range(len(normal)) if j not in held]
     part = normal[np.ix_(free, free)]
     scale = 1.0 / np.sqrt(np.maximum(part.diagonal(), 1e-300))
-    scales = scale[:, None] * scale
-    result = np.zeros_like(normal)
-    if not np.isfinite(part).all():
-        # A search that got to where nothing moves has no errors, and does not count as settled.
-        return np.full_like(result, np.nan)
-    result[np.ix_(free, free)] = scales * np.linalg.pinv(part * scales, rcond=1e-14, hermitian=True)
-    return result
+    return free, part * scale[:, None] * scale, scale
 
 
 FRACTIONS: Final = (1.0, 0.3, 0.1, 0.02)
