@@ -1,6 +1,7 @@
 """WinDaq files, byte by byte: read and written."""
 
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -29,37 +30,70 @@ def written(path: Path, content: WindaqFile) -> Path:
     return path
 
 
-def test_14_bit_counts_are_shifted_and_scaled(tmp_path: Path) -> None:
-    path = written(tmp_path / "a.WDQ", WindaqFile(TWO, intercept=0.25))
-    for channel in (1, 2):
-        recording = read(path, ReadOptions(channel=str(channel)))
-        np.testing.assert_allclose(recording.values, TWO[:, channel - 1] * 10 / 16384 + 0.25)
-    assert recording.quantity == "volts"
-    assert recording.resolution == pytest.approx(10 / 16384)
-    np.testing.assert_allclose(recording.time_s, np.arange(2000) * 0.004)
+STEP_V = 10 / 16384
+PLAIN = WindaqFile(TWO, intercept=0.25)
+HIRES = WindaqFile(4 * COUNTS + 1, hires=True)
+CIRCULAR = WindaqFile(
+    np.roll(TWO, 700, axis=0), hires=True, header_size=1536, state=2, next_write=700
+)
+PACKED = WindaqFile(TWO, divisors=[1, 4])
+"""As documented, no such file being at hand: a channel is in the scans its divisor divides."""
+FULL = np.clip(3 * COUNTS, -8192, 8191)
 
 
-def test_hires_counts_keep_their_two_low_bits(tmp_path: Path) -> None:
-    path = written(tmp_path / "a.WDH", WindaqFile(4 * COUNTS + 1, hires=True))
-    np.testing.assert_allclose(read(path).values, (4 * COUNTS[:, 0] + 1) / 4 * 10 / 16384)
-    assert inspect(path).format == "windaq-hires"
+def of_channel(path: Path, channel: str) -> Recording:
+    return read(path, ReadOptions(channel=channel))
 
 
-def test_a_circular_file_begins_with_its_oldest_sample(tmp_path: Path) -> None:
-    turned = np.roll(TWO, 700, axis=0)
-    content = WindaqFile(turned, hires=True, header_size=1536, state=2, next_write=700)
-    path = written(tmp_path / "a.WHC", content)
-    np.testing.assert_allclose(read(path).values, TWO[:, 0] / 4 * 10 / 16384)
-    assert inspect(path).format == "windaq-hires-circular"
-
-
-def test_packed_channels_have_their_own_rates(tmp_path: Path) -> None:
-    # As documented, no such file being at hand: a channel is in the scans its divisor divides.
-    path = written(tmp_path / "a.WDQ", WindaqFile(TWO, divisors=[1, 4]))
-    second = read(path, ReadOptions(channel="2"))
-    np.testing.assert_allclose(second.values, TWO[::4, 1] * 10 / 16384)
-    np.testing.assert_allclose(second.time_s, np.arange(500) * 0.016)
-    assert len(read(path, ReadOptions(channel="1"))) == 2000
+@pytest.mark.parametrize(
+    ("content", "asked", "expected"),
+    [
+        (PLAIN, lambda path: of_channel(path, "1").values, TWO[:, 0] * STEP_V + 0.25),
+        (PLAIN, lambda path: of_channel(path, "2").values, TWO[:, 1] * STEP_V + 0.25),
+        (PLAIN, lambda path: read(path).quantity, "volts"),
+        (PLAIN, lambda path: read(path).resolution, STEP_V),
+        (PLAIN, lambda path: read(path).time_s, np.arange(2000) * 0.004),
+        (WindaqFile(COUNTS, unit=b"deg"), lambda path: read(path).quantity, "angle_rad"),
+        (HIRES, lambda path: read(path).values, (4 * COUNTS[:, 0] + 1) / 4 * STEP_V),
+        (HIRES, lambda path: inspect(path).format, "windaq-hires"),
+        (CIRCULAR, lambda path: read(path).values, TWO[:, 0] / 4 * STEP_V),
+        (CIRCULAR, lambda path: inspect(path).format, "windaq-hires-circular"),
+        (PACKED, lambda path: of_channel(path, "2").values, TWO[::4, 1] * STEP_V),
+        (PACKED, lambda path: of_channel(path, "2").time_s, np.arange(500) * 0.016),
+        (PACKED, lambda path: len(of_channel(path, "1")), 2000),
+        (
+            WindaqFile(TWO, hires=True, events=[0, 0, -1000]),
+            lambda path: inspect(path).markers[1].sample,
+            500,
+        ),
+        (
+            WindaqFile(COUNTS, interval_s=-1.2e-41),
+            lambda path: read(path, ReadOptions(sample_rate=250)).time_s[1],
+            0.004,
+        ),
+        (
+            WindaqFile(FULL),
+            lambda path: inspect(path).clipped_samples,
+            np.count_nonzero((FULL == -8192) | (FULL == 8191)),
+        ),
+        (
+            WindaqFile(COUNTS, events=[0, 0, len(COUNTS), 99]),
+            lambda path: inspect(path).markers[-1].time_s,
+            0.004 * (len(COUNTS) - 1),
+        ),
+    ],
+    ids=[
+        *("14 bits, shifted and scaled", "14 bits, second channel", "volts", "step", "times"),
+        *("the unit of the header", "two low bits of HiRes", "HiRes", "the oldest sample first"),
+        *("circular", "packed: every fourth scan", "packed: at its own rate", "packed: all scans"),
+        *("pointers of HiRes count samples", "the user's rate beside a damaged interval"),
+        *("samples at the converter's end", "an event behind the last sample"),
+    ],
+)
+def test_a_file_says(
+    tmp_path: Path, content: WindaqFile, asked: Callable[[Path], object], expected: object
+) -> None:
+    assert asked(written(tmp_path / "a.WDQ", content)) == pytest.approx(expected)
 
 
 def test_markers_carry_their_comments(tmp_path: Path) -> None:
@@ -76,11 +110,6 @@ def test_markers_carry_their_comments(tmp_path: Path) -> None:
     ]
 
 
-def test_hires_pointers_count_samples(tmp_path: Path) -> None:
-    content = WindaqFile(TWO, hires=True, events=[0, 0, -1000])
-    assert inspect(written(tmp_path / "a.WDH", content)).markers[1].sample == 500
-
-
 def test_a_pause_is_a_gap_and_nothing_else_is(tmp_path: Path) -> None:
     # Scan 1000 stands 4 s after the start by the samples, and 60 s by its stamp.
     path = written(
@@ -94,8 +123,6 @@ def test_a_pause_is_a_gap_and_nothing_else_is(tmp_path: Path) -> None:
 
 
 def test_the_units_of_the_header_are_kept(tmp_path: Path) -> None:
-    path = written(tmp_path / "a.WDQ", WindaqFile(COUNTS, unit=b"deg"))
-    assert read(path).quantity == "angle_rad"
     path = written(tmp_path / "b.WDQ", WindaqFile(COUNTS, unit=b"rpm"))
     assert inspect(path).channels == (("channel 1", "rpm"),)
     with pytest.raises(InputError, match="no column looks like"):
@@ -149,23 +176,6 @@ def test_damage_of_the_header_is_reported_and_refused_if_it_costs_samples(
         return
     assert len(read(path)) == 2000
     assert any(said in note for note in read(path).notes)
-
-
-def test_the_users_rate_mends_a_damaged_interval(tmp_path: Path) -> None:
-    path = written(tmp_path / "a.WDQ", WindaqFile(COUNTS, interval_s=-1.2e-41))
-    assert read(path, ReadOptions(sample_rate=250)).time_s[1] == pytest.approx(0.004)
-
-
-def test_samples_at_the_converters_end_are_counted(tmp_path: Path) -> None:
-    clipped = np.clip(3 * COUNTS, -8192, 8191)
-    found = inspect(written(tmp_path / "a.WDQ", WindaqFile(clipped)))
-    assert found.clipped_samples == np.sum((clipped == -8192) | (clipped == 8191)) > 0
-
-
-def test_an_event_behind_the_last_sample_has_its_time(tmp_path: Path) -> None:
-    events = [0, 0, len(COUNTS), 99]
-    found = inspect(written(tmp_path / "a.WDQ", WindaqFile(COUNTS, events=events)))
-    assert found.markers[-1].time_s == pytest.approx(0.004 * (len(COUNTS) - 1), abs=1e-9)
 
 
 def test_a_spreadsheet_export_goes_by_place_and_index(tmp_path: Path) -> None:
