@@ -15,7 +15,7 @@ campaign: .venv/installed
 	$(RUN) snakemake --cores $(CORES)
 
 test: .venv/installed
-	$(RUN) pytest -q -n $(CORES) --dist worksteal
+	$(RUN) pytest -q -n $(CORES)
 
 # The pages in docs/ as HTML in docs/_build; their commands are executed, warnings are errors.
 docs: .venv/installed-docs

@@ -21,6 +21,12 @@ settings.register_profile("same", settings.get_profile("untimed"), derandomize=T
 settings.load_profile("same")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files with slow tests come first: no process waits for another, or makes a campaign twice."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
+
+
 @pytest.fixture(scope="session")
 def make_example() -> Callable[..., Any]:
     """What makes the example campaign of tests/figures, under whatever folder the tests run."""
@@ -34,3 +40,16 @@ def make_example() -> Callable[..., Any]:
         sys.modules[name] = module
         spec.loader.exec_module(module)
     return sys.modules[name].make_example  # type: ignore[no-any-return]
+
+
+@pytest.fixture
+def answer_of(capsys: pytest.CaptureFixture[str]) -> Callable[..., Any]:
+    """What a command prints, which has to end with that status."""
+
+    def answer(words: list[str], status: int = 0) -> Any:
+        from pendpipe.cli import main
+
+        assert main(words) == status
+        return capsys.readouterr()
+
+    return answer

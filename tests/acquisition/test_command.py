@@ -11,6 +11,7 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -115,7 +116,10 @@ def test_a_second_call_records_beside_the_first(tmp_path: Path) -> None:
 
 
 def test_a_csv_that_could_not_be_written_is_made_at_the_next_call(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    answer_of: Any,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     out = tmp_path / "decay.csv"
 
@@ -130,8 +134,9 @@ def test_a_csv_that_could_not_be_written_is_made_at_the_next_call(
     assert "No space left on device" in error
     kept = read_raw(tmp_path / "decay.raw").data
     # Nothing is recorded now, although another length is asked for.
-    assert main([*QUICK.split(), str(out), "--duration", "1"]) == 0
-    assert "nothing was recorded now" in capsys.readouterr().err
+    assert (
+        "nothing was recorded now" in answer_of([*QUICK.split(), str(out), "--duration", "1"]).err
+    )
     assert len(read_plain(out)) == 2000
     assert list(raw_files(tmp_path)) == ["decay.raw"]
     assert read_raw(tmp_path / "decay.raw").data == kept
@@ -142,12 +147,11 @@ def test_a_csv_that_could_not_be_written_is_made_at_the_next_call(
 
 
 def test_a_place_where_nothing_can_be_written_is_refused_before_the_recording(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, answer_of: Any
 ) -> None:
     for out in (tmp_path, tmp_path / "a-file/decay.csv", Path("/dev/null/decay.csv")):
         (tmp_path / "a-file").touch()
-        assert main([*QUICK.split(), str(out)]) == 2
-        assert capsys.readouterr().err.count("\n") == 1
+        assert answer_of([*QUICK.split(), str(out)], 2).err.count("\n") == 1
     assert not raw_files(tmp_path)
 
 
@@ -224,7 +228,7 @@ def test_make_clean_spares_what_an_instrument_has_recorded(tmp_path: Path) -> No
 
 
 def test_a_simulated_record_is_the_same_whenever_it_is_made(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answer_of: Any
 ) -> None:
     """Date and measured rate are the run's: they go to the log, not into the result."""
     made = []
@@ -233,8 +237,7 @@ def test_a_simulated_record_is_the_same_whenever_it_is_made(
         monkeypatch.setattr("pendpipe.acquisition.recorder.datetime", then)
         out = tmp_path / str(year) / "recording.csv"
         call = ["--campaign", "config/config.yaml", "--record", "air-12"]
-        assert main(["acquire", *call, "--out", str(out)]) == 0
-        assert f"recorded_at: {year}-01-01" in capsys.readouterr().err
+        assert f"recorded_at: {year}-01-01" in answer_of(["acquire", *call, "--out", str(out)]).err
         made.append(out.read_bytes())
     assert made[0] == made[1]
 

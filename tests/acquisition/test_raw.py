@@ -28,7 +28,6 @@ from pendpipe.acquisition.line import LineLostError
 from pendpipe.acquisition.raw import Frame, RawWriter, append_event, lock, read_raw
 from pendpipe.acquisition.recorder import ProgressLine, acquire_simulated
 from pendpipe.arrays import FloatArray
-from pendpipe.cli import main
 from pendpipe.errors import InputError
 from pendpipe.recording import MISSING, SUSPECT, read_plain
 
@@ -291,15 +290,12 @@ def kill_a_recorder(raw: Path, after_s: float) -> int:
     return size
 
 
-def test_a_killed_recorder_leaves_a_recording_that_opens(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_killed_recorder_leaves_a_recording_that_opens(tmp_path: Path, answer_of: Any) -> None:
     instants = random.Random(5)
     for number in range(2):
         raw, out = tmp_path / f"{number}.raw", tmp_path / f"{number}.csv"
         size = kill_a_recorder(raw, instants.uniform(0.0, 0.3))
-        assert main(["acquire", "--recover", str(raw), "--out", str(out)]) == 0
-        assert "cut short" in capsys.readouterr().err
+        assert "cut short" in answer_of(["acquire", "--recover", str(raw), "--out", str(out)]).err
         kept = read_raw(raw)
         # Whatever had been written before is there, but for a frame half written.
         assert raw.stat().st_size - kept.damaged_bytes >= size - 5000

@@ -22,7 +22,6 @@ from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.raw import read_raw
 from pendpipe.acquisition.recorder import acquire_simulated, example_signal
 from pendpipe.acquisition.view import state
-from pendpipe.cli import main
 from pendpipe.recording import read_plain
 
 SCALE = 20.0
@@ -139,7 +138,8 @@ def test_a_growing_file_is_shown_as_far_as_it_has_come(tmp_path: Path) -> None:
 
 
 def test_where_nothing_is_recorded_there_is_nothing_to_view(
-    capsys: pytest.CaptureFixture[str],
+    answer_of: Any,
 ) -> None:
-    assert main(["acquire", "--view", "--serve", "di2108"]) == 2
-    assert capsys.readouterr().err.startswith("pendpipe: --view: nothing is recorded here")
+    assert answer_of(["acquire", "--view", "--serve", "di2108"], 2).err.startswith(
+        "pendpipe: --view: nothing is recorded here"
+    )

@@ -3,6 +3,7 @@
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -414,15 +415,13 @@ def test_a_period_gives_q_with_its_error(tmp_path: Path) -> None:
     assert np.max(np.abs(fit.residual)) < 5e-4
 
 
-def test_the_command_takes_period_or_frequency(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_takes_period_or_frequency(tmp_path: Path, answer_of: Any) -> None:
     file = tmp_path / "ruler.csv"
     file.write_text(LAYOUTS["ruler in cm"][0])
-    found = []
-    for option in (["--period", "1.25"], ["--frequency", "0.8"], []):
-        assert main(["fit", str(file), "--json", *option]) == 0
-        found.append(json.loads(capsys.readouterr().out))
+    found = [
+        json.loads(answer_of(["fit", str(file), "--json", *option]).out)
+        for option in (["--period", "1.25"], ["--frequency", "0.8"], [])
+    ]
     assert found[0]["quality_factors"] == found[1]["quality_factors"]
     assert found[2]["parameters"]["frequency"]["value"] is None
     assert found[2]["noise_rms_rad"] is None

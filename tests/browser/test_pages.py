@@ -13,6 +13,7 @@ import pytest
 from pendpipe.recording import read_plain
 from pendpipe.report.page import BUDGET_BYTES
 
+pytestmark = pytest.mark.slow
 SETTLED = """() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() =>
   done(performance.now()))))"""
 """Waits until what was loaded has been drawn."""

@@ -220,12 +220,12 @@ def test_what_holds_no_decay_is_not_analysable(
     assert "\n" not in content["reason"]
 
 
-def test_a_file_that_is_not_there_leaves_nothing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_file_that_is_not_there_leaves_nothing(tmp_path: Path, answer_of: Any) -> None:
     out = tmp_path / "out"
-    assert cli.main(["diagnose", str(tmp_path / "none.csv"), "--out", str(out)]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
+    assert (
+        answer_of(["diagnose", str(tmp_path / "none.csv"), "--out", str(out)], 2).err.count("\n")
+        == 1
+    )
     assert not out.exists()
 
 
@@ -239,10 +239,9 @@ def test_a_file_that_is_not_there_leaves_nothing(
     ],
 )
 def test_a_parameter_that_cannot_be_held_is_a_usage_fault(
-    linear: Path, tmp_path: Path, words: list[str], capsys: pytest.CaptureFixture[str]
+    linear: Path, tmp_path: Path, words: list[str], answer_of: Any
 ) -> None:
-    assert cli.main(["diagnose", str(linear), "--out", str(tmp_path / "out"), *words]) == 2
-    said = capsys.readouterr().err
+    said = answer_of(["diagnose", str(linear), "--out", str(tmp_path / "out"), *words], 2).err
     assert "--fix" in said
     assert said.count("\n") == 1
     assert not (tmp_path / "out").exists()

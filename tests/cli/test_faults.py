@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from inspect import signature
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -60,16 +61,14 @@ def test_a_keyword_that_there_is_not_is_no_keyword(verb: Callable[..., object]) 
         verb("examples/rod-pendulum.csv", sampel_rate=10.0)
 
 
-def test_a_mistyped_command_gets_the_nearest_one(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["inspekt"]) == 2
-    err = capsys.readouterr().err
+def test_a_mistyped_command_gets_the_nearest_one(answer_of: Any) -> None:
+    err = answer_of(["inspekt"], 2).err
     assert err.count("\n") == 1
     assert "did you mean 'pendpipe inspect'?" in err
 
 
-def test_no_arguments_show_where_to_begin(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main([]) == 0
-    assert "pendpipe fit FILE" in capsys.readouterr().out
+def test_no_arguments_show_where_to_begin(answer_of: Any) -> None:
+    assert "pendpipe fit FILE" in answer_of([]).out
 
 
 def test_a_users_fault_is_one_line_and_status_2(

@@ -6,6 +6,7 @@ import math
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,9 +26,8 @@ VISCOUS = {
 }
 
 
-def test_the_summary_holds_the_truth_within_its_errors(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["fit", ROD]) == 0
-    out = capsys.readouterr().out
+def test_the_summary_holds_the_truth_within_its_errors(answer_of: Any) -> None:
+    out = answer_of(["fit", ROD]).out
     first, *_, copy, following = out.splitlines()
     assert first.startswith("rod-pendulum.csv: angle, 50 Hz, ")
     assert first.endswith("GREEN")
@@ -49,11 +49,10 @@ def refused_file(folder: Path) -> Path:
 
 
 def test_several_recordings_make_one_table_and_a_bad_one_stops_nothing(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, answer_of: Any
 ) -> None:
     bad = refused_file(tmp_path)
-    assert cli.main(["fit", ROD, str(bad), STRING, "--wide"]) == 0
-    captured = capsys.readouterr()
+    captured = answer_of(["fit", ROD, str(bad), STRING, "--wide"])
     rows = captured.out.splitlines()
     assert [row.split()[1] for row in rows[1:4]] == ["green", "refused", "green"]
     # Each number has its unit.
@@ -70,7 +69,7 @@ def test_several_recordings_make_one_table_and_a_bad_one_stops_nothing(
 
 @pytest.mark.parametrize("form", ["csv", "xlsx", "html", "tex", "json"])
 def test_the_suffix_decides_the_form_of_the_table(
-    form: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    form: str, tmp_path: Path, answer_of: Any
 ) -> None:
     import pandas as pd
 
@@ -94,20 +93,21 @@ def test_the_suffix_decides_the_form_of_the_table(
     assert cli.main(asked) == 0
     # So it is with one file.
     assert cli.main(["fit", ROD, "--out", str(tmp_path / f"one.{form}")]) == 0
-    assert cli.main(["fit", ROD, "--out", str(tmp_path / "one.xyz")]) == 2
-    assert "its form is unknown" in capsys.readouterr().err
+    assert (
+        "its form is unknown" in answer_of(["fit", ROD, "--out", str(tmp_path / "one.xyz")], 2).err
+    )
 
 
-def test_the_files_of_a_class_that_agree_are_put_together(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_files_of_a_class_that_agree_are_put_together(tmp_path: Path, answer_of: Any) -> None:
     files = []
     for seed in range(5):
         path = tmp_path / f"{seed}.csv"
         write_plain(path, pp.simulate(VISCOUS | {"noise_rad": 1e-3}, seed=seed))
         files.append(str(path))
-    assert cli.main(["fit", *files, STRING, "--json"]) == 0
-    together = {each["name"]: each for each in json.loads(capsys.readouterr().out)["together"]}
+    together = {
+        each["name"]: each
+        for each in json.loads(answer_of(["fit", *files, STRING, "--json"]).out)["together"]
+    }
     # The string's pendulum is another one.
     assert (together["T0"]["files"], together["T0"]["of"]) == (5, 6)
     mean = together["T0"]["mean"]
@@ -116,10 +116,13 @@ def test_the_files_of_a_class_that_agree_are_put_together(
 
 
 def test_a_length_with_its_error_makes_g_with_its_error(
-    capsys: pytest.CaptureFixture[str],
+    answer_of: Any,
 ) -> None:
-    assert cli.main(["fit", STRING, "--length", "1.000(1)"]) == 0
-    line = next(row for row in capsys.readouterr().out.splitlines() if row.startswith("  g "))
+    line = next(
+        row
+        for row in answer_of(["fit", STRING, "--length", "1.000(1)"]).out.splitlines()
+        if row.startswith("  g ")
+    )
     value, sd = line.split()[1].rstrip(")").split("(")
     # Of a length known to 1e-3; of 2.006018(3) s.
     assert float(value) == pytest.approx(9.8105, rel=2e-3)
@@ -129,31 +132,25 @@ def test_a_length_with_its_error_makes_g_with_its_error(
         cli.main(["fit", STRING, "--length", "0"])
 
 
-def test_standard_input_is_a_file(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_standard_input_is_a_file(monkeypatch: pytest.MonkeyPatch, answer_of: Any) -> None:
     stream = io.TextIOWrapper(io.BytesIO(Path(ROD).read_bytes()))
     monkeypatch.setattr(sys, "stdin", stream)
-    assert cli.main(["fit", "-", "--json"]) == 0
-    piped = json.loads(capsys.readouterr().out)
+    piped = json.loads(answer_of(["fit", "-", "--json"]).out)
     assert piped["parameters"] == pp.fit(ROD).to_dict()["parameters"]
-    assert cli.main(["fit", ROD, ROD, "--json"]) == 0
-    both = json.loads(capsys.readouterr().out)["fits"]
+    both = json.loads(answer_of(["fit", ROD, ROD, "--json"]).out)["fits"]
     assert [entry["parameters"] for entry in both] == [piped["parameters"]] * 2
 
 
-def test_a_figure_is_drawn_where_it_is_asked_for(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_figure_is_drawn_where_it_is_asked_for(tmp_path: Path, answer_of: Any) -> None:
     figure = tmp_path / "rod.svg"
     assert cli.main(["fit", ROD, "--figure", str(figure)]) == 0
     text = figure.read_text(encoding="utf-8")
     assert "Amplitude" in text
     assert ">Q<" in text
-    assert cli.main(["fit", ROD, "--figure", str(tmp_path / "rod.bmp")]) == 2
-    assert "form is unknown" in capsys.readouterr().err
-    assert cli.main(["fit", ROD, STRING, "--figure", str(figure)]) == 2
-    assert "--figure" in capsys.readouterr().err
+    assert (
+        "form is unknown" in answer_of(["fit", ROD, "--figure", str(tmp_path / "rod.bmp")], 2).err
+    )
+    assert "--figure" in answer_of(["fit", ROD, STRING, "--figure", str(figure)], 2).err
 
 
 def test_a_law_at_its_bound_is_printed_as_an_upper_limit(tmp_path: Path) -> None:
@@ -169,14 +166,15 @@ def test_a_law_at_its_bound_is_printed_as_an_upper_limit(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("content", ["{}", "[1, 2]", '{"volts": 3}'])
 def test_a_file_that_is_no_calibration_is_refused_in_a_line(
-    content: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    content: str, tmp_path: Path, answer_of: Any
 ) -> None:
     recording, calibration = tmp_path / "decay.csv", tmp_path / "calibration.json"
     rows = (f"{0.01 * k:.2f},{math.exp(-k / 900) * math.cos(0.05 * k):.6f}" for k in range(3000))
     recording.write_text("time_s,volts\n" + "\n".join(rows) + "\n")
     calibration.write_text(content)
-    assert cli.main(["fit", str(recording), "--calibration", str(calibration)]) == 2
-    said = capsys.readouterr().err.splitlines()[-1]
+    said = answer_of(
+        ["fit", str(recording), "--calibration", str(calibration)], 2
+    ).err.splitlines()[-1]
     assert said == f"pendpipe: {calibration}: this is no calibration; run pendpipe calibrate"
 
 
@@ -195,7 +193,7 @@ def test_a_file_that_is_no_calibration_is_refused_in_a_line(
     ],
 )
 def test_a_commands_answer_is_one_json_object(
-    command: list[str], key: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    command: list[str], key: str, tmp_path: Path, answer_of: Any
 ) -> None:
     table = tmp_path / "caliper.csv"
     rows = [f"{0.01 * step},{0.0385 * step + 0.001 * (step % 2)}" for step in range(-5, 6)]
@@ -206,8 +204,7 @@ def test_a_commands_answer_is_one_json_object(
         (results / "separation.json").write_text("{}", encoding="utf-8")
         written.append(results / "separation.json")
     words = [word.format(folder=results, table=table) for word in command]
-    assert cli.main([*words, "--json"]) == 0
-    assert key in json.loads(capsys.readouterr().out)
+    assert key in json.loads(answer_of([*words, "--json"]).out)
 
 
 # `pendpipe page` writes one file that needs nothing outside itself.
@@ -229,13 +226,12 @@ def test_one_page_holds_the_fit_and_refers_to_nothing_outside(
     assert str(ROD_FILE.parent) not in text
 
 
-def test_a_name_in_the_page_is_text_and_no_markup(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_name_in_the_page_is_text_and_no_markup(tmp_path: Path, answer_of: Any) -> None:
     odd = tmp_path / "<b>rod&.csv"
     odd.write_bytes(ROD_FILE.read_bytes())
-    assert cli.main(["page", str(odd), "--out", "-", "--no-diagnosis"]) == 0
-    assert "&lt;b&gt;rod&amp;.csv" in capsys.readouterr().out
+    assert (
+        "&lt;b&gt;rod&amp;.csv" in answer_of(["page", str(odd), "--out", "-", "--no-diagnosis"]).out
+    )
 
 
 def test_a_diagnosis_stands_on_the_page_unless_it_is_not_wanted(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ import os
 import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -88,12 +89,14 @@ def test_an_output_that_is_an_input_is_refused(
     command: str,
     name: Callable[[Path], Path],
     force: Sequence[str],
-    capsys: pytest.CaptureFixture[str],
+    answer_of: Any,
 ) -> None:
     path = given[INPUT.get(command, "recording")]
     before = path.read_bytes()
-    assert main([*call(command, name(path), given), *force]) == 2
-    assert "this output is one of the inputs" in capsys.readouterr().err
+    assert (
+        "this output is one of the inputs"
+        in answer_of([*call(command, name(path), given), *force], 2).err
+    )
     assert path.read_bytes() == before
 
 
@@ -110,15 +113,14 @@ def test_a_file_of_others_is_replaced_only_with_force(
     given: dict[str, Path],
     command: str,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    answer_of: Any,
 ) -> None:
     """And what a command has written it may write again."""
     content = b'\x00{"made by": "me"}'
     out = tmp_path / FORM.get(command, "mine.csv")
     out.write_bytes(content)
     words = call(command, out, given)
-    assert main(words) == 2
-    error = capsys.readouterr().err
+    error = answer_of(words, 2).err
     assert "pendpipe did not make this file" in error
     assert "--force" in error
     assert error.count("\n") == 1
@@ -143,7 +145,7 @@ def test_a_figure_replaces_a_figure_of_ours_and_no_other(
 
 @pytest.mark.parametrize("name", ["again.csv", "again.wdh"])
 def test_a_converted_recording_is_made_again_and_an_instruments_is_not(
-    given: dict[str, Path], tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+    given: dict[str, Path], tmp_path: Path, name: str, answer_of: Any
 ) -> None:
     words = ["convert", str(given["recording"]), str(tmp_path / name)]
     assert [main(words), main(words)] == [0, 0]
@@ -151,8 +153,7 @@ def test_a_converted_recording_is_made_again_and_an_instruments_is_not(
     recorded = [*device, "--out", str(tmp_path / f"recorded-{name}")]
     assert main(recorded) == 0
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
-    assert main(recorded) == 2
-    assert "did not make" in capsys.readouterr().err
+    assert "did not make" in answer_of(recorded, 2).err
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
@@ -173,14 +174,16 @@ def test_a_raw_file_is_never_replaced(given: dict[str, Path], tmp_path: Path) ->
 
 
 def test_a_diagnosis_leaves_the_users_figures_alone(
-    given: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    given: dict[str, Path], tmp_path: Path, answer_of: Any
 ) -> None:
     folder = tmp_path / "diagnosis"
     folder.mkdir()
     mine = folder / "decay.svg"
     mine.write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
-    assert main(["diagnose", str(given["recording"]), "--out", str(folder)]) == 2
-    assert "decay.svg: pendpipe did not make this file" in capsys.readouterr().err
+    assert (
+        "decay.svg: pendpipe did not make this file"
+        in answer_of(["diagnose", str(given["recording"]), "--out", str(folder)], 2).err
+    )
     assert [path.name for path in folder.iterdir()] == ["decay.svg"]
 
 
@@ -208,14 +211,13 @@ def test_what_goes_to_standard_output_is_the_result_alone(
     given: dict[str, Path],
     command: str,
     out: str,
-    capsys: pytest.CaptureFixture[str],
+    answer_of: Any,
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     words = [out if word == "OUT" else word for word in call(command, Path("OUT"), given)]
-    assert main(words) == 0
-    printed = capsys.readouterr().out
+    printed = answer_of(words).out
     assert printed.startswith(("# made_by: pendpipe ", '{\n "made_by": "pendpipe '))
     assert len({*tmp_path.iterdir()} - {*given.values()}) == 0
     written = tmp_path / "written"

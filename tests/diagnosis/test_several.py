@@ -176,16 +176,13 @@ def test_command_writes_the_keys_of_a_diagnosis_and_the_recordings(tmp_path: Pat
     assert "frequency" in found["recordings"][0]["parameters"]
 
 
-def test_what_is_for_one_recording_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["diagnose", "a.csv", "b.csv", "--fix", "c=0"]) == 2
-    assert "--fix" in capsys.readouterr().err
+def test_what_is_for_one_recording_is_refused(answer_of: Any) -> None:
+    assert "--fix" in answer_of(["diagnose", "a.csv", "b.csv", "--fix", "c=0"], 2).err
     with pytest.raises(pp.InputError, match="at least two"):
         pp.diagnose([swing(0.1, 1)], volts_per_radian=1.0, together=True)
 
 
-def test_two_pendulums_are_not_taken_for_one(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_two_pendulums_are_not_taken_for_one(tmp_path: Path, answer_of: Any) -> None:
     """1.27 and 1.42 s: no amplitude lengthens the one to the other."""
     time_s, files = np.arange(0.0, 40.0, 0.02), []
     for period in (1.27, 1.42):
@@ -193,10 +190,11 @@ def test_two_pendulums_are_not_taken_for_one(
         files.append(str(tmp_path / f"{period}.csv"))
         rows = "".join(f"{t:.2f},{x:.6f}\n" for t, x in zip(time_s, angle, strict=True))
         Path(files[-1]).write_text("time_s,angle_rad\n" + rows)
-    assert main(["diagnose", *files]) == 2
-    assert "add --together if they are recordings of one pendulum" in capsys.readouterr().err
-    assert main(["diagnose", "--together", *files]) == 2
-    assert "1.42.csv swings at 0.70" in capsys.readouterr().err
+    assert (
+        "add --together if they are recordings of one pendulum"
+        in answer_of(["diagnose", *files], 2).err
+    )
+    assert "1.42.csv swings at 0.70" in answer_of(["diagnose", "--together", *files], 2).err
     with pytest.raises(pp.InputError, match="say together=True"):
         pp.diagnose(files)
     with pytest.raises(pp.InputError, match="no amplitude of one pendulum"):

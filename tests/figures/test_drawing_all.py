@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from pendpipe.cli import main
 from pendpipe.figures.campaign import (
     draw_all,
     draw_fig03,
@@ -98,7 +97,7 @@ def test_recordings_of_others_have_their_decays_only(small: tuple[dict[str, Any]
 
 
 def test_the_command_draws_and_says_what_it_left_out(
-    small: tuple[dict[str, Any], Path], example: Any, capsys: pytest.CaptureFixture[str]
+    small: tuple[dict[str, Any], Path], example: Any, answer_of: Any
 ) -> None:
     from pendpipe.files import write_json
 
@@ -107,14 +106,12 @@ def test_the_command_draws_and_says_what_it_left_out(
     write_json(folder / "comparison.json", {**content, "calibration": None})
     out, comparison = folder.parent / "elsewhere", str(folder / "comparison.json")
     words = ["figures", "--campaign", str(folder / "c.json"), "--out", str(out), "--comparison"]
-    assert main([*words, comparison]) == 0
-    assert "fig03 is not drawn" in capsys.readouterr().err
+    assert "fig03 is not drawn" in answer_of([*words, comparison]).err
     # The workflow counts on figures 3 to 10: the reason stands in the place of figure 3.
     assert {path.stem for path in out.glob("*.svg")} == set(PAPER)
     assert "no calibration" in "".join(ET.parse(out / "fig03.svg").getroot().itertext())
     assert (out / "fig04.svg").as_posix() in (out / "drawn.json").read_text()
-    assert main([*words, str(folder / "nowhere.json")]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
+    assert answer_of([*words, str(folder / "nowhere.json")], 2).err.count("\n") == 1
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +10,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.special import ellipk
 
-from pendpipe.cli import main
 from pendpipe.errors import InputError
 from pendpipe.formats import ReadOptions, circle, inspect, lists, read, times, units
 from pendpipe.formats import columns as guess
@@ -135,12 +135,9 @@ def test_a_pull_along_the_string_swings_twice_in_a_period(
     assert any("twice in a period" in note for note in notes) is said
 
 
-def test_inspect_prints_the_number_that_column_takes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_inspect_prints_the_number_that_column_takes(tmp_path: Path, answer_of: Any) -> None:
     (tmp_path / "a.csv").write_text(text(TIME, ANGLE, 900 + 80 * ANGLE, head="t,theta,foo\n"))
-    assert main(["inspect", str(tmp_path / "a.csv"), "--column", "foo"]) == 0
-    printed = capsys.readouterr().out.splitlines()
+    printed = answer_of(["inspect", str(tmp_path / "a.csv"), "--column", "foo"]).out.splitlines()
     assert "  channel 2   foo (--column 3)" in printed
     level = float(next(line for line in printed if "hangs at" in line).split()[-1])
     assert level == pytest.approx(900.0, abs=1.0)

@@ -3,6 +3,7 @@
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -103,13 +104,12 @@ LISTS = {
 
 @pytest.mark.parametrize("kind", LISTS)
 def test_a_list_is_reported_as_what_it_is_by_inspect_and_convert(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], answer_of: Any, kind: str
 ) -> None:
     path = tmp_path / "a.csv"
     path.write_text(LISTS[kind])
     word = {"periods": "holds periods", "spectrum": "a spectrum", "passages": "light gate"}[kind]
-    assert main(["convert", str(path), str(tmp_path / "copy.csv")]) == 2
-    assert word in capsys.readouterr().err
+    assert word in answer_of(["convert", str(path), str(tmp_path / "copy.csv")], 2).err
     status = main(["inspect", str(path), "--json"])
     said = capsys.readouterr()
     assert word in said.out + said.err
@@ -215,13 +215,12 @@ def test_one_flat_top_and_one_flat_bottom_are_clipped_but_no_held_readings() -> 
     assert clipped_samples(np.repeat(np.round(np.cos(0.25 * time), 1), 4), 0.1) == 0
 
 
-def test_json_has_the_contracts_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_has_the_contracts_form(tmp_path: Path, answer_of: Any) -> None:
     path = tmp_path / "a.WDH"
     counts = np.rint(ANGLE * 20000).astype(np.int64)[:, None]
     events = [0, 0, -1000]
     path.write_bytes(WindaqFile(counts, hires=True, interval_s=0.02, events=events).pack())
-    assert main(["inspect", "--json", str(path)]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = json.loads(answer_of(["inspect", "--json", str(path)]).out)
     expected = {
         "made_by": found["made_by"],
         "schema_version": 1,
@@ -245,14 +244,11 @@ def test_json_has_the_contracts_form(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert list(found) == list(expected)
 
 
-def test_convert_keeps_samples_constant_and_markers(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_convert_keeps_samples_constant_and_markers(tmp_path: Path, answer_of: Any) -> None:
     path, out = tmp_path / "a.WDQ", tmp_path / "out.csv"
     counts = np.rint(ANGLE * 8000).astype(np.int64)[:, None]
     path.write_bytes(WindaqFile(counts, interval_s=0.02, events=[0, 0, -1000]).pack())
-    assert main(["convert", str(path), str(out), "--volts-per-radian", "3.85"]) == 0
-    assert "a.WDQ" in capsys.readouterr().err
+    assert "a.WDQ" in answer_of(["convert", str(path), str(out), "--volts-per-radian", "3.85"]).err
     plain = read_plain(out)
     np.testing.assert_array_equal(plain.values, read(path).values)
     assert plain.number("volts_per_radian") == 3.85
@@ -260,13 +256,10 @@ def test_convert_keeps_samples_constant_and_markers(
     assert inspect(out).format == "plain"
 
 
-def test_a_fault_ends_with_2_one_line_and_no_file(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_fault_ends_with_2_one_line_and_no_file(tmp_path: Path, answer_of: Any) -> None:
     path, out = tmp_path / "a.csv", tmp_path / "out.csv"
     path.write_text("time_s,angle_rad\n0.0,0.1\n0.1,oops\n")
-    assert main(["convert", str(path), str(out)]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
+    assert answer_of(["convert", str(path), str(out)], 2).err.count("\n") == 1
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -286,12 +279,11 @@ def test_a_drive_that_is_switched_on_and_off_is_not_graded(off: float) -> None:
     assert swing_of(size * np.cos(2.0 * np.pi * cycle)).graded < 0.03
 
 
-def test_why_prints_a_line_a_decision(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_why_prints_a_line_a_decision(tmp_path: Path, answer_of: Any) -> None:
     path = tmp_path / "a.csv"
     rows = "".join(f"{t:.2f};{x:.5f};21\n" for t, x in zip(TIME, ANGLE, strict=True))
     path.write_text(("t [s];theta;temperature\n" + rows).replace(".", ","))
-    assert main(["inspect", "--why", str(path)]) == 0
-    printed = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    printed = [line.strip() for line in answer_of(["inspect", "--why", str(path)]).out.splitlines()]
     assert "column 1 't': time, in s" in printed
     assert "column 2 'theta': angle, no unit stated" in printed
     assert "columns separated by semicolons, decimal commas" in printed

@@ -3,13 +3,12 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from pendpipe.arrays import FloatArray
-from pendpipe.cli import main
 from pendpipe.formats import ReadOptions, inspect, read
 from pendpipe.formats.table import without_marks
 
@@ -986,14 +985,11 @@ def test_no_size_and_no_step_tells_a_unit(tmp_path: Path, size: float, name: str
     assert inspect(path).unit == "1"
 
 
-def test_the_first_line_says_which_option_gives_the_rest(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_first_line_says_which_option_gives_the_rest(tmp_path: Path, answer_of: Any) -> None:
     path = tmp_path / "a.csv"
     lines = zip(TIME_S, SMALL_RAD, strict=True)
     path.write_text("t,theta\n" + "".join(f"{t:.3f},{x:.9f}\n" for t, x in lines))
-    assert main(["inspect", str(path)]) == 0
-    first = capsys.readouterr().out.splitlines()[0]
+    first = answer_of(["inspect", str(path)]).out.splitlines()[0]
     assert first == "a guess: 'theta' has no unit: analysed in its own (--unit)"
     assert not read(path, ReadOptions(unit="rad")).weak_guesses
 

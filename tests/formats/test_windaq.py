@@ -3,6 +3,7 @@
 import struct
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -435,22 +436,22 @@ def test_uneven_times_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["out.WDQ", "out.whc", "out.mat", "out.xlsx"])
 def test_a_form_that_is_only_read_is_refused_before_anything_is_done(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, tmp_path: Path, answer_of: Any
 ) -> None:
-    assert main(["convert", str(tmp_path / "nowhere.csv"), str(tmp_path / name)]) == 2
-    assert "this form is read, not written" in capsys.readouterr().err
+    assert (
+        "this form is read, not written"
+        in answer_of(["convert", str(tmp_path / "nowhere.csv"), str(tmp_path / name)], 2).err
+    )
     call = ["acquire", "--device", "simulated:di2108", "--out", str(tmp_path / name)]
-    assert main(call) == 2
-    assert "this form is read, not written" in capsys.readouterr().err
+    assert "this form is read, not written" in answer_of(call, 2).err
 
 
-def test_convert_there_and_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_convert_there_and_back(tmp_path: Path, answer_of: Any) -> None:
     first, windaq, last = tmp_path / "a.csv", tmp_path / "a.WDH", tmp_path / "b.csv"
     marked = {**volts(SWING).metadata, "marker_1": "250; 2.5 s; released"}
     write_plain(first, Recording(volts(SWING).time_s, volts(SWING).values, "volts", None, marked))
     assert main(["convert", str(first), str(windaq)]) == 0
-    assert main(["convert", str(windaq), str(last)]) == 0
-    assert "1500 samples" in capsys.readouterr().out
+    assert "1500 samples" in answer_of(["convert", str(windaq), str(last)]).out
     assert np.array_equal(read_plain(last).values, read_plain(first).values)
     assert [(m.sample, m.comment) for m in inspect(last).markers] == [(0, ""), (250, "released")]
 

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,6 +17,7 @@ from pendpipe.stages.chunks import batch_for, split
 
 # The workflow runs in any folder: begun by `init`, run by `campaign`, or used as a module.
 
+pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 RECORDS_STAGES = ("acquire", "calibrate", "turning_points", "fit")
 
@@ -111,12 +113,11 @@ rule all:
 
 
 def test_init_replaces_nothing(
-    begun: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    begun: Path, monkeypatch: pytest.MonkeyPatch, answer_of: Any
 ) -> None:
     before = {path: path.read_bytes() for path in begun.rglob("*") if path.is_file()}
     (begun / "config/records.tsv").unlink()
-    assert main(["init", str(begun)]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
+    (line,) = answer_of(["init", str(begun)], 2).err.splitlines()
     assert "config.yaml" in line
     assert "records.tsv" not in line
     del before[begun / "config/records.tsv"]
@@ -153,12 +154,11 @@ def test_what_is_wrong_is_said_before_snakemake_starts(
     words: list[str],
     said: str,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    answer_of: Any,
 ) -> None:
     if words:
         monkeypatch.chdir(begun)
-    assert main(["campaign", *words]) == 2
-    (line,) = capsys.readouterr().err.splitlines()[-1:]
+    (line,) = answer_of(["campaign", *words], 2).err.splitlines()[-1:]
     assert said in line
 
 

@@ -22,6 +22,7 @@ from pendpipe.manifest import FOLDER, manifests
 from pendpipe.project import SNAKEFILE
 from pendpipe.stages.chunks import split
 
+pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 LIBRARY = Path(pendpipe.__file__).parents[1]
 """What is tested, wherever it is installed."""
@@ -369,7 +370,7 @@ def test_damaged_results_are_named_and_made_again(campaign: Campaign) -> None:
 
 
 def test_a_job_that_reads_a_damaged_result_says_so_and_writes_none(
-    campaign: Campaign, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    campaign: Campaign, tmp_path: Path, answer_of: Any
 ) -> None:
     """Damage between planning and job: status 2, one line, and no refusal."""
     record = tmp_path / "results/air-07"
@@ -379,8 +380,7 @@ def test_a_job_that_reads_a_damaged_result_says_so_and_writes_none(
     call += ["--calibration", str(record / "calibration.json")]
     call += ["--turning-points", str(record / "turning_points.csv")]
     call += ["--out", str(record / "fit.json"), "--refused", str(record / "refused.json")]
-    assert main(call) == 2
-    (line,) = capsys.readouterr().err.splitlines()
+    (line,) = answer_of(call, 2).err.splitlines()
     assert "turning_points.csv: it is torn" in line
     assert "run snakemake again" in line
     assert not (record / "refused.json").exists()

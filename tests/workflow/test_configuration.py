@@ -299,14 +299,15 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ],
 )
 def test_a_place_that_cannot_be_written_is_one_line(
-    folder: Path, call: str, capsys: pytest.CaptureFixture[str]
+    folder: Path, call: str, answer_of: Any
 ) -> None:
     (folder / "campaign.json").write_text(json.dumps({"results": "file"}))
     configuration = folder / "config/config.yaml"
     text = configuration.read_text(encoding="utf-8")
     configuration.write_text(text.replace("results: results", "results: r"), encoding="utf-8")
-    assert main(call.split()) == 2
-    lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("pendpipe")]
+    lines = [
+        line for line in answer_of(call.split(), 2).err.splitlines() if line.startswith("pendpipe")
+    ]
     assert len(lines) == 1
     assert "file" in lines[0]
     assert (folder / "file").read_text() == "kept"
@@ -377,9 +378,11 @@ def killed_stage(results: Path) -> None:
         raise KeyboardInterrupt
 
 
-def test_sound_results_have_no_finding(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["doctor", str(results), "--fail-on", "findings"]) == 0
-    assert "as their stages wrote them" in capsys.readouterr().out
+def test_sound_results_have_no_finding(results: Path, answer_of: Any) -> None:
+    assert (
+        "as their stages wrote them"
+        in answer_of(["doctor", str(results), "--fail-on", "findings"]).out
+    )
 
 
 @pytest.mark.parametrize(
@@ -405,13 +408,12 @@ def test_each_thing_that_is_wrong_is_named(
     results: Path,
     change: Callable[[Path], object],
     expected: tuple[str, str],
-    capsys: pytest.CaptureFixture[str],
+    answer_of: Any,
 ) -> None:
     change(results)
     before = {path: path.stat().st_mtime_ns for path in results.rglob("*")}
     assert expected in kinds(results)
-    assert main(["doctor", str(results), "--fail-on", "findings"]) == 3
-    for line in capsys.readouterr().out.splitlines():
+    for line in answer_of(["doctor", str(results), "--fail-on", "findings"], 3).out.splitlines():
         assert line.count("; ") >= 1, "each line ends with what is safe to do"
     assert {path: path.stat().st_mtime_ns for path in results.rglob("*")} == before
 
@@ -501,10 +503,9 @@ def test_a_folder_without_results_is_the_users_error(
     assert "no stage has left results here" in capsys.readouterr().err
 
 
-def test_programs_get_json(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_programs_get_json(results: Path, answer_of: Any) -> None:
     put("air-01/fit.json", "")(results)
-    assert main(["doctor", str(results), "--json"]) == 0
-    findings = json.loads(capsys.readouterr().out)["findings"]
+    findings = json.loads(answer_of(["doctor", str(results), "--json"]).out)["findings"]
     assert {"kind", "path", "problem", "safe"} == set(findings[0])
 
 
