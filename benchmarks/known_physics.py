@@ -1,6 +1,6 @@
 """What is known of real recordings, and whether the library finds it.
 
-    python -m benchmarks.known_physics [--only NAME] [--limit SECONDS] [--number N]
+    python -m benchmarks.known_physics [--only NAME] [--limit SECONDS] [--number N] [--answers]
 
 `known_physics.tsv` lists the free decays of ../shared/recordings with what their README states
 (`known`), what was worked out by hand (`by_hand`), and names that would be wrong. `pendpipe fit`
@@ -311,18 +311,24 @@ def main() -> None:
     """Ask what has not been asked yet of this code, and print a row a recording."""
     parser = judge_parser(__doc__, "known_physics", 0)
     parser.add_argument("--only", action="append", default=[], help="part of a name; repeatable")
+    parser.add_argument("--answers", action="store_true", help="print each answer in full")
     parser.add_argument("--limit", type=float, default=200.0, help="CPU seconds a command")
     arguments = parser.parse_args()
     wanted = arguments.only or [""]
     rows = [row for row in table() if any(each in row["record"] for each in wanted)]
     rows = rows[: arguments.number or None]
     titles = ("record", "named", "class of the first", "known: found", "missed", "by hand, found")
-    print(head(*titles, "torque and light of fit", "CPU s: fit, diagnose"), flush=True)
+    if not arguments.answers:
+        print(head(*titles, "torque and light of fit", "CPU s: fit, diagnose"), flush=True)
     judged = []
     asked = answers(arguments, rows, partial(ask, limit_s=arguments.limit))
     for row, kept in zip(rows, asked, strict=True):
         judged.append((row, judge(row, kept)))
-        print(line(row, kept, judged[-1][1]), flush=True)
+        if arguments.answers:
+            said = kept["diagnosis"]["content"].get("statement") or kept["diagnosis"]["said"]
+            print(f"**{row['file']}**", "```", said.strip(), "```", sep="\n", flush=True)
+        else:
+            print(line(row, kept, judged[-1][1]), flush=True)
     print("", summary(judged), sep="\n")
 
 

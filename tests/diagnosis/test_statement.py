@@ -255,6 +255,17 @@ def test_the_answer_has_a_dozen_lines_in_the_order_of_the_questions() -> None:
     assert lines[-1].startswith("Copy: “Eq. 8 does not describe this recording (p < 1e-12)")
 
 
+def test_a_number_that_moves_keeps_its_power_of_ten() -> None:
+    rates = [Estimate(4.0e-4, 0.2e-4, "1/s"), Estimate(1.11e-3, 0.2e-4, "1/s")]
+    found = diagnosis(likely("impulse", 0.9))
+    before, after = (
+        replace(model, parameters={**model.parameters, "b": rate})
+        for model, rate in zip((found.baseline, found.improved), rates, strict=True)
+    )
+    matters = replace(found, baseline=before, improved=after).summary.matters
+    assert matters.endswith("b 4.00(20) × 10⁻⁴ → 0.001110(20) s⁻¹")
+
+
 def test_the_table_shows_the_numbers_as_fitted_and_with_what_is_missing() -> None:
     found = diagnosis(likely("impulse", 0.9))
     (period, b) = found.to_dict()["summary"]["consequence"]

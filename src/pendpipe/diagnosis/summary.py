@@ -408,20 +408,12 @@ def _matters(diagnosis: Diagnosis, changes: Sequence[Change], unit: str) -> str:
     noise = compact(diagnosis.noise_rms_rad, unit)
     moved = [each for each in changes if each.quantity != "Q" and each.moved_sd > _MOVED]
     words = [
-        f"{_title(each)} {_like(each.fitted, each.with_missing)} →"
+        f"{_title(each)} {replace(each.fitted, unit='').or_limit()} →"
         f" {replace(each.with_missing, unit=each.fitted.unit).or_limit()}"
         for each in moved
     ]
     what = ", ".join(words) if words else "it moves no number by two standard deviations"
     return f"the fit misses the readings by {left} (noise {noise}): {what}"
-
-
-def _like(old: Estimate, new: Estimate) -> str:
-    """A value with the digits of another's error."""
-    if old.value == 0.0:
-        return "0"
-    value = with_error(old.value, new.sd or old.sd).strip("(")
-    return value.partition(" ± ")[0]
 
 
 def _where(diagnosis: Diagnosis, found: Sequence[FoundEffect]) -> str:
