@@ -454,6 +454,19 @@ def test_circular_error_at_1_4_rad_is_found_from_a_frequency_that_is_12_percent_
     assert abs(fit.value[OMEGA] - omega) < 5.0 * sd
 
 
+@pytest.mark.parametrize("scale", [1.0, 100.0])
+def test_an_interval_holds_its_value_whatever_the_unit_of_the_readings(scale: float) -> None:
+    """A play of 0.02 rad is 2 where 1 rad reads 100: the bounds of a size are scaled with it."""
+    effect = by_identifier("sensor-backlash")
+    powers = np.array([-1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0])  # of a, b, c, ... in amplitudes
+    model = Model(TIME_S, INTERVAL_S, scale=scale).adding(effect)
+    truth = np.append(TRUTH * scale**powers, 0.02 * scale)
+    data, noise = prepared(model.reading(truth) + scale * white(5), rms=scale * NOISE_RAD)
+    (play,) = effect_parameters(refine(model, data, noise, truth), effect).values()
+    low, high = play.bounds95
+    assert low < play.value < high
+
+
 # Intervals of instants hold the truth, in whichever half cycle chi^2 has its minimum.
 
 

@@ -16,7 +16,7 @@ from pendpipe.analysis.fit.quality import period_of_frequency, seen_qualities
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import CURVES
 from pendpipe.estimate import Estimate
-from pendpipe.quantities import compact, in_columns, with_error
+from pendpipe.quantities import compact, in_columns, listed, with_error
 
 if TYPE_CHECKING:
     from pendpipe.diagnosis.cycles import SmallSwings
@@ -519,7 +519,7 @@ def _sentence(diagnosis: Diagnosis, names: Sequence[str], presumed: str) -> str:
     p = printed(diagnosis.p_value)
     if not names:
         return f"“{model} does not describe this recording ({p}); the cause was not identified.”"
-    return f"“{model} does not describe this recording ({p}): it lacks {' and '.join(names)}.”"
+    return f"“{model} does not describe this recording ({p}): it lacks {listed(names)}.”"
 
 
 def printed(p_value: float) -> str:

@@ -139,11 +139,11 @@ def effect_parameters(fit: Fit, effect: Effect, unit: str = "rad") -> dict[str, 
     position = next((here for other, here in fit.model.places() if other is effect), None)
     if position is None:
         return {}
-    found, sds = {}, _sds(fit)
+    found, sds, (lowest, highest) = {}, _sds(fit), fit.model.bounds()
     for index, parameter in enumerate(effect.parameters, position.start + effect.parameter_free):
         value, sd = float(fit.value[index]), float(sds[index])
         low, high = Estimate(value, sd, "").bounds95
-        interval = max(low, parameter.low), min(high, parameter.high)
+        interval = max(low, float(lowest[index])), min(high, float(highest[index]))
         found[parameter.name] = Estimate(value, sd, parameter.unit_in(unit), interval)
     return found
 
