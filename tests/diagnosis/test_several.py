@@ -85,9 +85,12 @@ def test_a_torque_that_is_known_is_that_of_all() -> None:
 
 
 def test_each_release_is_predicted_from_the_others_within_its_band() -> None:
-    for each in together("nothing").to_dict()["recordings"]:
+    found = together("nothing")
+    for each in found.to_dict()["recordings"]:
         # 1000 readings: a fraction of 0.95 has a standard deviation of 0.007.
-        assert each["prediction"]["within_95"] == pytest.approx(0.95, abs=0.03)
+        within = each["prediction"]["within_95"]
+        assert within == pytest.approx(0.95, abs=0.03)
+        assert f" {100 * within:.0f} % of {each['name']} " in found.details
 
 
 def test_amplitudes_exclude_a_drift_that_one_recording_cannot_tell_from_cubic_damping() -> None:
