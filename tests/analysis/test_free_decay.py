@@ -415,6 +415,20 @@ def test_a_mode_that_does_not_decay_is_a_drive() -> None:
         find_free_decay(beat((0.03, 0.0), rest=True))
 
 
+@pytest.mark.parametrize("detuning", [0.98, 1.03])
+def test_a_pohl_wheel_whose_drive_is_switched_off_has_one_mode_and_no_beat(
+    detuning: float,
+) -> None:
+    """Two modes with losses of their own imitate it, but for a tenth of its amplitude."""
+    time = np.arange(8000) / RATE
+    drive = np.where(time < 20.0, np.sin(detuning * OMEGA * time), 0.0)
+    response = np.exp(-0.03 * time) * np.sin(OMEGA * time) / (RATE * OMEGA)
+    found = find_free_decay(recording([np.convolve(drive, response)[: len(time)]], noise=5e-3))
+    assert 19.0 < found.start_s < 22.5
+    assert found.stop_s == time[-1]
+    assert not found.notes
+
+
 @pytest.mark.parametrize("quality", [2.0, 3.0, 4.0, 10.0])
 def test_a_strongly_damped_decay_is_found(quality: float) -> None:
     time = np.arange(800) / RATE

@@ -381,7 +381,8 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     used = _chained(found, told) if told else []
     beside = sum(run.path for run in found) - sum(run.path for run in used)
     alone = told and beside <= 0.3 * told.path and _falls(told, least)
-    beat = _beating(time, values, whole, half_period, place, driven=not alone)
+    ends = (float(told.middle_s[0]), float(told.middle_s[-1])) if told else (math.inf, math.inf)
+    beat = _beating(time, values, whole, half_period, place, driven=not alone, decay_s=ends)
     if beat is not None:
         return beat
     if told is None:
@@ -570,8 +571,9 @@ def _beating(
     place: str | Path,
     *,
     driven: bool,
+    decay_s: tuple[float, float],
 ) -> FreeDecay | None:
-    """Find two free modes that beat; None where nothing beats.
+    """Find two free modes that beat; None where nothing beats, or one decays alone (`decay_s`).
 
     Raises
     ------
@@ -592,12 +594,13 @@ def _beating(
     )
     if not np.max(smooth - np.minimum.accumulate(smooth)) > 0.2 * np.max(smooth):
         return None
-    start, stop = float(cycles.turn_time_s[first]), float(cycles.turn_time_s[last + 1])
+    start = float(cycles.turn_time_s[first])
+    stop = _stop(time, Run(slice(0, len(time)), cycles, first, last))
     from pendpipe.effects.two_modes import two_modes
 
     inside = (time >= start) & (time <= stop)
     usual = float(np.median(half))
-    modes = two_modes(time[inside], values[inside], usual, may_be_one=not driven)
+    modes = two_modes(time[inside], values[inside], usual, may_be_one=not driven, decay_s=decay_s)
     if modes is None:
         return None
     steadily = [mode for mode in modes if mode.driven]

@@ -42,7 +42,12 @@ class Mode(NamedTuple):
 
 
 def two_modes(
-    time_s: FloatArray, values: FloatArray, half_period_s: float, *, may_be_one: bool = False
+    time_s: FloatArray,
+    values: FloatArray,
+    half_period_s: float,
+    *,
+    may_be_one: bool = False,
+    decay_s: tuple[float, float] = (math.inf, math.inf),
 ) -> tuple[Mode, Mode] | None:
     """Fit two damped modes and a level to readings.
 
@@ -67,19 +72,16 @@ def two_modes(
     eigenvalues of the step from one part of its strongest two-dimensional signal space to the next
     (ESPRIT); a few Gauss-Newton steps on all readings follow.
     """
-    slow = math.pi / half_period_s
-    time = time_s - time_s[0]
-    width = max(2.0 * half_period_s, float(time[-1]) / _WINDOWS)
-    edges = np.searchsorted(time, np.arange(0.0, time[-1], width))
-    amplitude = slow_amplitude(slow * time, values, edges.tolist())
-    if len(amplitude) < _FEWEST:
-        return None
-    found = _fitted(time, values, amplitude, width, slow, 2)
+    found = _fitted(time_s, values, half_period_s, 2)
     if found is None or not _explained(found[-1], values):
         return None
     rates, size, design, residual = found
+    decay = slice(*np.searchsorted(time_s, decay_s))
+    alone = _fitted(time_s[decay], values[decay], half_period_s, 1)
+    if alone and _explained(alone[-1], residual[decay]):
+        return None
     if may_be_one:
-        one = _fitted(time, values, amplitude, width, slow, 1)
+        one = _fitted(time_s, values, half_period_s, 1)
         thirds = [np.array_split(each, _THIRDS) for each in (residual, values)]
         still = _STILL * float(np.var(values))
         if one and not _explained(residual, one[-1]):
@@ -109,9 +111,11 @@ def _explained(residual: FloatArray, values: FloatArray) -> bool:
 
 
 def _fitted(
-    time: FloatArray, values: FloatArray, amplitude: AnyArray, width: float, slow: float, count: int
+    time_s: FloatArray, values: FloatArray, half_period_s: float, count: int
 ) -> tuple[AnyArray, AnyArray, FloatArray, FloatArray] | None:
-    """Fit some modes and a level; None where one of them does not beat with the motion.
+    """Fit some modes and a level.
+
+    None where the readings are few, or one of the modes does not beat with the motion.
 
     Returns
     -------
@@ -120,6 +124,14 @@ def _fitted(
     design, residual
         The derivatives of the readings, and what is left of these, shape (n,).
     """
+    if len(time_s) == 0:
+        return None
+    slow, time = math.pi / half_period_s, time_s - time_s[0]
+    width = max(2.0 * half_period_s, float(time[-1]) / _WINDOWS)
+    edges = np.searchsorted(time, np.arange(0.0, time[-1], width))
+    amplitude = slow_amplitude(slow * time, values, edges.tolist())
+    if len(amplitude) < _FEWEST:
+        return None
     rows = np.lib.stride_tricks.sliding_window_view(amplitude, len(amplitude) // 2 + 1)
     space = np.linalg.svd(rows, full_matrices=False)[2][:count].T
     step = np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0]
