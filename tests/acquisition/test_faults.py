@@ -10,8 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pytest
 from benchmarks.faulty_device import Fault, acquire_faulty
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy.stats import binom, t
 
 import pendpipe.acquisition.recorder

@@ -17,8 +17,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from benchmarks.acquisition import flip, recorded_bytes
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from pendpipe.acquisition.attempts import accept, choose, new_path, read_attempts, refuse_lost
 from pendpipe.acquisition.decode import decode_recording

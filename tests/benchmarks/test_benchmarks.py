@@ -10,12 +10,9 @@ import numpy as np
 import pytest
 from benchmarks.apparatus import draw, solved
 from benchmarks.check import challenge_faults
-from benchmarks.consistency import FEWEST_CYCLES, KINDS, Truth, judge, recorded
-from benchmarks.consistency import draw as drawn_at
+from benchmarks.consistency import FEWEST_CYCLES, KINDS, Truth, draw as drawn_at, judge, recorded
 
-from benchmarks import journal
-from benchmarks import known_physics as known
-from benchmarks import null_families as nulls
+from benchmarks import journal, known_physics as known, null_families as nulls
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.effects.catalogue import CATALOGUE
 from pendpipe_challenge.score import CONFIDENT, Solved, questions

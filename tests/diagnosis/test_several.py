@@ -11,9 +11,7 @@ import pytest
 import pendpipe as pp
 from pendpipe.cli import main
 from pendpipe.diagnosis.result import Diagnosis
-from pendpipe.effects.baseline import A as QUADRATIC
-from pendpipe.effects.baseline import B as LINEAR
-from pendpipe.effects.baseline import C as FRICTION
+from pendpipe.effects.baseline import A as QUADRATIC, B as LINEAR, C as FRICTION
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model, jacobian
 from pendpipe.effects.stack import Differs, Stack

@@ -8,10 +8,9 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
-from hypothesis import strategies as st
-from numpy.typing import NDArray
+from hypothesis import Phase, given, settings, strategies as st
 
+from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.begin import order_for
 from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian, turning_points
 from pendpipe.dynamics.any_law import (
@@ -36,7 +35,6 @@ from ..effects.integration import integrate
 # What is integrated is written down here from the paper: f_c, f_h, f_q and b_v, the energy of a
 # pendulum or of a spring, and v|v| in the place of the energy where the drag follows the speed.
 
-Floats = NDArray[np.float64]
 OMEGA = 2.0 * math.pi * 0.87
 TIME = np.arange(0.0, 9.0, 0.031)
 AMPLITUDES = (0.1, 0.3, 1.0, 2.0, 2.5)
@@ -64,13 +62,13 @@ def pendulum(losses: str, restoring: Restoring, drag: Drag, amplitude: float) ->
     return replace(law, **dict.fromkeys(others, 0.0))
 
 
-def integrated(law: Eq8, start_rad: float, time_s: Floats) -> Floats:
+def integrated(law: Eq8, start_rad: float, time_s: FloatArray) -> FloatArray:
     """The paper's equation, by DOP853 from turning point to turning point."""
     w = law.angular_frequency
     f_c, f_h = 0.5 * math.pi * w * law.coulomb, 0.5 * math.pi * law.hysteretic
     f_q, b_v = 0.5 * math.pi * law.quadratic / w, law.viscous
 
-    def acceleration(_t: float, state: Floats, sign: float, _turn: float) -> float:
+    def acceleration(_t: float, state: FloatArray, sign: float, _turn: float) -> float:
         x, v = float(state[0]), float(state[1])
         potential = 2.0 * (1.0 - math.cos(x)) if law.restoring == "sine" else x * x
         square = w * w * potential + v * v
@@ -82,7 +80,7 @@ def integrated(law: Eq8, start_rad: float, time_s: Floats) -> Floats:
     return integrate(acceleration, start_rad, 0.0, time_s)
 
 
-def general(law: Eq8, start_rad: float) -> tuple[Model, Floats]:
+def general(law: Eq8, start_rad: float) -> tuple[Model, FloatArray]:
     """The general engine's model and its values."""
     b = law.hysteretic + law.viscous
     share = law.hysteretic / b if b else 0.0
@@ -128,7 +126,7 @@ def test_both_engines_have_the_same_derivatives(
 
 
 @cache
-def derivatives(restoring: Restoring, drag: Drag, amplitude: float) -> Floats:
+def derivatives(restoring: Restoring, drag: Drag, amplitude: float) -> FloatArray:
     """The paper's equation by every parameter, by differences of two integrations."""
     law = pendulum("all", restoring, drag, amplitude)
     columns = []
@@ -158,7 +156,7 @@ def test_the_compiled_derivatives_are_those_of_the_integrated_equation(
 RATE_BASE = np.array([0.02, 0.02, 1e-3, 0.4, OMEGA, 1.2, 0.0, 0.05])
 
 
-def gyroscope(time_s: Floats, **more: Any) -> Model:
+def gyroscope(time_s: FloatArray, **more: Any) -> Model:
     interval = float(time_s[1] - time_s[0])
     return Model(time_s, interval, order=20, restoring="sine", drag="speed", seen="rate", **more)
 
@@ -209,7 +207,7 @@ def eq8_motion(pendulum: Pendulum, start: float, count: int, order: int = 14) ->
     return follow(pendulum.acceleration, pendulum.angular_frequency, start, 0.0, guess)
 
 
-def sine_law(motion: Motion) -> Floats:
+def sine_law(motion: Motion) -> FloatArray:
     return OMEGA_RAD_S**2 * (motion.angle - np.sin(motion.angle))
 
 
@@ -339,7 +337,7 @@ def test_the_tangent_is_what_a_small_force_does() -> None:
     time = np.arange(0.0, 20.0, 0.05)
     sampled = sample_motion(base, time)
 
-    def changed(law: Law, start: float = 0.2, late: float = 0.0) -> Floats:
+    def changed(law: Law, start: float = 0.2, late: float = 0.0) -> FloatArray:
         return (
             sample_motion(follow(law, OMEGA_RAD_S, start, late, base), time).angle - sampled.angle
         )

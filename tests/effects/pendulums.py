@@ -4,12 +4,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pendpipe.arrays import FloatArray
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Evaluated, Model
 
-Floats = NDArray[np.float64]
 OMEGA = 2.0 * math.pi * 0.9
 
 VALUES: dict[str, tuple[float, ...]] = {
@@ -27,17 +26,17 @@ def baseline(
     start: float = 0.15,
     offset: float = 0.0,
     omega: float = OMEGA,
-) -> Floats:
+) -> FloatArray:
     """Values of the baseline; released at t = 0."""
     return np.array([a, b, c, share, omega, start, 0.0, offset])
 
 
-def times(duration_s: float, interval_s: float = 0.05) -> Floats:
+def times(duration_s: float, interval_s: float = 0.05) -> FloatArray:
     return np.arange(0.0, duration_s, interval_s)
 
 
 def evaluated(
-    identifier: str, values: Sequence[float], base: Floats, time_s: Floats, order: int = 14
+    identifier: str, values: Sequence[float], base: FloatArray, time_s: FloatArray, order: int = 14
 ) -> Evaluated:
     """One effect on a baseline."""
     model = Model(time_s, float(time_s[1] - time_s[0]), (by_identifier(identifier),), order=order)
@@ -45,11 +44,11 @@ def evaluated(
 
 
 def reading(
-    identifier: str, values: Sequence[float], base: Floats, time_s: Floats, order: int = 14
-) -> Floats:
+    identifier: str, values: Sequence[float], base: FloatArray, time_s: FloatArray, order: int = 14
+) -> FloatArray:
     return evaluated(identifier, values, base, time_s, order).reading
 
 
-def plain(base: Floats, time_s: Floats) -> Floats:
+def plain(base: FloatArray, time_s: FloatArray) -> FloatArray:
     """The readings of the baseline alone."""
     return Model(time_s, float(time_s[1] - time_s[0])).reading(base)

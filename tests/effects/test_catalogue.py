@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from pendpipe.arrays import FloatArray
 from pendpipe.commands.small import catalogue_manual as manual
 from pendpipe.effects import Effect, catalogue
 from pendpipe.effects.baseline import OFFSET, OMEGA, START, TIME, A, B, C, pendulum_of
@@ -22,7 +22,6 @@ from .pendulums import VALUES, baseline, times
 
 # The catalogue as a whole: complete, without effect at size zero, its derivatives right.
 
-Floats = NDArray[np.float64]
 DYNAMICS = [
     "circular-error",
     "cubic-stiffness",
@@ -173,7 +172,7 @@ def test_it_changes_the_readings_in_proportion_to_its_size(identifier: str) -> N
     assert np.linalg.norm(changes[0] - 2.0 * changes[1]) < within * np.linalg.norm(changes[0])
 
 
-def numerical(model: Model, value: Floats, index: int, step: float) -> Floats:
+def numerical(model: Model, value: FloatArray, index: int, step: float) -> FloatArray:
     low, high = value.copy(), value.copy()
     low[index] -= step
     high[index] += step
@@ -238,7 +237,9 @@ def test_readings_are_linear_in_a_curves_mixtures(kind: type[Curve]) -> None:
     assert found @ change == pytest.approx(moved, abs=1e-6 * np.max(np.abs(moved)))
 
 
-def projected(effect: Effect, shape: tuple[float, ...], model: Model, basis: Floats) -> Floats:
+def projected(
+    effect: Effect, shape: tuple[float, ...], model: Model, basis: FloatArray
+) -> FloatArray:
     """Columns of an effect's sizes, what the baseline can do taken off; orthonormal."""
     at = model.evaluate(BASE)
     columns = []

@@ -11,8 +11,7 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.dynamics import Eq8, Release, sample
-from pendpipe.effects.baseline import HYSTERETIC, SHARE, VISCOUS, B, pendulum_of
-from pendpipe.effects.baseline import TIME as TIME_S
+from pendpipe.effects.baseline import HYSTERETIC, SHARE, TIME as TIME_S, VISCOUS, B, pendulum_of
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.effect import STRAIGHT_S, Span
 from pendpipe.effects.model import Model

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipj
 
+from pendpipe.arrays import FloatArray
 from pendpipe.effects.baseline import pendulum_of
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.catalogue.reading import SoftClipping
@@ -16,7 +17,7 @@ from pendpipe.effects.effect import STRAIGHT_S, Span
 from pendpipe.effects.model import Model
 
 from .lock_in import Lines, lock_in, windows
-from .pendulums import OMEGA, Floats, baseline, evaluated, plain, reading, times
+from .pendulums import OMEGA, baseline, evaluated, plain, reading, times
 
 # What frictions do: how the amplitude falls, and the third harmonic in quadrature.
 
@@ -402,7 +403,7 @@ def test_play_in_the_sensor_is_the_play_operator() -> None:
     [(12.0, 12.0 * (1.0 - np.exp(-MIDDLE_TIME / 12.0)), 1e-12), (STRAIGHT_S, MIDDLE_TIME, 1e-7)],
 )
 def test_drifts_of_offset_and_gain_relax_or_are_straight(
-    tau: float, gained: Floats, within: float
+    tau: float, gained: FloatArray, within: float
 ) -> None:
     offset, gain = (
         reading(f"{name}-drift", (rate, tau), BASE, MIDDLE_TIME)
@@ -494,7 +495,7 @@ VISCOUS = baseline(b=0.01)
 VISCOUS_OWN = plain(VISCOUS, COARSE_TIME)
 
 
-def clipped(upper: float, lower: float, width: float) -> Floats:
+def clipped(upper: float, lower: float, width: float) -> FloatArray:
     model = Model(COARSE_TIME, 0.04, (SoftClipping(),))
     return model.reading(np.concatenate([VISCOUS, [upper, lower, width]]))
 

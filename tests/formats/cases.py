@@ -10,14 +10,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pendpipe.arrays import FloatArray
 from pendpipe.formats import ReadOptions, read
 from pendpipe.recording import Recording
 
-Floats = NDArray[np.float64]
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "recordings"
 
 
-def swing(samples: int = 800, rate: float = 50.0, amplitude: float = 0.5) -> tuple[Floats, Floats]:
+def swing(
+    samples: int = 800, rate: float = 50.0, amplitude: float = 0.5
+) -> tuple[FloatArray, FloatArray]:
     """Times and angles of a pendulum of 0.8 Hz with a logarithmic decrement of 0.0625.
 
     Its period is longer by a sixteenth of the amplitude squared, as sin x has it.
@@ -86,19 +88,19 @@ RATE, DEGREES = np.gradient(ANGLE, TIME), np.degrees(ANGLE)
 
 
 def text(
-    *columns: Floats, sign: str = ",", decimal: str = ".", digits: int = 6, head: str = ""
+    *columns: FloatArray, sign: str = ",", decimal: str = ".", digits: int = 6, head: str = ""
 ) -> str:
     """A table of columns below a header."""
     rows = (sign.join(f"{x:.{digits}f}" for x in row) for row in zip(*columns, strict=True))
     return head + "".join(row.replace(".", decimal) + "\n" for row in rows)
 
 
-def each(form: str, *columns: Floats | Sequence[object]) -> str:
+def each(form: str, *columns: FloatArray | Sequence[object]) -> str:
     """Rows of the form, which may hold several lines."""
     return "".join(form.format(*row) for row in zip(*columns, strict=True))
 
 
-def clock(form: str, seconds: Floats) -> list[str]:
+def clock(form: str, seconds: FloatArray) -> list[str]:
     """Times of day by the form's h, m and s."""
     return [form.format(h=int(t // 3600), m=int(t // 60) % 60, s=t % 60) for t in seconds]
 
@@ -119,7 +121,10 @@ def read_as(
 
 
 def same(
-    recording: Recording, values: Floats = ANGLE, time_s: Floats = TIME, within_s: float = 2e-3
+    recording: Recording,
+    values: FloatArray = ANGLE,
+    time_s: FloatArray = TIME,
+    within_s: float = 2e-3,
 ) -> None:
     """Times from the first one on and readings are those."""
     assert len(recording) == len(values), len(recording)
@@ -133,14 +138,14 @@ class Case(NamedTuple):
     """A file, and what has to be read from it."""
 
     content: str | bytes
-    values: Floats = ANGLE
+    values: FloatArray = ANGLE
     unit: str = "rad"
     said: str = ""
     """Part of a note or of a weak guess."""
     doubted: str | None = None
     """Part of the weak guesses; "" if there has to be none."""
     lost: Sequence[int] = ()
-    time_s: Floats = TIME
+    time_s: FloatArray = TIME
     within_s: float = 2e-3
     name: str = "a.txt"
     options: ReadOptions = AS_FOUND

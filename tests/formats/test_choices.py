@@ -6,13 +6,21 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 from scipy.special import ellipk
 
+from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.formats import ReadOptions, circle, inspect, lists, read, times, units
-from pendpipe.formats import columns as guess
+from pendpipe.formats import (
+    ReadOptions,
+    circle,
+    columns as guess,
+    inspect,
+    lists,
+    read,
+    times,
+    units,
+)
 from pendpipe.formats.table import (
     Column,
     clipped_samples,
@@ -28,7 +36,7 @@ from pendpipe.formats.table import (
 from pendpipe.formats.text import column_of_clock_times
 from pendpipe.formats.words import Role
 
-from .cases import ANGLE, DEGREES, RATE, TIME, Floats, each, read_as, same, swing, text, with_lines
+from .cases import ANGLE, DEGREES, RATE, TIME, each, read_as, same, swing, text, with_lines
 
 # What is chosen of a file: columns, runs, spans and units, by the reader and by its user.
 
@@ -246,7 +254,7 @@ ORDER[0:930:7], ORDER[3:933:7] = ORDER[3:933:7].copy(), ORDER[0:930:7].copy()
     ],
     ids=["rows out of order", "two clocks", "back by little more than a row"],
 )
-def test_a_time_that_falls_is_refused(tmp_path: Path, stamps: Floats) -> None:
+def test_a_time_that_falls_is_refused(tmp_path: Path, stamps: FloatArray) -> None:
     with pytest.raises(InputError, match="the time falls"):
         read_as(tmp_path, text(stamps, ANGLE, head=HEAD))
 

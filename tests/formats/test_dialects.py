@@ -8,12 +8,10 @@ from random import Random
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats import read
-
-Floats = NDArray[np.float64]
 
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "blank": " ", "blanks": "   "}
 UNITS = {
@@ -63,14 +61,14 @@ class Sample:
 
     text: bytes
     story: str
-    time_s: Floats
-    values: Floats
+    time_s: FloatArray
+    values: FloatArray
     unit: str
     stated: bool
     timed: bool
 
 
-def motion(random: Random) -> tuple[Floats, Floats, float]:
+def motion(random: Random) -> tuple[FloatArray, FloatArray, float]:
     """A pendulum under gravity, or a torsion pendulum whose period is constant."""
     period = random.choice((0.6, 1.0, 1.7, 2.9))
     rate = random.choice((20.0, 50.0, 100.0))
@@ -96,7 +94,7 @@ def written(value: float, digits: int, decimal: str) -> str:
     return f"{value:.{digits}f}".replace(".", decimal)
 
 
-def times(form: str, time: Floats, decimal: str, random: Random) -> tuple[list[str], str]:
+def times(form: str, time: FloatArray, decimal: str, random: Random) -> tuple[list[str], str]:
     """The times as text, and the unit that a header would give."""
     match form:
         case "ms":

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
+from pendpipe.arrays import FloatArray
 from pendpipe.cli import main
 from pendpipe.errors import InputError
 from pendpipe.formats import ReadOptions, inspect, read
 from pendpipe.formats.table import clipped_samples, swing_of
 from pendpipe.recording import find_step, read_plain
 
-from .cases import Floats, WindaqFile, swing
+from .cases import WindaqFile, swing
 
 TIME_S = 1.9 * np.arange(24)
 SIZE = 0.25 * np.exp(-0.03 * np.arange(24))
@@ -24,7 +24,7 @@ TURNS = SIZE * (-1.0) ** np.arange(24)
 ERROR = 0.001 + 0.0001 * np.arange(24) % 3
 
 
-def rows(*columns: Floats, sign: str = ",", digits: int = 5) -> str:
+def rows(*columns: FloatArray, sign: str = ",", digits: int = 5) -> str:
     lines = zip(*columns, strict=True)
     return "".join(sign.join(f"{x:.{digits}f}" for x in line) + "\n" for line in lines)
 
@@ -157,7 +157,7 @@ T = np.arange(3000) / 50.0
     ],
 )
 def test_a_steady_or_driven_signal_is_reported(
-    tmp_path: Path, values: Floats, beside: Floats | None, said: str
+    tmp_path: Path, values: FloatArray, beside: FloatArray | None, said: str
 ) -> None:
     columns = [T, values] if beside is None else [T, values, beside]
     path = tmp_path / "a.csv"

@@ -18,7 +18,6 @@ from .cases import (
     RATE,
     TIME,
     Case,
-    Floats,
     check,
     clock,
     each,
@@ -898,7 +897,7 @@ ARM_M = 9.81 / (2.0 * np.pi * 0.8) ** 2
 """Of a pendulum of 0.8 Hz."""
 
 
-def on_circle(angle: Floats, x0: float, y0: float, arm: float) -> tuple[Floats, Floats]:
+def on_circle(angle: FloatArray, x0: float, y0: float, arm: float) -> tuple[FloatArray, FloatArray]:
     """Positions on a circle about (x0, y0), with noise of 0.2 % of its radius."""
     x, y = arm * np.sin(angle) + 2e-3 * arm * NOISE[0], -arm * np.cos(angle) + 2e-3 * arm * NOISE[1]
     return x0 + x, y0 + y
@@ -908,8 +907,8 @@ class Meant(NamedTuple):
     """Columns behind the time, under `head`: what is read, of which unit and why."""
 
     head: str
-    columns: tuple[Floats, ...]
-    values: Floats
+    columns: tuple[FloatArray, ...]
+    values: FloatArray
     unit: str = "rad"
     said: str = ""
     guessed: bool = False
@@ -1033,31 +1032,31 @@ MINUTES_S, MINUTES_RAD = swing(6000, 50.0, 0.5)
 RANDOM = np.random.default_rng(5)
 
 
-def clocked(seconds: Floats, form: str) -> list[str]:
+def clocked(seconds: FloatArray, form: str) -> list[str]:
     """Times of day by the form's h, m and s."""
     return [form.format(h=int(t // 3600), m=int(t // 60) % 60, s=t % 60) for t in seconds]
 
 
-def arrival(time: Floats) -> Floats:
-    late: Floats = np.maximum.accumulate(time + RANDOM.exponential(0.1, len(time)))
+def arrival(time: FloatArray) -> FloatArray:
+    late: FloatArray = np.maximum.accumulate(time + RANDOM.exponential(0.1, len(time)))
     return late + 1e-6 * np.arange(len(time))
 
 
-def torn(time: Floats) -> Floats:
+def torn(time: FloatArray) -> FloatArray:
     """A clock that counts the full second a row too late."""
     stamps = time.copy()
     stamps[49:-50:50] += 0.89
     return stamps
 
 
-def slowing(time: Floats) -> Floats:
+def slowing(time: FloatArray) -> FloatArray:
     return np.where(time < 100.0, np.floor(10.0 * time + 1e-9) / 10.0, time)
 
 
 class Form(NamedTuple):
     """Stamps in the column `name`; how near to the truth they are read; what is said."""
 
-    stamps: Callable[[Floats], list[str]]
+    stamps: Callable[[FloatArray], list[str]]
     name: str = "t (s)"
     within_s: float = 0.002
     said: str = ""

@@ -24,8 +24,7 @@ from pendpipe.formats.table import (
     damaged_if,
     refuse_unpacked,
 )
-from pendpipe.formats.text import read_table as read_text
-from pendpipe.formats.text import table_of_text
+from pendpipe.formats.text import read_table as read_text, table_of_text
 
 _MOST_ROWS: Final = 1 << 20
 """What a sheet has, and no more."""

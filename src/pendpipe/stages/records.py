@@ -15,8 +15,7 @@ from pendpipe.errors import refuse_if
 from pendpipe.files import MADE_BY, MARK, read_json, write_whole
 from pendpipe.manifest import job
 from pendpipe.options import OUTPUT, flags
-from pendpipe.report.class_table import Fitted
-from pendpipe.report.class_table import record as row_of
+from pendpipe.report.class_table import Fitted, record as row_of
 from pendpipe.stages.results import RecordResult, read_results, record_files
 
 if TYPE_CHECKING:
