@@ -114,11 +114,6 @@ def shifted(points: TurningPoints, longer: Callable[[FloatArray], FloatArray]) -
     return replace(points, time_s=points.time_s + late)
 
 
-def test_a_wheel_beyond_pi_has_no_sine() -> None:
-    points = points_of(Eq8(OMEGA, 0.0, 0.0, 0.01, 0.005), 9.0, 60)
-    assert restoring_of(points) == "linear"
-
-
 def test_a_pendulum_whose_frequency_drifts_is_still_a_pendulum() -> None:
     # It drifts against sin x, as strongly: the times alone then speak for the linear law.
     points = points_of(Eq8(OMEGA, viscous=0.015, restoring="sine"), 0.4, 100)
@@ -187,13 +182,6 @@ def test_drag_in_its_true_form_is_lost_as_the_law_says(release: float) -> None:
     assert result.restoring == "sine"
     assert result.light != "red"
     assert all(abs(check.excess) < 0.06 for check in result.decrement_check[:2])
-
-
-def test_a_wheel_that_turns_far_stays_linear() -> None:
-    law = Eq8(OMEGA, 0.0, 0.0, 0.01, 0.01)
-    result = fit_recording(recorded(sample(law, Release(-0.2, 2.5), TIME), TIME, 5e-3))
-    assert (result.restoring, result.light) == ("linear", "green")
-    assert result.value("c") == pytest.approx(0.01, abs=4.0 * result.parameters["c"].sd)
 
 
 def test_x_that_the_readings_prefer_is_fitted_and_said() -> None:

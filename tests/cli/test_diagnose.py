@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from pendpipe import cli
 from pendpipe.files import write_json
 from pendpipe.recording import Recording, write_plain
+
+from ..effects.integration import swung
 
 FREQUENCY_HZ, LINEAR = 0.9, 0.012
 NOISE_RAD = 1e-4
@@ -22,18 +23,11 @@ TIME_S = np.arange(1500) / 15.0
 
 def pendulum(folder: Path, *, sine: bool, amplitude: float = 0.25) -> Path:
     """Write a decay of x'' = -omega^2 x - 2 b x' (or with sin x), with white noise."""
-    omega = 2.0 * math.pi * FREQUENCY_HZ
-
-    def rate(_: float, state: np.ndarray) -> list[float]:
-        x, v = state
-        return [v, -omega * omega * (math.sin(x) if sine else x) - 2.0 * LINEAR * v]
-
-    solved = solve_ivp(
-        rate, (0.0, TIME_S[-1]), [amplitude, 0.0], "DOP853", t_eval=TIME_S, rtol=1e-10, atol=1e-12
-    )
+    torque = math.sin if sine else float
+    angle = swung(TIME_S, amplitude, 2.0 * math.pi * FREQUENCY_HZ, LINEAR, torque=torque)[0]
     noise = NOISE_RAD * np.random.default_rng(5).standard_normal(len(TIME_S))
     path = folder / f"{'sine' if sine else 'linear'}.csv"
-    write_plain(path, Recording(TIME_S, 0.01 + solved.y[0] + noise, "angle_rad"))
+    write_plain(path, Recording(TIME_S, 0.01 + angle + noise, "angle_rad"))
     return path
 
 

@@ -8,7 +8,6 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.turning_points.measure import Samples, prepare
@@ -68,26 +67,6 @@ def with_effects(*identifiers: str, base: FloatArray = TRUTH) -> FloatArray:
     effects = tuple(by_identifier(identifier) for identifier in identifiers)
     values = [number for identifier in identifiers for number in VALUES[identifier]]
     return Model(TIME_S, INTERVAL_S, effects).reading(np.append(base, values))
-
-
-def swung(
-    time_s: FloatArray,
-    amplitude: float,
-    omega: float,
-    loss: float,
-    drag: float = 0.0,
-    torque: Callable[[float], float] = math.sin,
-) -> FloatArray:
-    """Angles and rates by scipy: x'' = -omega^2 torque(x) - 2 loss x' - drag |x'| x'."""
-
-    def motion(_: float, state: FloatArray) -> list[float]:
-        x, v = state
-        return [v, -(omega**2) * torque(x) - (2.0 * loss + drag * abs(v)) * v]
-
-    span = (float(time_s[0]), float(time_s[-1]))
-    return np.asarray(
-        solve_ivp(motion, span, [amplitude, 0.0], "DOP853", t_eval=time_s, rtol=1e-9, atol=1e-11).y
-    )
 
 
 def recording(readings: FloatArray, seed: int) -> Recording:

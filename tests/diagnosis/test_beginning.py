@@ -27,6 +27,7 @@ from pendpipe.effects.model import Model
 from pendpipe.estimate import Estimate
 from pendpipe.recording import Quantity, Recording
 
+from ..effects.integration import swung
 from .records import (
     INTERVAL_S,
     TIME_S,
@@ -36,7 +37,6 @@ from .records import (
     prepared,
     pulled,
     recording,
-    swung,
     white,
     with_effects,
 )

@@ -28,8 +28,9 @@ from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
 
+from ..effects.integration import swung
 from .faults import AIR, STEP_16, TESTS, drawn_white, fitted, rounded
-from .records import INTERVAL_S, TIME_S, TRUTH, hypothesis_of, other_engine, swung, white
+from .records import INTERVAL_S, TIME_S, TRUTH, hypothesis_of, other_engine, white
 
 # Which codes occur: coarser lattices, combs, and neither.
 

@@ -26,6 +26,7 @@ from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
 
+from ..effects.integration import swung
 from .records import (
     FREQUENCY_HZ,
     INTERVAL_S,
@@ -41,7 +42,6 @@ from .records import (
     prepared,
     pulled,
     recording,
-    swung,
     task_of,
     white,
     with_effects,

@@ -51,6 +51,7 @@ from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.effects.model import Evaluated, Model
 from pendpipe.estimate import Estimate
 
+from ..effects.integration import swung
 from .records import (
     FREQUENCY_HZ,
     INSTANT_S,
@@ -65,7 +66,6 @@ from .records import (
     prepared,
     recording,
     stribeck_record,
-    swung,
     white,
 )
 

@@ -78,3 +78,24 @@ def integrate(
             state[1] += by_velocity
             direction = math.copysign(1.0, state[1])
     return found
+
+
+def swung(
+    time_s: Floats,
+    amplitude: float,
+    omega: float,
+    loss: float,
+    drag: float = 0.0,
+    torque: Callable[[float], float] = math.sin,
+    speed: float = 0.0,
+) -> Floats:
+    """Angles and rates: x'' = -omega^2 torque(x) - 2 loss x' - drag |x'| x'."""
+
+    def motion(_: float, state: Floats) -> list[float]:
+        x, v = state
+        return [v, -(omega**2) * torque(x) - (2.0 * loss + drag * abs(v)) * v]
+
+    span, start = (float(time_s[0]), float(time_s[-1])), [amplitude, speed]
+    return np.asarray(
+        solve_ivp(motion, span, start, "DOP853", t_eval=time_s, rtol=1e-10, atol=1e-12).y
+    )

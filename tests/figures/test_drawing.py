@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from scipy.integrate import solve_ivp
 
 from pendpipe import diagnose, physics
 from pendpipe.analysis.fit.by_points import fit_envelope
@@ -40,6 +39,8 @@ from pendpipe.figures.decays import (
 from pendpipe.figures.diagnosis import Shown, draw_diagnosis, shown
 from pendpipe.figures.style import save
 from pendpipe.recording import Recording, read_plain
+
+from ..effects.integration import swung
 
 # Figures 7 and 8 and each record's decay, and what they work out for themselves.
 
@@ -280,16 +281,9 @@ TIME_S = np.arange(1500) / 15.0
 @pytest.fixture(scope="module")
 def outcome() -> Any:
     """The diagnosis of a pendulum taken for a spring, integrated by scipy."""
-
-    def rate(_: float, state: np.ndarray) -> list[float]:
-        x, v = state
-        return [v, -OMEGA * OMEGA * math.sin(x) - 2.0 * LINEAR * v]
-
-    solved = solve_ivp(
-        rate, (0.0, TIME_S[-1]), [AMPLITUDE, 0.0], "DOP853", t_eval=TIME_S, rtol=1e-10, atol=1e-12
-    )
+    angle = swung(TIME_S, AMPLITUDE, OMEGA, LINEAR)[0]
     noise = NOISE_RAD * np.random.default_rng(5).standard_normal(len(TIME_S))
-    record = Recording(TIME_S, solved.y[0] + noise, "angle_rad")
+    record = Recording(TIME_S, angle + noise, "angle_rad")
     return diagnose_recording(record, restoring="linear")
 
 

@@ -188,12 +188,6 @@ def test_going_back_in_time_undoes_the_decay_until_it_has_no_past() -> None:
     assert amplitude(1.001 * birth, 0.068, *abc) == np.inf
 
 
-def test_arguments_broadcast() -> None:
-    y = amplitude(np.arange(3.0)[:, None], [0.1, 0.2], [0.0, 1.0], 0.0, [0.1, 0.03])
-    assert y.shape == (3, 2)
-    assert y[2, 1] == amplitude(2.0, 0.2, 1.0, 0.0, 0.03)
-
-
 # The derivatives of Eq. 14 against those of its implicit relation, at many digits.
 
 
@@ -254,12 +248,12 @@ def test_gradient_vanishes_after_the_stop() -> None:
 
 
 def test_gradient_broadcasts_like_the_amplitude() -> None:
-    y, gradient = amplitude_and_gradient(
-        np.arange(1.0, 4.0)[:, None], [0.1, 0.2], [0.0, 1.0], 0.0, [0.01, 0.03]
-    )
-    assert y.shape == (3, 2)
+    arguments = np.arange(1.0, 4.0)[:, None], [0.1, 0.2], [0.0, 1.0], 0.0, [0.01, 0.03]
+    y, gradient = amplitude_and_gradient(*arguments)
     assert gradient.shape == (3, 2, 4)
-    _, single = amplitude_and_gradient(3.0, 0.2, 1.0, 0.0, 0.03)
+    np.testing.assert_allclose(y, amplitude(*arguments), rtol=1e-15)
+    alone, single = amplitude_and_gradient(3.0, 0.2, 1.0, 0.0, 0.03)
+    assert y[2, 1] == pytest.approx(alone, rel=1e-15)
     np.testing.assert_allclose(gradient[2, 1], single, rtol=1e-15)
 
 
