@@ -58,18 +58,22 @@ class Check(NamedTuple):
         """By what part of what is seen the law has more."""
         return (self.fitted - self.seen) / abs(self.seen) if self.seen else math.inf
 
+    def misses(self, deviations: float) -> bool:
+        """Whether they differ by more than 5 %, and by more than so many standard deviations."""
+        off = abs(self.fitted - self.seen)
+        return not off <= max(TOLERANCE * abs(self.seen), deviations * self.seen_sd)
+
     @property
     def contradicts(self) -> bool:
         """Whether they differ by more than 5 % and by more than chance explains."""
-        off = abs(self.fitted - self.seen)
-        return not (off <= TOLERANCE * abs(self.seen) or off <= _CERTAIN * self.seen_sd)
+        return self.misses(_CERTAIN)
 
     @property
     def p_value(self) -> float:
         """How often chance alone makes them differ so; 1 within 5 %."""
-        off = abs(self.fitted - self.seen)
-        if off <= TOLERANCE * abs(self.seen):
+        if not self.misses(0.0):
             return 1.0
+        off = abs(self.fitted - self.seen)
         return math.erfc(off / self.seen_sd * math.sqrt(0.5)) if self.seen_sd > 0.0 else 0.0
 
     @property
@@ -224,14 +228,3 @@ def _cycle(law: Eq8, amplitude: float) -> tuple[float, float] | None:
         if not start > 0.0:
             return None
     return found
-
-
-_OFF: Final = 2.4
-"""Standard deviations of the turning points beyond which a loss is off, where the law is known to
-miss something: one of three is by chance in one decay of twenty."""
-
-
-def is_off(check: Check) -> bool:
-    """Whether a loss misses the turning points' by more than 5 % and by more than their errors."""
-    missed = abs(check.fitted - check.seen)
-    return missed > TOLERANCE * abs(check.seen) and missed > _OFF * check.seen_sd

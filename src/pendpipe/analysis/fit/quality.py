@@ -85,7 +85,7 @@ class Quality:
 
 
 def qualities(result: FitResult) -> tuple[Quality, ...]:
-    """Return Q at a large, a middle and a small amplitude of the decay.
+    """Q and the shares of the losses at a large, a middle and a small amplitude of the decay.
 
     The fitted law's, or what the turning points show where the light is red.
     """
@@ -110,33 +110,43 @@ def seen_qualities(result: FitResult) -> tuple[Quality, ...]:
     )
 
 
-def quality_at(result: FitResult, amplitude: float) -> Estimate:
-    """Return Q at any amplitude: of the law, or with a red light between the turning points' three.
+def quality_at(result: FitResult, amplitude_rad: float) -> Estimate:
+    """Return Q at an amplitude, ``pi/(T loss)`` with the period and the loss there.
+
+    Of the law, or with a red light between the turning points' three.
+
+    Parameters
+    ----------
+    result
+        A fit.
+    amplitude_rad
+        In rad, or in the unit of the recording.
 
     Raises
     ------
     InputError
-        If the amplitude is none, or lies outside of what a red fit's turning points show.
+        If it is no amplitude; or, where no law describes the decay, none at which its
+        turning points show Q.
     """
     unit = result.parameters["amplitude"].unit
     refuse_if(
-        not (math.isfinite(amplitude) and amplitude > 0.0),
+        not (math.isfinite(amplitude_rad) and amplitude_rad > 0.0),
         "amplitude_rad",
-        f"{amplitude!r} is no amplitude",
+        f"{amplitude_rad!r} is no amplitude",
         f"give a positive number of {unit}",
     )
     if result.light != "red":
-        return quality_by_law(result, amplitude).quality_factor
+        return quality_by_law(result, amplitude_rad).quality_factor
     seen = sorted(seen_qualities(result), key=lambda each: each.amplitude_rad)
     ends = [seen[0].amplitude_rad, seen[-1].amplitude_rad] if seen else []
-    if not seen or not 0.9 * ends[0] <= amplitude <= 1.2 * ends[1]:
+    if not seen or not 0.9 * ends[0] <= amplitude_rad <= 1.2 * ends[1]:
         where = f"from {ends[0]:.3g} to {ends[1]:.3g}{after_number(unit)}" if seen else "nowhere"
         raise InputError(
             "amplitude_rad",
             f"no law describes this decay, and its turning points show Q {where}",
             "ask within, or fit a part of the recording",
         )
-    place = math.log(amplitude)
+    place = math.log(amplitude_rad)
     x = [math.log(each.amplitude_rad) for each in seen]
     value, sd = (
         float(np.interp(place, x, [getattr(each.quality_factor, name) for each in seen]))
@@ -209,7 +219,12 @@ def period_of(result: FitResult, amplitude: float) -> float:
 
 
 def damping_of(result: FitResult) -> dict[str, Estimate]:
-    """Return damping time, half-life and logarithmic decrement; see `FitResult.damping`."""
+    """Return other measures of the loss at the largest amplitude of `qualities`.
+
+    ``damping_time_s``, 1 over the loss: the amplitude falls to 1/e in it; ``half_life_s``, ln 2
+    times that; ``logarithmic_decrement``, pi/Q, of a period. All at ``amplitude_rad``, where the
+    loss depends on it.
+    """
     found = result.quality_factors
     if not found:
         return {}

@@ -17,7 +17,6 @@ from pendpipe.analysis.fit.goodness import LEVEL, Goodness, combined
 from pendpipe.analysis.fit.least_squares import CHI2_95
 from pendpipe.analysis.fit.printed import html, lines
 from pendpipe.analysis.fit.quality import (
-    Quality,
     damping_of,
     qualities,
     quality_at,
@@ -217,46 +216,17 @@ class FitResult:
             return released_quality(self)
         return self.period if name == "period" else self.parameters[name]
 
-    @property
-    def period(self) -> Estimate:
-        """Period of small swings, s; with a red light that of the turning points."""
-        return small_period(self)
+    period = property(small_period)
+    quality_factors = cached_property(qualities)
+    quality_factor = quality_at
+    damping = damping_of
+    _repr_html_ = html
 
     @property
     def refuted(self) -> bool:
         """Whether the readings differ from the law by more than noise explains."""
         test = self.fit_p_value is not None and self.fit_p_value < LEVEL
         return test or max(self.widening) > 1.0
-
-    def damping(self) -> dict[str, Estimate]:
-        """Return other measures of the loss at the largest amplitude of `quality_factors`.
-
-        ``damping_time_s``, 1 over the loss: the amplitude falls to 1/e in it;
-        ``half_life_s``, ln 2 times that; ``logarithmic_decrement``, pi/Q, of a period. All at
-        ``amplitude_rad``, where the loss depends on it.
-        """
-        return damping_of(self)
-
-    @cached_property
-    def quality_factors(self) -> tuple[Quality, ...]:
-        """Q and the shares of the losses at a large, a middle and a small amplitude."""
-        return qualities(self)
-
-    def quality_factor(self, amplitude_rad: float) -> Estimate:
-        """Return Q at an amplitude, ``pi/(T loss)`` with the period and the loss there.
-
-        Parameters
-        ----------
-        amplitude_rad
-            In rad, or in the unit of the recording.
-
-        Raises
-        ------
-        InputError
-            If it is no amplitude; or, where no law describes the decay, none at which its
-            turning points show Q.
-        """
-        return quality_at(self, amplitude_rad)
 
     def __str__(self) -> str:
         """Return what is known, the sentence to copy, and what to do next."""
@@ -268,10 +238,6 @@ class FitResult:
             f"{name}={entry.value:.6g}+-{entry.sd:.2g}" for name, entry in self.parameters.items()
         )
         return f"FitResult({self.light}: {numbers})"
-
-    def _repr_html_(self) -> str:
-        """Return the answer as a table, for a notebook."""
-        return html(self)
 
     @property
     def equation(self) -> str:
