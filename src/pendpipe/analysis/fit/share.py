@@ -192,16 +192,24 @@ def _not_negative(
 
     The best of those with any of them at its bound.
     """
-    # Shape (subsets, k, 3) from here on.
-    subsets = _SUBSETS[(free >= _SUBSETS).all(axis=1)][:, None]
-    at_zero = (free - subsets) * -value
-    system = normal * subsets[..., None] * subsets[..., None, :] + (1.0 - subsets)[
-        ..., None
-    ] * np.eye(3)
-    right = (gradient - np.einsum("kpq,skq->skp", normal, at_zero)) * subsets + at_zero
-    tried = np.linalg.solve(system, right[..., None])[..., 0]
-    slope = gradient - np.einsum("kpq,skq->skp", normal, tried)
-    inside = (tried >= -value - _SLACK * np.abs(value)).all(axis=2)
-    cost = np.where(inside, -np.sum(tried * (gradient + slope), axis=2), np.inf)
-    best = np.take_along_axis(tried, np.argmin(cost, axis=0)[None, :, None], axis=0)[0]
-    return np.asarray(np.maximum(best, -value))
+    step, least = np.zeros_like(gradient), np.full(len(gradient), np.inf)
+    subsets = _SUBSETS[(free >= _SUBSETS).all(axis=1)]
+    # Most shares have the same ones at their bound.
+    subsets = subsets[np.argsort(np.abs(subsets - (value > 0.0)).sum(axis=1), kind="stable")]
+    left = np.arange(len(gradient))
+    for chosen in subsets:
+        own, pull = normal[left], gradient[left]
+        at_zero = (free - chosen) * -value
+        system = own * np.outer(chosen, chosen) + np.diag(1.0 - chosen)
+        right = (pull - own @ at_zero) * chosen + at_zero
+        tried = np.linalg.solve(system, right[..., None])[..., 0]
+        slope = pull - np.einsum("kpq,kq->kp", own, tried)
+        cost = -np.sum(tried * (pull + slope), 1)
+        inside = (tried >= -value - _SLACK * np.abs(value)).all(axis=1)
+        better = inside & (cost < least[left])
+        step[left[better]], least[left[better]] = tried[better], cost[better]
+        # A minimum: what is at its bound is pulled beyond it.
+        left = left[~(inside & (slope * (free - chosen) <= 0.0).all(axis=1))]
+        if not len(left):
+            break
+    return np.maximum(step, -value)
