@@ -27,10 +27,19 @@ def harmonic_columns(phase: FloatArray, harmonics: int) -> FloatArray:
     return np.concatenate([np.ones((1, len(phase))), waves])
 
 
+def _numbered(phase: FloatArray) -> IntArray:
+    """Return the number of each reading's cycle.
+
+    A phase that falls back, where a clock steps back or a trial motion is hardly resolved, begins
+    no cycle again.
+    """
+    return np.maximum.accumulate(np.floor(phase / (2.0 * math.pi))).astype(np.int64)
+
+
 def cycle_starts(phase: FloatArray, cycles: int = 1) -> IntArray:
     """Return the first reading of each so many cycles, from the first reading's phase on."""
-    number = np.floor((phase - phase[0]) / (2.0 * math.pi * cycles))
-    return np.searchsorted(number, np.arange(int(number[-1]) + 1))
+    number = _numbered((phase - phase[0]) / cycles)
+    return np.searchsorted(number, np.arange(number[-1] + 1))
 
 
 def normal_equations(
@@ -132,8 +141,8 @@ def lock_in(readings: FloatArray, weight: FloatArray, sampled: Sampled, part: fl
     part
         Part of the median number of readings that a cycle must have.
     """
-    number = np.floor(sampled.phase / (2.0 * math.pi)).astype(np.int64)
-    numbers = np.arange(number.min(), number.max() + 1)
+    number = _numbered(sampled.phase)
+    numbers = np.arange(number[0], number[-1] + 1)
     starts = np.searchsorted(number, numbers)
     carrier = sampled.motion.upwards * sampled.amplitude
     waves = np.stack([np.ones_like(readings), carrier * sampled.cosine, carrier * sampled.sine])
