@@ -21,21 +21,15 @@ from pendpipe.version import __version__
 
 if TYPE_CHECKING:
     from pendpipe import effects, physics
-    from pendpipe.api import (
-        acquire,
-        diagnose,
-        find_free_decay,
-        fit,
-        inspect,
-        read,
-        simulate,
-        turning_points,
-    )
+    from pendpipe.acquisition.verbs import acquire
+    from pendpipe.api import diagnose, find_free_decay, fit, turning_points
     from pendpipe.batch import fit_many
     from pendpipe.dynamics import Eq8
     from pendpipe.errors import InputError
     from pendpipe.estimate import Estimate
+    from pendpipe.reading import inspect, read
     from pendpipe.recording import Recording
+    from pendpipe.simulation.verbs import simulate
 
 __all__ = [
     "Eq8",
@@ -61,7 +55,11 @@ _HOMES = {
     "Estimate": "estimate",
     "InputError": "errors",
     "Recording": "recording",
+    "acquire": "acquisition.verbs",
     "fit_many": "batch",
+    "inspect": "reading",
+    "read": "reading",
+    "simulate": "simulation.verbs",
 }
 """Modules of the public names that are not in `api`."""
 

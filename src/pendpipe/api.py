@@ -1,4 +1,4 @@
-"""The front door: from arrays or a file to a fit and a diagnosis.
+"""From arrays or a file to a fit and a diagnosis.
 
 `import pendpipe as pp` offers everything here; the commands call the same functions. Heavy
 packages are imported by the function that needs them.
@@ -15,11 +15,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 from pendpipe.errors import refuse_if
 from pendpipe.files import distinct_names
 from pendpipe.options import (
-    A_GUESS,
     ALTERNATIVES,
     NATURAL,
     POSITIVE,
-    SENSOR,
     Baseline,
     Fixed,
     Number,
@@ -29,21 +27,19 @@ from pendpipe.options import (
     checked,
     measured_number,
 )
+from pendpipe.reading import read
 from pendpipe.recording import Recording
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
     from pandas import DataFrame
 
-    from pendpipe.acquisition.devices.simulated import Signal
-    from pendpipe.acquisition.recorder import ProgressLine
     from pendpipe.analysis.fit.result import FitResult
     from pendpipe.analysis.free_decay import FreeDecay
     from pendpipe.analysis.turning_points import TurningPoints
     from pendpipe.diagnosis import Progress
     from pendpipe.diagnosis.result import Diagnosis
     from pendpipe.estimate import Estimate
-    from pendpipe.formats import Inspection, ReadOptions
 
 Source = Recording | str | Path
 """What is analysed: a recording, or the path of its file. A DataFrame serves as well, with a
@@ -52,187 +48,6 @@ _COLUMNS: Final = ("angle_rad", "angle_deg", "volts", "displacement_m")
 _FIGURES_OF_A_FIT: Final = partial(importlib.import_module, "pendpipe.figures.decays")
 _FIGURES_OF_A_DIAGNOSIS: Final = partial(importlib.import_module, "pendpipe.figures.diagnosis")
 """Who draws a result, imported when it is drawn: the result itself knows no figures."""
-
-
-@checked
-def read(
-    path: str | Path,
-    *,
-    channel: Annotated[
-        str | int | None,
-        Option("number (from 1) or name of the channel, see inspect", "CHANNEL", heading=A_GUESS),
-    ] = None,
-    column: Annotated[
-        str | int | None,
-        Option(
-            "number (from 1) or name of the column; X,Y for a position seen from the pivot;"
-            " TIME:COLUMN names both",
-            "COLUMN",
-            heading=A_GUESS,
-        ),
-    ] = None,
-    unit: Annotated[
-        str | None,
-        Option(
-            "of the readings: rad, deg, V, mm, counts, ...; of both: ms:deg",
-            "UNIT",
-            heading=A_GUESS,
-        ),
-    ] = None,
-    sample_rate: Annotated[
-        float | None,
-        Option("samples a second, instead of the time column", "HZ", heading=A_GUESS),
-    ] = None,
-    decimal: Annotated[
-        str | None, Option("decimal sign, '.' or ','", "SIGN", heading=A_GUESS)
-    ] = None,
-    delimiter: Annotated[
-        str | None, Option("sign between cells, or tab, space", "SIGN", heading=A_GUESS)
-    ] = None,
-    volts_per_radian: VoltsPerRadian = None,
-    start: Annotated[
-        float | None, Option("first time to read, s, by the file's clock", "S", heading=A_GUESS)
-    ] = None,
-    stop: Annotated[
-        float | None, Option("last time to read, s, by the file's clock", "S", heading=A_GUESS)
-    ] = None,
-) -> Recording:
-    """Read a recording from a file in any supported format.
-
-    The layout is guessed, and each guess stands in the recording's `notes`. The options
-    replace a wrong guess; they are those of the commands (``pendpipe inspect --help``).
-
-    Parameters
-    ----------
-    path
-        CSV in most dialects, WinDaq, MATLAB, Excel, ...
-    {options}
-
-    Raises
-    ------
-    InputError
-        If the file can't be read: the file and line, what is wrong, what to do.
-
-    Examples
-    --------
-    >>> recording = read("examples/string-pendulum.csv")
-    >>> recording
-    Recording(3600 samples of angle_rad, 0 to 119.967 s)
-    >>> len(read("examples/string-pendulum.csv", start=10, stop=60))
-    1501
-    """
-    from pendpipe.formats import read as read_file
-
-    return read_file(
-        path,
-        _read_options(
-            channel=channel,
-            column=column,
-            unit=unit,
-            sample_rate=sample_rate,
-            decimal=decimal,
-            delimiter=delimiter,
-            volts_per_radian=volts_per_radian,
-            start=start,
-            stop=stop,
-        ),
-    )
-
-
-@checked
-def acquire(
-    port: str,
-    *,
-    model: Annotated[
-        str | None,
-        Option("the instrument: di154rs, di2108, ...; it is asked when not given", "MODEL"),
-    ] = None,
-    rate_hz: Annotated[float, Option("scans a second", "HZ", flag="--rate")] = 60.0,
-    duration_s: Annotated[float, Option("length, s", "S", flag="--duration")] = 60.0,
-    range_volts: Annotated[float | None, Option("the signal stays within +-V", "V")] = None,
-    reconnect_s: Annotated[
-        float,
-        Option("how long a device that was unplugged is waited for, s", "S", flag="--reconnect"),
-    ] = 30.0,
-    clock_scale: Annotated[
-        float, Option("simulated seconds in a real one", "FACTOR", POSITIVE)
-    ] = 1.0,
-    volts_per_radian: Annotated[float | None, Option(SENSOR, "V")] = None,
-    channel: int = 1,
-    signal: "Signal | None" = None,
-    raw_path: str | Path | None = None,
-    progress: "ProgressLine | None" = None,
-) -> Recording:
-    """Record from a Dataq instrument, or from a simulated one.
-
-    Parameters
-    ----------
-    port
-        A device file, a COM port, ``socket://HOST:PORT`` or ``rfc2217://HOST:PORT``;
-        ``"simulated:di2108"`` needs none.
-    {options}
-    channel
-        As printed on the box.
-    signal
-        What a simulated instrument reads: times in s to volts. By default a decaying pendulum.
-    raw_path
-        A new file that keeps the bytes off the wire; in memory only where not given.
-    progress
-        A display that is kept up to date.
-
-    Returns
-    -------
-    Recording
-        In volts.
-
-    Raises
-    ------
-    InputError
-        If the port can't be opened, the device does not answer, or the setting is impossible.
-
-    Examples
-    --------
-    >>> acquire("simulated:di2108", duration_s=20, clock_scale=100)
-    Recording(1200 samples of volts, 0 to 19.9833 s)
-    """
-    from pendpipe.acquisition.recorder import acquire_simulated, example_signal, record
-
-    request: dict[str, Any] = {
-        "channels": (channel,),
-        "rate_hz": rate_hz,
-        "duration_s": duration_s,
-        "range_volts": range_volts,
-        "reconnect_s": reconnect_s,
-        "volts_per_radian": volts_per_radian,
-        "raw_path": raw_path,
-        "progress": progress,
-    }
-    where, _, kind = port.partition(":")
-    if where == "simulated":
-        signal = signal or example_signal()
-        return acquire_simulated(kind, signal, clock_scale=clock_scale, **request)
-    return record(port, model, **request)
-
-
-def inspect(path: str | Path, **options: Any) -> "Inspection":
-    """Describe a file: format, channels, rate, gaps, clipping, and what was guessed.
-
-    Parameters
-    ----------
-    path
-        As for `read`.
-    **options
-        As for `read`.
-
-    Examples
-    --------
-    >>> found = inspect("examples/string-pendulum.csv")
-    >>> round(found.sample_rate_hz, 3), found.unit
-    (30.0, 'rad')
-    """
-    from pendpipe.formats import inspect as inspect_file
-
-    return inspect_file(path, _read_options(**options))
 
 
 def find_free_decay(recording: Source) -> "FreeDecay":
@@ -560,42 +375,6 @@ def diagnose(
     return replace(found, drawn_by=_FIGURES_OF_A_DIAGNOSIS)
 
 
-@checked
-def simulate(
-    model: str | Path | Mapping[str, Any],
-    *,
-    seed: Annotated[
-        int | None, Option("seed of the noise, instead of the model's", "N", NATURAL)
-    ] = None,
-) -> Recording:
-    """Simulate a recording from a described pendulum and measurement chain.
-
-    Parameters
-    ----------
-    model
-        A TOML file like ``config/model.toml``, or its content as a mapping.
-    {options}
-
-    Examples
-    --------
-    >>> recording = simulate(
-    ...     {
-    ...         "pendulum": {"frequency_hz": 0.5, "c": 1e-3, "release_angle_rad": 0.1},
-    ...         "sampling": {"sample_rate_hz": 50.0, "duration_s": 20.0},
-    ...     }
-    ... )
-    >>> recording
-    Recording(1000 samples of angle_rad, 0 to 19.98 s)
-    """
-    from pendpipe.simulation import model as models
-
-    described = models.read_model(model)
-    if seed is not None:
-        described = described.model_copy(update={"seed": seed})
-    place = "model" if isinstance(model, Mapping) else str(model)
-    return models.simulate(described, f"simulated: {Path(place).name}", place=place)
-
-
 def _source(recording: Any, angle_rad: "ArrayLike | None" = None) -> Source:
     """Return a recording or a path, from arrays or a DataFrame as well."""
     if angle_rad is not None:
@@ -614,18 +393,6 @@ def _source(recording: Any, angle_rad: "ArrayLike | None" = None) -> Source:
     )
     readings: dict[str, Any] = {found[0]: recording[found[0]].to_numpy()}
     return Recording(time_s=recording["time_s"].to_numpy(), **readings)
-
-
-def _read_options(
-    start: float | None = None, stop: float | None = None, **given: Any
-) -> "ReadOptions":
-    """Turn the overrides into the readers' options; numbers of columns are words there."""
-    from pendpipe.formats import ReadOptions
-
-    given |= {
-        key: str(given[key]) for key in ("channel", "column") if isinstance(given.get(key), int)
-    }
-    return ReadOptions(start_s=start, stop_s=stop, **given)
 
 
 def _motion(recording: Source, volts_per_radian: float | None = None) -> Recording:

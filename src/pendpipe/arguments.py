@@ -7,13 +7,14 @@ import hashlib
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from inspect import getdoc
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
 
-from pendpipe import api
 from pendpipe.errors import InputError
 from pendpipe.files import check_output, is_stream, json_text, read_json, writing
 from pendpipe.options import ALTERNATIVES, INPUT, Flags, flags_of, given
+from pendpipe.reading import read
 from pendpipe.version import __version__
 
 if TYPE_CHECKING:
@@ -24,11 +25,17 @@ _RECORDING: Final = {
     "metavar": "FILE",
     "help": "a recording in any supported format; - is standard input",
 }
-FILE: Final[Flags] = {"file": _RECORDING | INPUT} | flags_of(api.read)
-FILES: Final[Flags] = {"files": _RECORDING | {"nargs": "+"} | INPUT} | flags_of(api.read)
+FILE: Final[Flags] = {"file": _RECORDING | INPUT} | flags_of(read)
+FILES: Final[Flags] = {"files": _RECORDING | {"nargs": "+"} | INPUT} | flags_of(read)
 """The argument of a command that reads a recording, or several, with the overrides."""
 Arguments: TypeAlias = argparse.Namespace
 """What one call gave for a command's arguments."""
+
+
+_FORCE: Final = {
+    "action": "store_true",
+    "help": "replace files that pendpipe did not make (never an input, nor a raw file)",
+}
 
 
 class Command(NamedTuple):
@@ -41,38 +48,37 @@ class Command(NamedTuple):
     """Of a command that another package adds: it declares its arguments by itself."""
 
     def declare(self, parser: argparse.ArgumentParser) -> None:
-        """Declare its arguments."""
+        """Declare its arguments, each by its name and the options of argparse.
+
+        Two options are our own: the `heading` that it stands under in the help (of those under
+        `ALTERNATIVES` a call gives one at most), and the `file` that it names (`INPUT`, `OUTPUT`).
+        """
         if self.add_arguments:
             self.add_arguments(parser)
-        else:
-            declare(parser, self.arguments)
+        arguments = self.arguments
+        groups: dict[str | None, argparse._ActionsContainer] = {None: parser}
+        if any(options.get("file", "input") != "input" for options in arguments.values()):
+            arguments = arguments | {"--force": _FORCE}
+        for name, options in arguments.items():
+            heading = options.get("heading")
+            if heading == ALTERNATIVES and heading not in groups:
+                groups[heading] = parser.add_mutually_exclusive_group()
+            elif heading not in groups:
+                groups[heading] = parser.add_argument_group(heading)
+            own = {key: value for key, value in options.items() if key not in ("heading", "file")}
+            groups[heading].add_argument(name, **own)
 
 
-_FORCE: Final = {
-    "action": "store_true",
-    "help": "replace files that pendpipe did not make (never an input, nor a raw file)",
-}
+def command(arguments: Flags) -> Callable[[Callable[[Arguments], int | None]], Command]:
+    """Make a function the command that takes these arguments.
 
-
-def declare(parser: argparse.ArgumentParser, arguments: Flags) -> None:
-    """Declare a command's arguments, each by its name and the options of argparse.
-
-    Two options are our own: the `heading` that it stands under in the help (of those under
-    `ALTERNATIVES` a call gives one at most), and the `file` that it names (`INPUT`, `OUTPUT`).
+    Its docstring is what ``--help`` says; that of its module, where it is called ``run``.
     """
-    groups: dict[str | None, argparse._ActionsContainer] = {None: parser}
-    if any(options.get("file", "input") != "input" for options in arguments.values()):
-        arguments = arguments | {"--force": _FORCE}
-    for name, options in arguments.items():
-        heading = options.get("heading")
-        if heading == ALTERNATIVES and heading not in groups:
-            groups[heading] = parser.add_mutually_exclusive_group()
-        elif heading not in groups:
-            groups[heading] = parser.add_argument_group(heading)
-        groups[heading].add_argument(
-            name,
-            **{key: value for key, value in options.items() if key not in ("heading", "file")},
-        )
+    return lambda run: Command(
+        (sys.modules[run.__module__].__doc__ if run.__name__ == "run" else getdoc(run)) or "",
+        arguments,
+        run,
+    )
 
 
 @contextmanager
@@ -123,7 +129,7 @@ def read_motion(
     """
     from pendpipe.formats.reading import file_bytes
 
-    recording = api.read(arguments.file, **given(arguments, api.read))
+    recording = read(arguments.file, **given(arguments, read))
     constant = arguments.volts_per_radian or _calibrated(arguments.calibration)
     was_volts = recording.quantity == "volts"
     recording = recording.as_motion(constant, arguments.file)

@@ -1,4 +1,4 @@
-"""What an option is: a keyword of a verb of `pendpipe.api`, and an argument of its command.
+"""What an option is: a keyword of a verb of the front door, and an argument of its command.
 
 An option is declared once, where the verb takes it: its name, type and default as those of any
 parameter, and by an `Option` in its annotation what the type does not say. The verb's documentation
@@ -32,7 +32,7 @@ from typing import (
 from pendpipe.errors import InputError, nearest, refuse_if
 
 Flags = dict[str, dict[str, Any]]
-"""Arguments of a command by their names, each with its options; see `arguments.declare`."""
+"""Arguments of a command by their names, each with its options; see `arguments.Command.declare`."""
 ALTERNATIVES: Final = "alternatives"
 INPUT: Final[dict[str, Any]] = {"file": "input"}
 OUTPUT: Final[dict[str, Any]] = {"file": "output"}
@@ -176,7 +176,7 @@ class Keyword(NamedTuple):
         return self.option.help + (f" ({self.default:g})" if number else "")
 
     def argument(self) -> dict[str, Any]:
-        """Return it as `arguments.declare` takes it."""
+        """Return it as `arguments.Command` takes it."""
         if bool in self.types:
             return {"help": self.words, "dest": self.name} | _TRUE
         many = any(get_origin(each) in (Sequence, Mapping) for each in self.types)

@@ -26,16 +26,21 @@ def code_version(module: str) -> str:
     str
         Twelve hexadecimal digits.
     """
+    digest = hashlib.sha256()
+    for path in (path for name in sorted(imported(module)) for path in _files(name)):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def imported(module: str) -> set[str]:
+    """A module of ours and all that it imports."""
     seen, waiting = set[str](), [module]
     while waiting:
         name = waiting.pop()
         if name not in seen and _files(name):
             seen.add(name)
             waiting.extend(_imports(name))
-    digest = hashlib.sha256()
-    for path in (path for name in sorted(seen) for path in _files(name)):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]
+    return seen
 
 
 @cache

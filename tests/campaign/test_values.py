@@ -10,7 +10,7 @@ from pendpipe import physics
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.campaign.design import Design
 from pendpipe.campaign.effects import DRAG_OF_ONE_RECORD, RATE_EXPONENT
-from pendpipe.campaign.fit import Candidate, Measured, named, only
+from pendpipe.campaign.fit import Candidate, Measured, coefficient, loss_torques, named, only
 from pendpipe.campaign.values import WORST_LINE, Values, campaign_values
 from pendpipe.configuration.load import Record
 from pendpipe.configuration.models import Fluid
@@ -38,7 +38,7 @@ def test_an_exact_campaign_gives_its_k_and_its_drag(inertia_exponent: float, fac
     """For a torque of the material as for k f^2 whatever the inertia."""
     design = default(inertia_exponent)
     found = values_of(design, data(design, named("uniform-drag-excess"), (factor - 1.0,)))
-    assert found.coefficient.value == pytest.approx(3940.0, rel=1e-8)
+    assert coefficient(found.fit).value == pytest.approx(3940.0, rel=1e-8)
     assert found.theory_factor.estimate.value == pytest.approx(factor, rel=1e-8)
     assert found.theory_factor.chi2 == pytest.approx(0.0, abs=1e-6)
     assert found.quantities["factor"][found.wet] == pytest.approx(factor, rel=1e-8)
@@ -90,8 +90,8 @@ def test_pulls_of_every_number_are_normal() -> None:
         exact = Values(truth, found.benchmark)
         water = 4.0 * np.pi**2 * 0.1 / 3940.0 * np.exp(0.05 * moved[design.index[LOSS]])
         pairs = {
-            "k": (found.coefficient, 3940.0),
-            "kappa": (found.loss_torques["water"], water),
+            "k": (coefficient(found.fit), 3940.0),
+            "kappa": (loss_torques(found.fit)["water"], water),
             "factor": (found.theory_factor.estimate, 1.0),
             "history": (found.history_coefficient.estimate, 1.0),
             "low-1": (found.estimate("viscous_rate", low_1), _rate(exact, low_1)),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import pendpipe.api as pp
+import pendpipe as pp
 from pendpipe import cli, manifest
 from pendpipe.quantities import with_error
 from pendpipe.recording import write_plain

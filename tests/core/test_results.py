@@ -410,6 +410,22 @@ def test_the_readers_of_files_count() -> None:
     assert "pendpipe.formats.trees" in provenance._imports(f"{dialects}.arrays")
 
 
+@pytest.mark.parametrize(
+    ("stage", "other"),
+    [
+        ("commands.calibrate", "analysis.fit"),
+        ("commands.turning_points", "diagnosis.search"),
+        ("commands.turning_points", "figures.style"),
+        ("commands.fit", "acquisition.recorder"),
+        ("commands.diagnose", "acquisition.recorder"),
+        ("commands.acquire", "diagnosis.search"),
+        ("stages.compare", "figures.style"),
+    ],
+)
+def test_editing_what_a_stage_does_not_run_reruns_nothing(stage: str, other: str) -> None:
+    assert f"pendpipe.{other}" not in provenance.imported(f"pendpipe.{stage}")
+
+
 def test_the_versions_of_all_commands_can_be_found() -> None:
     """An import that can't be followed would keep the workflow from starting."""
     for path in (provenance.PACKAGE / "commands").glob("*.py"):

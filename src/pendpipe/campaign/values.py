@@ -23,9 +23,7 @@ from pendpipe.campaign.fit import (
     Candidate,
     JointFit,
     Measured,
-    coefficient,
     joint_fit,
-    loss_torques,
     only,
     terms_with,
 )
@@ -283,16 +281,6 @@ class Values:
             named = {"history": history, "hysteresis": hysteresis, "ratio": ratio}
             found.append({**named, "chi2": float(off @ off), "dof": len(ratio)})
         return found
-
-    @property
-    def coefficient(self) -> Estimate:
-        """Return k at the reference inertia."""
-        return coefficient(self.fit)
-
-    @property
-    def loss_torques(self) -> dict[str, Estimate]:
-        """Return kappa'' of each assembly at the reference inertia."""
-        return loss_torques(self.fit)
 
 
 _SOURCES: Final = {

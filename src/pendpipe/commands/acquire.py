@@ -16,10 +16,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import Any, Final
+from typing import Any
 
-from pendpipe import api
-from pendpipe.arguments import Arguments, load, tell_written
+from pendpipe.acquisition import verbs
+from pendpipe.arguments import Arguments, command, load, tell_written
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import check_output, check_writable, is_stream
 from pendpipe.options import (
@@ -28,65 +28,61 @@ from pendpipe.options import (
     NATURAL,
     OUTPUTS,
     POSITIVE,
-    Flags,
     flags,
     flags_of,
     given,
     under,
 )
 
-_SOURCES: Final[Flags] = {
-    "--port": {"help": "serial port of a real instrument: /dev/ttyUSB0, COM3"},
-    "--device": {"metavar": "simulated:MODEL", "help": "a simulated instrument"},
-    "--recover": {"metavar": "RAW", "help": "decode a raw file, for instance after a crash"}
-    | INPUT,
-    "--serve": {
-        "metavar": "MODEL",
-        "help": "simulate an instrument for other programs: di2108, ...",
-    },
-}
-_OWN: Final[Flags] = {
-    "--list": {"action": "store_true", "help": "list ports; with --port, identify its device"},
-    "--channel": {"type": int, "help": "as printed on the box (1)"},
-    "--samples": {
-        "type": POSITIVE,
-        "metavar": "N",
-        "help": "length, instead of --duration",
-    },
-    "--out": {"metavar": "FILE", "help": "the recording; FILE.wdh for WinDaq"} | OUTPUTS,
-    "--raw": {
-        "metavar": "FILE",
-        "help": "a new file for the bytes off the wire (FILE.raw, FILE.<time stamp>.raw)",
-    },
-    "--anew": {
-        "action": "store_true",
-        "help": "record even if there is a recording: of a campaign's record, or not yet written",
-    },
-    "--accept-short": {
-        "action": "store_true",
-        "help": "take what was kept when the line was lost for the recording",
-    },
-    "--view": {
-        "action": "store_true",
-        "help": "show what is recorded on a page of this machine; its address is printed",
-    },
-    "--signal": {
-        "metavar": "TOML",
-        "help": "with --serve: what it reads, as for pendpipe simulate",
+
+@command(
+    under(
+        ALTERNATIVES,
+        {
+            "--port": {"help": "serial port of a real instrument: /dev/ttyUSB0, COM3"},
+            "--device": {"metavar": "simulated:MODEL", "help": "a simulated instrument"},
+            "--recover": {"metavar": "RAW", "help": "decode a raw file, for instance after a crash"}
+            | INPUT,
+            "--serve": {
+                "metavar": "MODEL",
+                "help": "simulate an instrument for other programs: di2108, ...",
+            },
+        },
+    )
+    | {
+        "--list": {"action": "store_true", "help": "list ports; with --port, identify its device"},
+        "--channel": {"type": int, "help": "as printed on the box (1)"},
+        "--samples": {
+            "type": POSITIVE,
+            "metavar": "N",
+            "help": "length, instead of --duration",
+        },
+        "--out": {"metavar": "FILE", "help": "the recording; FILE.wdh for WinDaq"} | OUTPUTS,
+        "--raw": {
+            "metavar": "FILE",
+            "help": "a new file for the bytes off the wire (FILE.raw, FILE.<time stamp>.raw)",
+        },
+        "--anew": {
+            "action": "store_true",
+            "help": "record even if there is a recording: of a campaign's record, or not yet"
+            " written",
+        },
+        "--accept-short": {
+            "action": "store_true",
+            "help": "take what was kept when the line was lost for the recording",
+        },
+        "--view": {
+            "action": "store_true",
+            "help": "show what is recorded on a page of this machine; its address is printed",
+        },
+        "--signal": {
+            "metavar": "TOML",
+            "help": "with --serve: what it reads, as for pendpipe simulate",
+        }
+        | INPUT,
+        "--link": {"choices": ("pty", "socket"), "help": "with --serve: on which line"},
     }
-    | INPUT,
-    "--link": {"choices": ("pty", "socket"), "help": "with --serve: on which line"},
-}
-_OF_A_STAGE: Final[Flags] = flags("--campaign", "--record", "--refused") | {
-    "--caliper": {
-        "action": "store_true",
-        "help": "the campaign's caliper run instead of a record",
-    }
-}
-ARGUMENTS: Final = (
-    under(ALTERNATIVES, _SOURCES)
-    | _OWN
-    | flags_of(api.acquire)
+    | flags_of(verbs.acquire)
     | {
         "--seed": {
             "type": NATURAL,
@@ -95,10 +91,17 @@ ARGUMENTS: Final = (
             "help": "of the simulated noise (0)",
         }
     }
-    | under("as a stage of a campaign", _OF_A_STAGE)
+    | under(
+        "as a stage of a campaign",
+        flags("--campaign", "--record", "--refused")
+        | {
+            "--caliper": {
+                "action": "store_true",
+                "help": "the campaign's caliper run instead of a record",
+            }
+        },
+    )
 )
-
-
 def run(arguments: Arguments) -> None:
     """List ports, serve a device, or record."""
     if arguments.list:
@@ -263,11 +266,11 @@ def _from_device(arguments: Arguments, raw: Path) -> None:
         "only simulated devices go here",
         "give simulated:di2108",
     )
-    options, simulated = given(arguments, api.acquire), None
+    options, simulated = given(arguments, verbs.acquire), None
     if device:
         options["volts_per_radian"] = arguments.volts_per_radian or 3.85
         simulated = example_signal(arguments.seed, options["volts_per_radian"])
-    api.acquire(
+    verbs.acquire(
         where,
         channel=arguments.channel or 1,
         signal=simulated,

@@ -9,44 +9,54 @@ constant holds for it.
 """
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from pendpipe import manifest
-from pendpipe.arguments import Arguments, print_answer
+from pendpipe.arguments import Arguments, command, print_answer
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import is_stream, read_json, write_json
-from pendpipe.options import INPUT, OUTPUT, SENSOR, Flags, flags, under
+from pendpipe.options import INPUT, OUTPUT, SENSOR, flags, under
 from pendpipe.recording import Recording, read_plain
 from pendpipe.stages.refusal import run_stage
 
-_OWN: Final[Flags] = {
-    "file": {"metavar": "FILE", "type": Path, "help": "table of volts against angles"} | INPUT,
-    "--out": {"type": Path, "metavar": "JSON", "help": "write the result here"} | OUTPUT,
-    **flags("--json"),
-    "--arm-m": {"type": float, "metavar": "M", "help": "arm of the displacements, metres"},
-    "--arm-sd-m": {"type": float, "default": 0.0, "metavar": "M", "help": "its standard deviation"},
-    "--displacement-sd-m": {
-        "type": float,
-        "default": 0.0,
-        "metavar": "M",
-        "help": "standard deviation of a displacement (the caliper's)",
-    },
-    "--delimiter": {"metavar": "SIGN", "help": "between the cells; guessed from the header"},
-    "--decimal": {
-        "metavar": "SIGN",
-        "choices": ".,",
-        "help": "decimal mark; guessed from the delimiter",
-    },
-}
-_OF_A_RECORD: Final = flags("--record", "--refused") | {
-    "--volts-per-radian": {"type": float, "metavar": "V", "help": SENSOR},
-    "--sensor": {"type": Path, "metavar": "JSON", "help": "the campaign's calibration"} | INPUT,
-}
-ARGUMENTS: Final = _OWN | under("with --record", _OF_A_RECORD)
 
-
+@command(
+    {
+        "file": {"metavar": "FILE", "type": Path, "help": "table of volts against angles"} | INPUT,
+        "--out": {"type": Path, "metavar": "JSON", "help": "write the result here"} | OUTPUT,
+        **flags("--json"),
+        "--arm-m": {"type": float, "metavar": "M", "help": "arm of the displacements, metres"},
+        "--arm-sd-m": {
+            "type": float,
+            "default": 0.0,
+            "metavar": "M",
+            "help": "its standard deviation",
+        },
+        "--displacement-sd-m": {
+            "type": float,
+            "default": 0.0,
+            "metavar": "M",
+            "help": "standard deviation of a displacement (the caliper's)",
+        },
+        "--delimiter": {"metavar": "SIGN", "help": "between the cells; guessed from the header"},
+        "--decimal": {
+            "metavar": "SIGN",
+            "choices": ".,",
+            "help": "decimal mark; guessed from the delimiter",
+        },
+    }
+    | under(
+        "with --record",
+        flags("--record", "--refused")
+        | {
+            "--volts-per-radian": {"type": float, "metavar": "V", "help": SENSOR},
+            "--sensor": {"type": Path, "metavar": "JSON", "help": "the campaign's calibration"}
+            | INPUT,
+        },
+    )
+)
 def run(arguments: Arguments) -> None:
     """Calibrate a sensor, or pick the constant of a record."""
     out: Path | None = arguments.out

@@ -12,53 +12,64 @@ its own (docs/several.md).
 from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from pendpipe import api
 from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.analysis.turning_points import read_turning_points
-from pendpipe.arguments import FILES, Arguments, print_answer, print_json, read_motion, tell
+from pendpipe.arguments import (
+    FILES,
+    Arguments,
+    command,
+    print_answer,
+    print_json,
+    read_motion,
+    tell,
+)
 from pendpipe.diagnosis.result import FILE_NAME, Diagnosis, not_analysable
 from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_A_DIAGNOSIS
 from pendpipe.files import check_output, distinct_names, make_folder, write_json
 from pendpipe.manifest import check, job
-from pendpipe.options import OUTPUTS, Flags, flags, flags_of, given
+from pendpipe.options import OUTPUTS, flags, flags_of, given
 from pendpipe.process import keep_memory
 from pendpipe.quantities import listed
 from pendpipe.stages.refusal import reason_of, within_results
 
 FOUND = 3
 """Exit status where ``--fail-on`` asks for it."""
-_OWN: Final[Flags] = {
-    "--out": {"type": Path, "metavar": "DIR", "help": "write diagnosis.json and the figures there"}
-    | OUTPUTS,
-    "--fail-on": {
-        "choices": ("missing-physics",),
-        "help": f"end with status {FOUND} on that verdict",
-    },
-    "--figures": {
-        "choices": ("all", "found", "none"),
-        "default": "all",
-        "help": "draw them always (all), where something is missing (found), or never (none)",
-    },
-    "--no-figures": {
-        "dest": "figures",
-        "action": "store_const",
-        "const": "none",
-        "help": "as --figures none",
-    },
-}
-ARGUMENTS: Final = (
+
+
+@command(
     FILES
-    | _OWN
+    | {
+        "--out": {
+            "type": Path,
+            "metavar": "DIR",
+            "help": "write diagnosis.json and the figures there",
+        }
+        | OUTPUTS,
+        "--fail-on": {
+            "choices": ("missing-physics",),
+            "help": f"end with status {FOUND} on that verdict",
+        },
+        "--figures": {
+            "choices": ("all", "found", "none"),
+            "default": "all",
+            "help": "draw them always (all), where something is missing (found), or never (none)",
+        },
+        "--no-figures": {
+            "dest": "figures",
+            "action": "store_const",
+            "const": "none",
+            "help": "as --figures none",
+        },
+    }
     | flags_of(api.diagnose)
     | flags("--verbose", "-v", "--json", "--turning-points", "--record", "--refused")
     # With several FILEs one for all, or one for each.
     | flags("--calibration", nargs="+", default=[])
 )
-
-
 def run(arguments: Arguments) -> int:
     """Diagnose, write the result, and print the answer."""
     keep_memory()

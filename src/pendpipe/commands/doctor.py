@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from pendpipe import manifest
-from pendpipe.arguments import Arguments, print_answer
+from pendpipe.arguments import Arguments, command, print_answer
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.options import flags
 
@@ -29,19 +29,19 @@ _NAMES: Final = (
 """Of results, beside those that manifests list."""
 
 
-ARGUMENTS: Final = {
-    "folder": {
-        "nargs": "?",
-        "type": Path,
-        "default": Path("results"),
-        "metavar": "DIR",
-        "help": "a folder of results (%(default)s)",
-    },
-    **flags("--json"),
-    "--fail-on": {"choices": ("findings",), "help": "end with status 3 if anything is wrong"},
-}
-
-
+@command(
+    {
+        "folder": {
+            "nargs": "?",
+            "type": Path,
+            "default": Path("results"),
+            "metavar": "DIR",
+            "help": "a folder of results (%(default)s)",
+        },
+        **flags("--json"),
+        "--fail-on": {"choices": ("findings",), "help": "end with status 3 if anything is wrong"},
+    }
+)
 def run(arguments: Arguments) -> int:
     """Examine and print."""
     found = examine(arguments.folder)

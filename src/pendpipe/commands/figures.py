@@ -5,30 +5,31 @@ each of figures 3 to 10 is written all the same, with the reason in its place.
 """
 
 from pathlib import Path
-from typing import Final
 
-from pendpipe.arguments import Arguments, tell
+from pendpipe.arguments import Arguments, command, tell
 from pendpipe.files import write_json
 from pendpipe.manifest import job
 from pendpipe.options import OUTPUTS, flags
 
-ARGUMENTS: Final = flags("--campaign", "--comparison", required=True) | {
-    "--out": {
-        "required": True,
-        "type": Path,
-        "metavar": "FOLDER",
-        "help": "where figures 3 to 10 go; a record's figures go to RESULTS/<record>/figures",
+
+@command(
+    flags("--campaign", "--comparison", required=True)
+    | {
+        "--out": {
+            "required": True,
+            "type": Path,
+            "metavar": "FOLDER",
+            "help": "where figures 3 to 10 go; a record's figures go to RESULTS/<record>/figures",
+        }
+        | OUTPUTS,
+        "--processes": {
+            "type": int,
+            "default": 1,
+            "metavar": "N",
+            "help": "how many may draw at once (1)",
+        },
     }
-    | OUTPUTS,
-    "--processes": {
-        "type": int,
-        "default": 1,
-        "metavar": "N",
-        "help": "how many may draw at once (1)",
-    },
-}
-
-
+)
 def run(arguments: Arguments) -> None:
     """Draw."""
     from pendpipe.figures.campaign import draw_all

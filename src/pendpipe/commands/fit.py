@@ -14,14 +14,13 @@ and the exit status is 2 unless --accept is given. Of several FILEs it is 2 if n
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 from pendpipe import api
 from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.analysis.fit.printed import gravity_line, lines
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.turning_points import is_turning_points, read_turning_points
-from pendpipe.arguments import FILES, Arguments, print_answer, print_json, read_motion, tell
+from pendpipe.arguments import FILES, Arguments, command, print_answer, read_motion, tell
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import over
 from pendpipe.files import is_stream, read_json, write_json
@@ -30,7 +29,6 @@ from pendpipe.options import (
     NATURAL,
     OUTPUT,
     POSITIVE,
-    Flags,
     flags,
     flags_of,
     given,
@@ -38,32 +36,33 @@ from pendpipe.options import (
 )
 from pendpipe.report.class_table import Fitted, form_of, printed, together, write_fits
 
-_OWN: Final[Flags] = {
-    "--out": {
-        "metavar": "FILE",
-        "help": "the result (.json), or the table (.csv, .xlsx, .html, .tex); - is standard output",
-    }
-    | OUTPUT,
-    "--figure": {
-        "type": Path,
-        "metavar": "FILE",
-        "help": "draw decay, residual, and Q against amplitude (.svg, .png, .pdf)",
-    }
-    | OUTPUT,
-    "--gravity": {
-        "type": POSITIVE,
-        "metavar": "G",
-        "help": "g in m/s^2: prints the equivalent length",
-    },
-    "--accept": {
-        "action": "store_true",
-        "help": "print a law that contradicts the decay, status 0",
-    },
-    "--wide": {"action": "store_true", "help": "of several FILEs: a, b, c in columns"},
-}
-ARGUMENTS: Final = (
+
+@command(
     FILES
-    | _OWN
+    | {
+        "--out": {
+            "metavar": "FILE",
+            "help": "the result (.json), or the table (.csv, .xlsx, .html, .tex); - is standard"
+            " output",
+        }
+        | OUTPUT,
+        "--figure": {
+            "type": Path,
+            "metavar": "FILE",
+            "help": "draw decay, residual, and Q against amplitude (.svg, .png, .pdf)",
+        }
+        | OUTPUT,
+        "--gravity": {
+            "type": POSITIVE,
+            "metavar": "G",
+            "help": "g in m/s^2: prints the equivalent length",
+        },
+        "--accept": {
+            "action": "store_true",
+            "help": "print a law that contradicts the decay, status 0",
+        },
+        "--wide": {"action": "store_true", "help": "of several FILEs: a, b, c in columns"},
+    }
     | flags_of(api.fit)
     | {
         "--frequency": {
@@ -77,8 +76,6 @@ ARGUMENTS: Final = (
     | flags("--record", "--refused")
     | {"--seed": {"type": NATURAL, "metavar": "N", "help": "recorded only"}}
 )
-
-
 def run(arguments: Arguments) -> int:
     """Fit and print; write what is asked for."""
     if arguments.out and arguments.record is None:
@@ -107,15 +104,8 @@ def run(arguments: Arguments) -> int:
         from pendpipe.figures.style import save
 
         save(result.plot(), figure.with_suffix(""), forms=[figure.suffix[1:]])
-    if arguments.verbose:
-        for warning in result.warnings:
-            tell(f"{arguments.file}: {warning}")
-    if arguments.out and is_stream(arguments.out):
-        return _status(arguments, result)
-    if arguments.json:
-        print_json(result.to_dict())
-    else:
-        _print(arguments, result)
+    if not (arguments.out and is_stream(arguments.out)):
+        print_answer(arguments, result.to_dict(), _text(arguments, result))
     return _status(arguments, result)
 
 
@@ -127,7 +117,7 @@ def _stage(arguments: Arguments) -> None:
     run_stage(
         "fit",
         arguments.record,
-        lambda: _write(arguments, _fit(arguments)),
+        lambda: write_json(arguments.out, _fit(arguments).to_dict()),
         outputs=[Path(arguments.out)],
         refused=arguments.refused,
         inputs=[Path(arguments.file), arguments.calibration, arguments.turning_points],
@@ -147,6 +137,9 @@ def _fit(arguments: Arguments, say: Callable[[str], None] = tell) -> FitResult:
     }
     source = arguments.file if is_turning_points(arguments.file) else recording
     result = api.fit(source, points=points, name=arguments.file, **options)
+    if arguments.verbose or arguments.record is not None:
+        for warning in result.warnings:
+            say(f"{arguments.file}: {warning}")
     return replace(
         result,
         provenance={
@@ -168,20 +161,14 @@ def _scale_percent(arguments: Arguments) -> float | None:
     return None if constant is None else 100.0 * float(constant["sd"]) / float(constant["value"])
 
 
-def _write(arguments: Arguments, result: FitResult) -> None:
-    write_json(arguments.out, result.to_dict())
-    for warning in result.warnings:
-        tell(f"{arguments.file}: {warning}")
-
-
-def _print(arguments: Arguments, result: FitResult) -> None:
-    """Print the answer."""
+def _text(arguments: Arguments, result: FitResult) -> str:
+    """The answer in words."""
     name = "standard input" if arguments.file == "-" else Path(arguments.file).name
     printed = lines(result, name=name, law=arguments.accept)
     length, gravity = arguments.length_m, arguments.gravity
     if length or gravity:
         printed.insert(-2, gravity_line(result, length=length, gravity=gravity))
-    print("\n".join(printed))
+    return "\n".join(printed)
 
 
 def _status(arguments: Arguments, result: FitResult) -> int:
@@ -219,8 +206,6 @@ def _table(arguments: Arguments) -> int:
         print_answer(arguments, content, printed(fits, wide=arguments.wide))
     for each in fits:
         notes += [f"pendpipe: {each.file}: {each.refusal}"] if each.refusal else []
-        if arguments.verbose and each.fit:
-            notes += [f"{each.file}: {warning}" for warning in each.fit.warnings]
     for note in notes:
         tell(note)
     usable = [each.fit for each in fits if each.fit and not _status(arguments, each.fit)]

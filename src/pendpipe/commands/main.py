@@ -1,9 +1,9 @@
 """The command line: it picks a command and turns user errors into one line and a status.
 
 A command is a module of `pendpipe.commands`, or of `pendpipe.stages` where it is a stage of a
-campaign and no more, with the table ``ARGUMENTS`` (see `pendpipe.arguments.declare`) and the
-function ``run(arguments)``, which returns the exit status where it is not 0; or, where it takes a
-few lines, a function of `pendpipe.commands.small`.
+campaign and no more, with the function ``run(arguments)``, which returns the exit status where it
+is not 0; or, where it takes a few lines, a function of `pendpipe.commands.small`. What stands above
+it, `pendpipe.arguments.command`, declares its arguments.
 Only the module of the command that was asked for is imported, since a job's cost is its imports.
 Other packages add commands by entry points of the group ``pendpipe.commands``; one that has
 commands of its own declares them by a function ``add_arguments(parser)`` instead.
@@ -95,21 +95,16 @@ def _descriptions() -> dict[str, str]:
 
 def command_of(name: str) -> Any:
     """Find a command; None where there is none of the name."""
-    from pendpipe.arguments import Command
-
+    place = name.replace("-", "_")
     if name in SMALL:
-        from pendpipe.commands import small
-
-        return small.COMMANDS[name]
-    if name in COMMANDS or name in STAGES:
-        file = name.replace("-", "_")
-        module = (
-            importlib.import_module(f"pendpipe.commands.{file}")
-            if name in COMMANDS
-            else importlib.import_module(f"pendpipe.stages.{file}")
-        )
-        return Command(module.__doc__ or "", module.ARGUMENTS, module.run)
+        return getattr(importlib.import_module("pendpipe.commands.small"), place)
+    if name in COMMANDS:
+        return importlib.import_module(f"pendpipe.commands.{place}").run
+    if name in STAGES:
+        return importlib.import_module(f"pendpipe.stages.{place}").run
     if (found := _added().get(name)) is not None:
+        from pendpipe.arguments import Command
+
         module = found.load()
         return Command(module.__doc__ or "", {}, module.run, module.add_arguments)
     if name in IN_A_CLONE:

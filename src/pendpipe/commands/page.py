@@ -7,15 +7,24 @@ all that links to them.
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 from pendpipe import api
-from pendpipe.arguments import FILES, Arguments, read_motion, tell
+from pendpipe.arguments import FILES, Arguments, command, read_motion, tell
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.options import OUTPUT, flags
 from pendpipe.process import cores, in_order
 
-ARGUMENTS: Final = (
+
+class Sheet(NamedTuple):
+    """A page, or why there is none."""
+
+    fitted: Any
+    page: str
+    notes: tuple[str, ...] = ()
+
+
+@command(
     FILES
     | {
         "--out": {
@@ -27,16 +36,6 @@ ARGUMENTS: Final = (
     }
     | flags("--calibration")
 )
-
-
-class Sheet(NamedTuple):
-    """A page, or why there is none."""
-
-    fitted: Any
-    page: str
-    notes: tuple[str, ...] = ()
-
-
 def run(arguments: Arguments) -> int:
     """Fit, diagnose, and write the page, or a page each."""
     from pendpipe.files import check_output, is_stream, write_whole

@@ -6,39 +6,39 @@ campaign's numbers go to standard output too, beside the paper's and the simulat
 """
 
 from pathlib import Path
-from typing import Final
 
-from pendpipe.arguments import Arguments, tell
+from pendpipe.arguments import Arguments, command, tell
 from pendpipe.options import INPUT, OUTPUT, flags
 
-ARGUMENTS: Final = {
-    **flags("--campaign", required=True),
-    **flags("--comparison"),
-    "--summary": {
-        "type": Path,
-        "metavar": "FILE",
-        "help": "campaign.json, from pendpipe compare, by default that beside the comparison;"
-        " it can be saved from the page",
-    }
-    | INPUT,
-    "--figures": {
-        "type": Path,
-        "metavar": "FOLDER",
-        "help": "where figures 3 to 10 are; the folder figures beside the page by default",
-    },
-    "--out": {
-        "type": Path,
-        "metavar": "PAGE.html",
-        "help": "the page; report.html among the campaign's results by default",
-    }
-    | OUTPUT,
-}
 
-
+@command(
+    {
+        **flags("--campaign", required=True),
+        **flags("--comparison"),
+        "--summary": {
+            "type": Path,
+            "metavar": "FILE",
+            "help": "campaign.json, from pendpipe compare, by default that beside the comparison;"
+            " it can be saved from the page",
+        }
+        | INPUT,
+        "--figures": {
+            "type": Path,
+            "metavar": "FOLDER",
+            "help": "where figures 3 to 10 are; the folder figures beside the page by default",
+        },
+        "--out": {
+            "type": Path,
+            "metavar": "PAGE.html",
+            "help": "the page; report.html among the campaign's results by default",
+        }
+        | OUTPUT,
+    }
+)
 def run(arguments: Arguments) -> None:
     """Write the page."""
-    from pendpipe.figures.data import read_compared, read_content
-    from pendpipe.files import write_whole
+    from pendpipe.figures.data import read_compared
+    from pendpipe.files import read_json, write_whole
     from pendpipe.manifest import job
     from pendpipe.report.page import OWN_PAGE, page_files, render
     from pendpipe.report.tables import as_text, headline
@@ -58,7 +58,7 @@ def run(arguments: Arguments) -> None:
         page = render(
             configuration,
             comparison,
-            read_content(summary, "run pendpipe compare first"),
+            read_json(summary),
             folder,
             figures,
             home=out,

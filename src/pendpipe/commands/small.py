@@ -10,42 +10,28 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from importlib import resources
 from inspect import getdoc
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from pendpipe import api
 from pendpipe.arguments import (
     FILE,
     Arguments,
-    Command,
     announce,
-    declare,
+    command,
     print_answer,
     tell_written,
 )
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.options import ALTERNATIVES, INPUT, OUTPUT, Flags, flags, flags_of, given
+from pendpipe.options import ALTERNATIVES, INPUT, OUTPUT, flags, flags_of, given
 from pendpipe.project import CONFIGURATION, PROJECT, SNAKEFILE
+from pendpipe.reading import inspect as describe
+from pendpipe.reading import read
+from pendpipe.simulation.verbs import simulate as simulated
 
 if TYPE_CHECKING:
     from pendpipe.formats import Inspection
-
-COMMANDS: Final[dict[str, Command]] = {}
-"""By their names."""
-_Run = Callable[[Arguments], int | None]
-
-
-def command(arguments: Flags) -> Callable[[_Run], _Run]:
-    """Enter a function as the command of its name, with its docstring as description."""
-
-    def enter(run: _Run) -> _Run:
-        COMMANDS[run.__name__] = Command(getdoc(run) or "", arguments, run)
-        return run
-
-    return enter
 
 
 @command(
@@ -55,7 +41,7 @@ def command(arguments: Flags) -> Callable[[_Run], _Run]:
 )
 def inspect(arguments: Arguments) -> None:
     """Print what a recording holds: format, channels, rate, gaps, markers, clipping, step."""
-    found = api.inspect(arguments.file, **given(arguments, api.read))
+    found = describe(arguments.file, **given(arguments, read))
     lines = [arguments.file, *("  " + line for line in found.why)]
     text = lines if arguments.why else _lines(arguments.file, found)
     print_answer(arguments, found.as_json(), "\n".join(text))
@@ -119,7 +105,7 @@ def convert(arguments: Arguments) -> None:
     from pendpipe.formats.writing import check_name, write
 
     check_name(arguments.out)
-    recording = api.read(arguments.file, **given(arguments, api.read))
+    recording = read(arguments.file, **given(arguments, read))
     announce(arguments, recording)
     for note in write(arguments.out, recording):
         print(f"{arguments.out}: {note}", file=sys.stderr)
@@ -131,7 +117,7 @@ def convert(arguments: Arguments) -> None:
         "model": {"metavar": "MODEL.toml", "help": "what to simulate"} | INPUT,
         "out": {"metavar": "OUT.csv", "type": Path, "help": "the recording, plain form"} | OUTPUT,
     }
-    | flags_of(api.simulate)
+    | flags_of(simulated)
 )
 def simulate(arguments: Arguments) -> None:
     """Make a recording from a described pendulum and measurement chain.
@@ -142,7 +128,7 @@ def simulate(arguments: Arguments) -> None:
     """
     from pendpipe.recording import write_plain
 
-    recording = api.simulate(arguments.model, **given(arguments, api.simulate))
+    recording = simulated(arguments.model, **given(arguments, simulated))
     write_plain(arguments.out, recording)
     tell_written(arguments.out, f"{len(recording)} samples in {recording.unit}")
 
@@ -416,8 +402,8 @@ def completion(arguments: Arguments) -> None:
     commands = parser.add_subparsers()
     for name, line in (COMMANDS | STAGES).items():
         one = commands.add_parser(name, help=line)
+        command_of(name).declare(one)
         declared = command_of(name).arguments
-        declare(one, declared)
         for action in one._actions:
             names = {action.dest, *action.option_strings}
             if any("file" in declared[key] for key in names if key in declared):

@@ -10,14 +10,13 @@ import traceback
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
-from pendpipe.arguments import Arguments, load, tell
+from pendpipe.arguments import Arguments, command, load, tell
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.errors import refuse_if
 from pendpipe.files import make_folder
 from pendpipe.manifest import disown, handed_on, read_manifest, set_aside_damaged
-from pendpipe.options import Flags, flags
+from pendpipe.options import flags
 from pendpipe.stages.chunks import (
     STAGES,
     Stage,
@@ -27,14 +26,15 @@ from pendpipe.stages.chunks import (
     write_chunk,
 )
 
-_OWN: Final[Flags] = {
-    "stage": {"choices": tuple(STAGES), "help": "what to do"},
-    "--chunk": {"required": True, "metavar": "NAME", "help": "which records"},
-    "--out": {"required": True, "type": Path, "metavar": "JSON", "help": "what was done"},
-}
-ARGUMENTS: Final = _OWN | flags("--campaign", required=True)
 
-
+@command(
+    {
+        "stage": {"choices": tuple(STAGES), "help": "what to do"},
+        "--chunk": {"required": True, "metavar": "NAME", "help": "which records"},
+        "--out": {"required": True, "type": Path, "metavar": "JSON", "help": "what was done"},
+        **flags("--campaign", required=True),
+    }
+)
 def run(arguments: Arguments) -> int:
     """Do what is left to do."""
     campaign = load(arguments.campaign)

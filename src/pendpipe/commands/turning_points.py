@@ -6,22 +6,20 @@ holds what they share: noise, the level's standard deviation, the spans that wer
 """
 
 from pathlib import Path
-from typing import Final
 
 from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.analysis.turning_points import write_turning_points
-from pendpipe.arguments import FILE, Arguments, read_motion, tell, tell_written
+from pendpipe.arguments import FILE, Arguments, command, read_motion, tell, tell_written
 from pendpipe.options import OUTPUT, flags
 from pendpipe.quantities import after_number
 from pendpipe.stages.refusal import run_stage
 
-ARGUMENTS: Final = (
+
+@command(
     FILE
     | {"--out": {"type": Path, "required": True, "metavar": "CSV", "help": "the table"} | OUTPUT}
     | flags("--calibration", "--record", "--refused")
 )
-
-
 def run(arguments: Arguments) -> None:
     """Measure and write."""
     run_stage(

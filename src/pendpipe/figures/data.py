@@ -92,20 +92,6 @@ def theory(
     return np.array(columns["frequency_hz"], float), np.array(columns[quantity], float)
 
 
-def read_content(path: Path, remedy: str = "run the campaign first") -> dict[str, Any]:
-    """Read a JSON file that holds an object.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it holds something else.
-    """
-    refuse_if(not path.is_file(), path, "there is no such file", remedy)
-    content: dict[str, Any] = read_json(path)
-    refuse_if(not isinstance(content, dict), path, "this is no JSON object", "make it again")
-    return content
-
-
 def read_compared(
     campaign: Path, comparison: Path | None
 ) -> tuple[dict[str, Any], Path, dict[str, Any]]:
@@ -125,7 +111,8 @@ def read_compared(
     folder = Path(str(configuration.get("results") or "results"))
     comparison = comparison or folder / "comparison.json"
     check([comparison])
-    content = read_content(comparison, "run pendpipe compare first")
+    content = read_json(comparison)
     again = "make it again with pendpipe compare"
-    refuse_if("records" not in content, comparison, "it has no records", again)
+    whole = isinstance(content, dict) and "records" in content
+    refuse_if(not whole, comparison, "it has no records", again)
     return configuration, folder, content

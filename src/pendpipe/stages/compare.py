@@ -8,7 +8,7 @@ import numpy as np
 
 from pendpipe.analysis.compare import amplitude_misfit, tail_fits
 from pendpipe.analysis.turning_points import read_turning_points
-from pendpipe.arguments import Arguments, load
+from pendpipe.arguments import Arguments, command, load
 from pendpipe.campaign.fit import InertiaSds, inertia_sds, joint_values
 from pendpipe.campaign.values import Line, Values, campaign_values
 from pendpipe.configuration.jobs import digest
@@ -33,13 +33,15 @@ from pendpipe.stages.results import (
 from pendpipe.stages.separate import is_line
 from pendpipe.version import __version__
 
-ARGUMENTS: Final = flags("--campaign", required=True) | {
-    "--separation": {"type": Path, "required": True, "help": "the stage before's JSON"} | INPUT,
-    "--out": {"type": Path, "required": True, "help": "the comparison, JSON"} | OUTPUT,
-    "--summary": {"type": Path, "required": True, "help": "campaign.json"} | OUTPUT,
-}
 
-
+@command(
+    flags("--campaign", required=True)
+    | {
+        "--separation": {"type": Path, "required": True, "help": "the stage before's JSON"} | INPUT,
+        "--out": {"type": Path, "required": True, "help": "the comparison, JSON"} | OUTPUT,
+        "--summary": {"type": Path, "required": True, "help": "campaign.json"} | OUTPUT,
+    }
+)
 def run(arguments: Arguments) -> None:
     """Compare."""
     campaign = load(arguments.campaign)

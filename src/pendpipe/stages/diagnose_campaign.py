@@ -7,9 +7,9 @@ goes to standard output as one paragraph.
 """
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-from pendpipe.arguments import Arguments, load, print_answer
+from pendpipe.arguments import Arguments, command, load, print_answer
 from pendpipe.configuration.load import Campaign
 from pendpipe.files import write_json
 from pendpipe.manifest import job
@@ -21,7 +21,7 @@ from pendpipe.version import __version__
 FILE_NAME = "campaign_diagnosis.json"
 
 
-ARGUMENTS: Final = (
+@command(
     {"folder": {"type": Path, "metavar": "DIR", "help": "the campaign's results"}}
     | flags("--campaign", default=Path("config/config.yaml"))
     | {
@@ -38,8 +38,6 @@ ARGUMENTS: Final = (
         },
     }
 )
-
-
 def run(arguments: Arguments) -> int:
     """Diagnose the campaign, write the result, and print the answer."""
     campaign = load(arguments.campaign)

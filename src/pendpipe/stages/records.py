@@ -9,7 +9,7 @@ import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from pendpipe.arguments import Arguments, load
+from pendpipe.arguments import Arguments, command, load
 from pendpipe.configuration.load import Campaign
 from pendpipe.errors import refuse_if
 from pendpipe.files import MADE_BY, MARK, read_json, write_whole
@@ -31,18 +31,20 @@ COLUMNS: Final = (*_WORDS[:4], *_NUMBERS, *_WORDS[4:])
 """T0_s is the period of small swings, Q that at `amplitude`, in `unit` (rad or m); a is in
 1/(unit s), b in 1/s, c in unit/s. Empty: there is no such number."""
 
-ARGUMENTS: Final = flags("--campaign", required=True) | {
-    "--out": {
-        "type": Path,
-        "nargs": "+",
-        "required": True,
-        "metavar": "FILE",
-        "help": "the table: .parquet, .csv, or both",
+
+@command(
+    flags("--campaign", required=True)
+    | {
+        "--out": {
+            "type": Path,
+            "nargs": "+",
+            "required": True,
+            "metavar": "FILE",
+            "help": "the table: .parquet, .csv, or both",
+        }
+        | OUTPUT
     }
-    | OUTPUT
-}
-
-
+)
 def run(arguments: Arguments) -> None:
     """Write the table in each form that is asked for."""
     for out in arguments.out:

@@ -56,15 +56,14 @@ def sensor_file(campaign: Campaign) -> Path:
 
 def read_results(campaign: Campaign) -> list[RecordResult]:
     """Read every record's fit, in the order of the table."""
-    return [_read(campaign.folder / record.record, record) for record in campaign.records]
-
-
-def _read(folder: Path, record: Record) -> RecordResult:
-    path = folder / "fit.json"
-    refused = read_json(path).get("refused")
-    return RecordResult(
-        record, None if refused else read_fit(path), read_json(folder / "calibration.json"), refused
-    )
+    results = []
+    for record in campaign.records:
+        folder = campaign.folder / record.record
+        refused = read_json(folder / "fit.json").get("refused")
+        fit = None if refused else read_fit(folder / "fit.json")
+        constant = read_json(folder / "calibration.json")
+        results.append(RecordResult(record, fit, constant, refused))
+    return results
 
 
 def placed(campaign: Campaign, results: Sequence[RecordResult]) -> list[RecordResult]:
@@ -117,8 +116,8 @@ def record_theory(campaign: Campaign, record: Record) -> dict[str, Any] | None:
     -------
     dict
         ``frequency_hz``, ``moment_of_inertia_kg_m2`` and ``restoring_torque_n_m_per_rad``
-        of any pendulum; with a sphere in the fluid also Eq. 16's Q_v, the steady Stokes
-        law's, a/delta and the lengthening of the period.
+        of any pendulum; with a sphere in the fluid also a/delta and the lengthening of the
+        period.
     """
     apparatus = campaign.configuration.apparatus
     if apparatus is None or campaign.geometry(record) is None:
@@ -132,10 +131,11 @@ def record_theory(campaign: Campaign, record: Record) -> dict[str, Any] | None:
     curve = _theory(apparatus, built.parts, built.fluid)
     if curve is None:
         return content
-    numbers = {name: float(values[0]) for name, values in curve.items()}
-    names = ("quality_factor_viscous_theory", "quality_factor_viscous_steady", "a_over_delta")
-    longer = {name: numbers[f"lengthening_{name}"] for name in ("buoyancy", "added_mass", "both")}
-    return content | {name: numbers[name] for name in names} | {"lengthening": longer}
+    names = ("buoyancy", "added_mass", "both")
+    return content | {
+        "a_over_delta": float(curve["a_over_delta"][0]),
+        "lengthening": {name: float(curve[f"lengthening_{name}"][0]) for name in names},
+    }
 
 
 def branch_curves(campaign: Campaign, branch: str) -> dict[str, list[float]] | None:

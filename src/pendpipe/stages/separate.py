@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
-from pendpipe.arguments import Arguments, load
+from pendpipe.arguments import Arguments, command, load
+from pendpipe.campaign.fit import coefficient, loss_torques
 from pendpipe.campaign.values import WORST_LINE, Values, campaign_values
 from pendpipe.configuration.load import Campaign
 from pendpipe.estimate import Z95, Estimate
@@ -15,11 +16,11 @@ from pendpipe.manifest import job
 from pendpipe.options import OUTPUT, flags
 from pendpipe.stages.results import RecordResult, campaign_data, read_results, record_files
 
-ARGUMENTS: Final = flags("--campaign", required=True) | {
-    "--out": {"type": Path, "required": True, "help": "the separation, JSON"} | OUTPUT
-}
 
-
+@command(
+    flags("--campaign", required=True)
+    | {"--out": {"type": Path, "required": True, "help": "the separation, JSON"} | OUTPUT}
+)
 def run(arguments: Arguments) -> None:
     """Separate."""
     campaign = load(arguments.campaign)
@@ -50,9 +51,9 @@ def separate_campaign(campaign: Campaign, out: Path) -> None:
         inertia = Estimate(values.design.reference_inertia, 0.0, "kg m^2")
         content["reference_inertia"] = inertia.as_json()
     if values and is_line(values):
-        content["hysteretic_coefficient"] = values.coefficient.as_json() | content["benchmark"]
+        content["hysteretic_coefficient"] = coefficient(values.fit).as_json() | content["benchmark"]
         content["loss_torque"] = {
-            name: each.as_json() for name, each in values.loss_torques.items()
+            name: each.as_json() for name, each in loss_torques(values.fit).items()
         }
     usable = [result for result in results if result.usable]
     spread = common_relative_sd(usable)
