@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from inspect import getdoc
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias, TypeVar
 
 from pendpipe.errors import InputError
 from pendpipe.files import check_output, is_stream, json_text, read_json, writing
@@ -69,16 +69,23 @@ class Command(NamedTuple):
             groups[heading].add_argument(name, **own)
 
 
-def command(arguments: Flags) -> Callable[[Callable[[Arguments], int | None]], Command]:
+COMMANDS: Final[dict[Any, Command]] = {}
+"""By the functions that run them, once their modules are imported."""
+_Run = TypeVar("_Run", bound=Callable[[Arguments], int | None])
+
+
+def command(arguments: Flags) -> Callable[[_Run], _Run]:
     """Make a function the command that takes these arguments.
 
     Its docstring is what ``--help`` says; that of its module, where it is called ``run``.
     """
-    return lambda run: Command(
-        (sys.modules[run.__module__].__doc__ if run.__name__ == "run" else getdoc(run)) or "",
-        arguments,
-        run,
-    )
+
+    def enter(run: _Run) -> _Run:
+        text = sys.modules[run.__module__].__doc__ if run.__name__ == "run" else getdoc(run)
+        COMMANDS[run] = Command(text or "", arguments, run)
+        return run
+
+    return enter
 
 
 @contextmanager

@@ -95,18 +95,19 @@ def _descriptions() -> dict[str, str]:
 
 def command_of(name: str) -> Any:
     """Find a command; None where there is none of the name."""
+    from pendpipe import arguments
+
     place = name.replace("-", "_")
     if name in SMALL:
-        return getattr(importlib.import_module("pendpipe.commands.small"), place)
+        small = importlib.import_module("pendpipe.commands.small")
+        return arguments.COMMANDS[getattr(small, place)]
     if name in COMMANDS:
-        return importlib.import_module(f"pendpipe.commands.{place}").run
+        return arguments.COMMANDS[importlib.import_module(f"pendpipe.commands.{place}").run]
     if name in STAGES:
-        return importlib.import_module(f"pendpipe.stages.{place}").run
+        return arguments.COMMANDS[importlib.import_module(f"pendpipe.stages.{place}").run]
     if (found := _added().get(name)) is not None:
-        from pendpipe.arguments import Command
-
         module = found.load()
-        return Command(module.__doc__ or "", {}, module.run, module.add_arguments)
+        return arguments.Command(module.__doc__ or "", {}, module.run, module.add_arguments)
     if name in IN_A_CLONE:
         raise InputError(
             name, "this command is not installed", f"in a clone of pendpipe: {IN_A_CLONE[name]}"
