@@ -135,6 +135,7 @@ def test_one_records_fault_is_its_own(
 ) -> None:
     """The others are done, the chunk's job fails, and the next ends what is left."""
     run(*ORDER[:3])
+    from pendpipe.arguments import COMMANDS
     from pendpipe.commands import fit
 
     real = fit.run
@@ -145,7 +146,7 @@ def test_one_records_fault_is_its_own(
         return real(arguments)  # type: ignore[arg-type]
 
     with monkeypatch.context() as patched:
-        patched.setattr(fit, "run", faulty)
+        patched.setitem(COMMANDS, real, COMMANDS[real]._replace(run=faulty))
         assert main(words("fit")) == 1
     assert "two: ZeroDivisionError: a fault of the program" in capsys.readouterr().err
     assert "Traceback" in Path("results/two/logs/fit.log").read_text(encoding="utf-8")
