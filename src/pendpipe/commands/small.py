@@ -26,8 +26,7 @@ from pendpipe.arguments import (
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.options import ALTERNATIVES, INPUT, OUTPUT, flags, flags_of, given
 from pendpipe.project import CONFIGURATION, PROJECT, SNAKEFILE
-from pendpipe.reading import inspect as describe
-from pendpipe.reading import read
+from pendpipe.reading import inspect as describe, read
 from pendpipe.simulation.verbs import simulate as simulated
 
 if TYPE_CHECKING:
