@@ -86,7 +86,7 @@ def test_a_class_is_listed_with_the_likeliest_first() -> None:
     )
     assert details(fitted)[1].startswith(
         "Drifting frequency 67 %, drifting clock 20 %, a restoring torque of unknown form < 1 %"
-        " (not told apart); rate = "
+        " (not told apart); of drifting clock: rate = "
     )
 
 
@@ -106,6 +106,27 @@ def test_the_likeliest_of_a_class_says_what_decides(
     fitted = replace(named(own), probability=0.2, indistinguishable=((rival, p),))
     assert details(fitted)[1].removesuffix(".").endswith(f"decide by: {tests[says]}")
     assert diagnosis(fitted).summary.decide_by == tests[says]
+
+
+@pytest.mark.parametrize(
+    ("rival", "p", "missing", "candidates"),
+    [
+        ("frequency-drift", 0.1, ("drifting clock (rate 1.66(11) × 10⁻⁴ s⁻¹)",), ""),
+        ("frequency-drift", 0.6, ("drifting frequency",), ""),
+        ("unnamed-restoring", 0.6, (), "described by a restoring torque of unknown form"),
+    ],
+)
+def test_numbers_are_those_of_what_is_named(
+    rival: str, p: float, missing: tuple[str, ...], candidates: str
+) -> None:
+    """Where a rival leads the class, the parameters of the effect that was fitted say nothing."""
+    fitted = replace(
+        named("clock-drift", rate=Estimate(1.66e-4, 1.1e-5, "1/s")),
+        probability=0.9 - p if p < 0.5 else 0.3,
+        indistinguishable=((rival, p),),
+    )
+    summary = diagnosis(fitted).summary
+    assert (summary.missing, summary.candidates) == (missing, candidates)
 
 
 def test_what_eq_8_describes_needs_no_effect() -> None:
@@ -245,7 +266,7 @@ def test_the_answer_has_a_dozen_lines_in_the_order_of_the_questions() -> None:
         "a.csv: missing: impulse, and a rest of unknown cause",
         "  how much it matters   the fit misses the readings by 200 µrad (noise 100 µrad): T0",
         "  where                 throughout the record; what is left lies in the phase (80 %)",
-        "  sure                  impulse 90 %; cycles left out of the fit are predicted better in",
+        "  how sure              impulse 90 %; cycles left out of the fit are predicted better in",
         "  looked for and not it second mode, ",
         "  decide by ",
         "  quote                 T0 1.098901(28) s",

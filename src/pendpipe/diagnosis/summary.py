@@ -182,7 +182,7 @@ class Summary:
         pairs = (
             ("how much it matters", self.matters),
             ("where", self.where),
-            ("sure", self.certainty),
+            ("how sure", self.certainty),
             ("candidates", self.candidates),
             ("looked for and not it", looked + (f" ({more} more: -v)" if more > 0 else "")),
             ("decide by", self.decide_by),
@@ -316,25 +316,35 @@ def class_of(effect: FoundEffect) -> list[tuple[float, str]]:
     return sorted([(effect.probability, own), *rivals], reverse=True)
 
 
+def _leader(effect: FoundEffect) -> tuple[float, str]:
+    """The most probable member of an effect's class: its probability and identifier."""
+    rivals = [(p, identifier) for identifier, p in effect.indistinguishable]
+    return max([(effect.probability, effect.identifier), *rivals], key=lambda member: member[0])
+
+
+def _is_described(effect: FoundEffect) -> bool:
+    """Whether a curve is more likely than not: it describes a cause, and names none."""
+    p, identifier = _leader(effect)
+    return identifier in UNNAMED and p >= NAMED
+
+
 def _named(effect: FoundEffect) -> str:
     """Name a cause, or its class, that is more likely than not; nothing otherwise."""
     members = class_of(effect)
-    if effect.kind == "unnamed" and effect.probability >= NAMED:
+    total = sum(p for p, _ in members)
+    if total < NAMED or _is_described(effect):
         return ""
     if members[0][0] >= NAMED:
-        text = members[0][1]
-        return f"{text} ({numbers})" if (numbers := numbers_of(effect)) else text
-    total = sum(p for p, _ in members)
-    if total < NAMED:
-        return ""
+        numbers = numbers_of(effect) if _leader(effect)[1] == effect.identifier else ""
+        return f"{members[0][1]} ({numbers})" if numbers else members[0][1]
     likely = [name for p, name in members if p >= 0.05]
     return f"{' or '.join(likely)} ({percent(min(total, 1.0))} together)"
 
 
 def _candidate(effect: FoundEffect) -> str:
     members = class_of(effect)
-    if effect.kind == "unnamed" and effect.probability >= NAMED:
-        return f"described by {effect.name}"
+    if _is_described(effect):
+        return f"described by {effect.name if effect.kind == 'unnamed' else members[0][1]}"
     likely = [f"{name} ({percent(p)})" for p, name in members if p >= CANDIDATE]
     return " or ".join(likely)
 
@@ -431,7 +441,7 @@ def _certainty(diagnosis: Diagnosis, named: Sequence[str], *, rest: bool) -> str
     sure = [
         f"{class_of(each)[0][1]} {percent(class_of(each)[0][0])}"
         for each in diagnosis.missing
-        if class_of(each)[0][0] >= NAMED and each.kind != "unnamed"
+        if class_of(each)[0][0] >= NAMED and not _is_described(each)
     ]
     text = ", ".join(sure) if sure else "nothing above 50 %" if not named else ""
     held = diagnosis.held_out
@@ -455,12 +465,6 @@ def _excluded(diagnosis: Diagnosis, found: Sequence[FoundEffect]) -> tuple[str, 
     left = [identifier for identifier, _ in diagnosis.scanned if identifier not in suspected]
     first = [each for each in _LOOKED_FOR if each in left]
     return tuple(name_of(each) for each in (*first, *(x for x in left if x not in first)))
-
-
-def _leader(effect: FoundEffect) -> tuple[float, str]:
-    """The most probable member of an effect's class: its probability and identifier."""
-    rivals = [(p, identifier) for identifier, p in effect.indistinguishable]
-    return max([(effect.probability, effect.identifier), *rivals], key=lambda member: member[0])
 
 
 def _test_of(effect: FoundEffect) -> str:
@@ -634,11 +638,12 @@ def _effect(effect: FoundEffect) -> str:
     # What a test has counted, its location says.
     wanted = known.get(effect.identifier, set(effect.parameters))
     members = class_of(effect)
+    whose = "" if _leader(effect)[1] == effect.identifier else f"of {effect.name}: "
     parts = [
         ", ".join(f"{name} {percent(p)}" for p, name in members)
         + (" (not told apart)" if len(members) > 1 else ""),
         *(
-            f"{name} = {each}"
+            f"{whose}{name} = {each}"
             for name, each in effect.parameters.items()
             if name in wanted and each.sd > 0.0
         ),
