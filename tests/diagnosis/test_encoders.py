@@ -410,3 +410,16 @@ def test_counts_are_lost_from_an_encoder_that_is_read_at_fixed_times(swing: Swin
     lost = names["count-slips"].parameters
     assert lost["step"].value == pytest.approx(count, rel=0.02)
     assert abs(lost["number"].value - len(rows)) <= 3
+
+
+@pytest.mark.parametrize(("readings", "kept"), [(19, 19), (20, 20), (21, 11), (40, 20), (41, 14)])
+def test_of_uneven_readings_every_second_or_third_is_kept_where_they_are_too_many(
+    readings: int, kept: int
+) -> None:
+    """Twice as many as of even ones, at most, and as many as that allows."""
+    time_s = np.arange(readings) ** 1.5
+    data = gather(
+        time_s, time_s, step=None, unit="rad", counts=False, period_s=10.0, noise_rms=0.1, most=10
+    )
+    assert np.array_equal(data.time_s, time_s[:: data.every])
+    assert len(data) == kept

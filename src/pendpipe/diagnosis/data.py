@@ -264,9 +264,9 @@ def gather(
         # Fourier transforms are ten times slower if the length has a large prime factor.
         fast = prev_fast_len(len(time_s))
         time_s, values = time_s[:fast], values[:fast]
-    elif len(time_s) > _MOST_UNEVEN * most:
+    else:
         # Means of unevenly spaced readings would mix phases: take every k-th reading.
-        every = len(time_s) // (_MOST_UNEVEN * most) + 1
+        every = math.ceil(len(time_s) / (_MOST_UNEVEN * most))
         time_s, values = time_s[::every], values[::every]
     return Data(
         time_s,
