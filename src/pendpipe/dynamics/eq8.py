@@ -1,6 +1,7 @@
 """Eq. 8: its constants, turning points and samples, and their derivatives by every parameter."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal, get_args
 
@@ -234,6 +235,15 @@ class Eq8:
                 [half_turn * by_delta, 0.0, 0.0, 0.0],
             ]
         )
+
+
+def share_of(parts: Mapping[str, float], b: float) -> float | None:
+    """The hysteretic share of b by its held parts (1/s, by name); None where it is free."""
+    if not parts or b <= 0.0:
+        return None
+    if "hysteretic" in parts:
+        return min(parts["hysteretic"] / b, 1.0)
+    return max(1.0 - parts["viscous"] / b, 0.0)
 
 
 @dataclass(frozen=True)

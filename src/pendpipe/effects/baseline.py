@@ -12,7 +12,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release
 from pendpipe.dynamics.any_law import Clock, Motion
-from pendpipe.dynamics.eq8 import BASELINE, OFFSET, OMEGA, SHARE, START, TIME, A, B, C
+from pendpipe.dynamics.eq8 import BASELINE, OFFSET, OMEGA, SHARE, START, TIME, A, B, C, share_of
 from pendpipe.effects.effect import Pendulum
 
 __all__ = [
@@ -89,10 +89,8 @@ def with_parts(value: FloatArray, parts: Mapping[str, float]) -> FloatArray:
     value = value.copy()
     least = sum(parts.values())
     value[B] = least if len(parts) == 2 else max(float(value[B]), least)
-    if value[B] > 0.0 and HYSTERETIC in parts:
-        value[SHARE] = parts[HYSTERETIC] / value[B]
-    elif value[B] > 0.0:
-        value[SHARE] = 1.0 - parts[VISCOUS] / value[B]
+    share = share_of(parts, float(value[B]))
+    value[SHARE] = value[SHARE] if share is None else share
     return value
 
 

@@ -278,10 +278,9 @@ def _limited(angle: FloatArray, low: float, high: float, width: float) -> FloatA
     """Cut off at two levels; smoothly over a width: y = L - w ln(1 + e^((L - x)/w))."""
     if width == 0.0:
         return np.clip(angle, low, high)
-    if np.isfinite(high):
-        angle = high - width * np.logaddexp(0.0, (high - angle) / width)
-    if np.isfinite(low):
-        angle = low + width * np.logaddexp(0.0, (angle - low) / width)
+    for level, side in ((high, width), (low, -width)):
+        if np.isfinite(level):
+            angle = level - side * np.logaddexp(0.0, (level - angle) / side)
     return angle
 
 

@@ -17,7 +17,7 @@ from pendpipe.analysis.fit.by_waveform import (
 )
 from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.goodness import LEVEL
-from pendpipe.analysis.fit.quality import period_of_frequency
+from pendpipe.analysis.fit.printed import period_text
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, read_fit
 from pendpipe.analysis.torque import may_be_sine, restoring_of, told_apart
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
@@ -26,7 +26,7 @@ from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.dynamics.eq8 import OMEGA, Restoring
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
-from pendpipe.quantities import after_number, pretty_unit, with_error
+from pendpipe.quantities import after_number, pretty_unit
 from pendpipe.recording import Recording
 
 __all__ = ["FitResult", "fit_recording", "read_fit"]
@@ -257,15 +257,10 @@ def _with_other_frequency(found: FitResult, as_spring: float) -> FitResult:
         return found
     other = Estimate(as_spring, own.sd * as_spring / own.value, own.unit)
     said = (
-        f"as a pendulum {_period(own)}; as a spring or torsion wheel {_period(other)}:"
+        f"as a pendulum {period_text(own)}; as a spring or torsion wheel {period_text(other)}:"
         " --restoring linear"
     )
     return replace(found, other_frequency=other, warnings=(*found.warnings, said))
-
-
-def _period(frequency: Estimate) -> str:
-    period = period_of_frequency(frequency)
-    return with_error(period.value, period.sd, "s", short=True)
 
 
 def _worst(result: FitResult) -> float:

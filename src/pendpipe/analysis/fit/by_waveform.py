@@ -24,7 +24,7 @@ from pendpipe.analysis.fit.least_squares import (
 )
 from pendpipe.analysis.fit.result import Baseline, DragForm, FitResult, result_of
 from pendpipe.analysis.fit.rounding import best_noise
-from pendpipe.analysis.fit.share import Shared, over_shares
+from pendpipe.analysis.fit.share import Marginal, marginalised
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
 from pendpipe.analysis.fit.waveform import DRIFT, Seen, Waveform
 from pendpipe.analysis.torque import Apart
@@ -68,7 +68,7 @@ class Fitted:
         Indices that were not fitted.
     start
         Where the search began.
-    shared
+    marginal
         The average over b's share there, where it was taken.
     """
 
@@ -76,7 +76,7 @@ class Fitted:
     minimum: Minimum
     held: tuple[int, ...]
     start: Start
-    shared: Shared | None = None
+    marginal: Marginal | None = None
 
     @property
     def value(self) -> FloatArray:
@@ -122,13 +122,13 @@ class Fitted:
         value[OMEGA] *= math.pi / apart.pace if linear else apart.pace / math.pi
         return self.rival(value, restoring=restoring)
 
-    def average(self, goodness: Goodness | None = None) -> Shared:
+    def marginal_for(self, goodness: Goodness | None = None) -> Marginal:
         """Over the share; for the noise that a test of fit found, and what enlarges it."""
         noise = goodness.noise_rms if goodness else self.noise_rms
         enlarged = goodness.enlarged if goodness else 1.0
-        if self.shared is not None and enlarged == 1.0 and noise < _SAME * self.noise_rms:
-            return self.shared
-        return over_shares(self.problem, self.value, self.held, noise, enlarged)
+        if self.marginal is not None and enlarged == 1.0 and noise < _SAME * self.noise_rms:
+            return self.marginal
+        return marginalised(self.problem, self.value, self.held, noise, enlarged)
 
     def chi2_between(self, first_s: float, last_s: float) -> float:
         """Chi^2 of the readings of a span."""
@@ -136,7 +136,7 @@ class Fitted:
         if first_s <= problem.time_s[0] and problem.time_s[-1] <= last_s:
             return self.chi2
         inside = (problem.time_s >= first_s) & (problem.time_s <= last_s)
-        return problem.unlikely(problem.residual(self.value)[inside])
+        return problem.deviance(problem.residual(self.value)[inside])
 
 
 class Forms(NamedTuple):
@@ -208,7 +208,7 @@ def fitted_waveform(
     drifting = _settled(_fitted(problem, found.value, held, start), samples)
     if not drifting.minimum.converged:
         return forms
-    sd = math.sqrt(drifting.average().covariance[DRIFT, DRIFT])
+    sd = math.sqrt(drifting.marginal_for().covariance[DRIFT, DRIFT])
     is_clear = abs(float(drifting.value[DRIFT])) > _CLEAR_DRIFT * sd
     return _with_drag(drifting, samples, points) if is_clear else forms
 
@@ -263,7 +263,7 @@ def _settled(found: Fitted, samples: Samples) -> Fitted:
             break
         else:
             found = _at_mean_share(found)
-            if settled := found.shared is not None:
+            if settled := found.marginal is not None:
                 continue
         found = _fitted(problem, found.value, found.held, found.start)
         settled = SHARE in found.held
@@ -273,17 +273,17 @@ def _settled(found: Fitted, samples: Samples) -> Fitted:
 def _at_mean_share(found: Fitted) -> Fitted:
     """Move to where the share is what the readings expect of it.
 
-    Without `shared` where chi^2 is not as expected there: it is to be minimised from there.
+    Without `marginal` where chi^2 is not as expected there: it is to be minimised from there.
     """
-    minimum, problem, shared = found.minimum, found.problem, found.average()
-    step = shared.value - minimum.value
-    if abs(step[SHARE]) <= _SETTLED * math.sqrt(shared.covariance[SHARE, SHARE]):
-        return replace(found, shared=shared)
+    minimum, problem, marginal = found.minimum, found.problem, found.marginal_for()
+    step = marginal.value - minimum.value
+    if abs(step[SHARE]) <= _SETTLED * math.sqrt(marginal.covariance[SHARE, SHARE]):
+        return replace(found, marginal=marginal)
     at = problem.bounds.clip(problem.curved(minimum.value, step))
-    expected = minimum.quadratic.chi2 + shared.chi2
+    expected = minimum.quadratic.chi2 + marginal.chi2
     settled = minimum.converged and abs(problem.chi2(at) - expected) < AS_PROMISED
     there = Minimum(at, minimum.quadratic._replace(chi2=expected), minimum.converged)
-    return replace(found, minimum=there, shared=shared if settled else None)
+    return replace(found, minimum=there, marginal=marginal if settled else None)
 
 
 def _judged(fitted: Fitted, samples: Samples, points: TurningPoints) -> Goodness:
@@ -382,8 +382,8 @@ def _numbers(
     fitted: Fitted, goodness: Goodness, start_s: float
 ) -> tuple[FloatArray, FloatArray, list[tuple[float, float]], float]:
     """The seven parameters, their covariance, the intervals of a, b, c, and the drift's error."""
-    value, held, shared = fitted.value, fitted.held, fitted.average(goodness)
-    own, gradient = shared.covariance, shared.gradient
+    value, held, marginal = fitted.value, fitted.held, fitted.marginal_for(goodness)
+    own, gradient = marginal.covariance, marginal.gradient
     normal = covariance(own, held)
     (amplitude, phase), jacobian = _first_turning_point(fitted, start_s)
     frequency = 0.5 * value[OMEGA] / math.pi

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Final
 
 from pendpipe.analysis.fit.result import PARTS, Baseline
-from pendpipe.dynamics.eq8 import OMEGA, PLACES, SHARE
+from pendpipe.dynamics.eq8 import OMEGA, PLACES, SHARE, share_of
 from pendpipe.errors import InputError, refuse_if
 
 _ENVELOPE: Final = ("a", "b", "c", "amplitude", "offset")
@@ -129,12 +129,3 @@ class Held:
     def share(self, b: float) -> float | None:
         """The hysteretic share of b where the user, or the baseline, tells it."""
         return 0.0 if self.baseline == "viscous" else share_of(self.parts, b)
-
-
-def share_of(parts: Mapping[str, float], b: float) -> float | None:
-    """The hysteretic share of b by held parts; None where it is free."""
-    if not parts or b <= 0.0:
-        return None
-    if "hysteretic" in parts:
-        return min(parts["hysteretic"] / b, 1.0)
-    return max(1.0 - parts["viscous"] / b, 0.0)

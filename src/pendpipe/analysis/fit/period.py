@@ -72,11 +72,9 @@ def fit_period(
         half, variance = np.full(len(shares), math.pi / omega), 0.0
     begun = middle - half * centre
     late = time - begun[0] - half[0] * half_cycles[0]
-    found, matrix = math.pi / half, np.empty((2, 2))
-    slope = -found[0] / half[0]
-    matrix[0, 0] = slope**2 * variance
-    matrix[0, 1] = matrix[1, 0] = -slope * centre[0] * variance
-    matrix[1, 1] = 1.0 / total + centre[0] ** 2 * variance
+    found = math.pi / half
+    by_half = np.array([-found[0] / half[0], -centre[0]])
+    matrix = variance * np.outer(by_half, by_half) + np.diag([0.0, 1.0 / total])
     chi2 = float(late**2 @ weight) / max(len(points) - 2, 1)
     if chi2 > _LOUD:
         matrix *= chi2

@@ -124,12 +124,16 @@ def _remarks(result: FitResult) -> Iterator[str]:
     if result.light != "green":
         yield result.light_reason
     if (other := result.other_frequency) is not None:
-        period = period_of_frequency(other)
-        text = with_error(period.value, period.sd, "s", short=True)
+        text = period_text(other)
         yield f"as a spring or torsion wheel (--restoring linear) its period would be {text}"
     if result.cuts:
         cuts = (f"{stretch(cut['start_s'], cut['stop_s'])}, {cut['reason']}" for cut in result.cuts)
         yield f"left out: {'; '.join(cuts)}"
+
+
+def period_text(frequency: Estimate) -> str:
+    """Print the period of a frequency."""
+    return f"{_number(period_of_frequency(frequency))} s"
 
 
 def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:

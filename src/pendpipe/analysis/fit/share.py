@@ -31,7 +31,7 @@ _RIDGE: Final = 1e-13
 _ZOOMS: Final = 12
 
 
-class Shared(NamedTuple):
+class Marginal(NamedTuple):
     """The parameters where b's hysteretic share is what the readings expect of it."""
 
     value: FloatArray
@@ -44,13 +44,13 @@ class Shared(NamedTuple):
     """Above the fit's."""
 
 
-def over_shares(
+def marginalised(
     problem: Waveform,
     value: FloatArray,
     held: Sequence[int],
     noise_rms: float,
     enlarged: float = 1.0,
-) -> Shared:
+) -> Marginal:
     """Average over the share: at each the others are at their bounded minimum.
 
     Parameters
@@ -62,7 +62,7 @@ def over_shares(
     noise_rms, enlarged
         The noise by which chi^2 counts, and by what its variance is enlarged.
     """
-    losses = _Losses(problem, value, held, noise_rms, enlarged)
+    losses = _LossProfile(problem, value, held, noise_rms, enlarged)
     low, high = (0.0, 0.5 * math.pi) if SHARE not in held else (0.0, 0.0)
     for _ in range(_ZOOMS):
         arc = np.linspace(low, high, _SHARES if low < high else 1)
@@ -83,7 +83,7 @@ def over_shares(
     return losses.averaged(share, losses.at(np.array([share])), shares, found, likely)
 
 
-class _AtShares(NamedTuple):
+class _Conditional(NamedTuple):
     """At k shares: steps of a, b, c to their bounded minimum, and what they leave."""
 
     step: FloatArray
@@ -100,13 +100,13 @@ class _AtShares(NamedTuple):
     """Of -chi^2/2, shape (k, 3)."""
 
 
-class _Losses:
+class _LossProfile:
     """Chi^2 as a function of the losses alone, all else at its minimum.
 
     Parameters
     ----------
     problem, value, held, noise_rms, enlarged
-        As for `over_shares`.
+        As for `marginalised`.
     """
 
     def __init__(
@@ -135,7 +135,7 @@ class _Losses:
         self.normal = ridge + normal[:4, :4] + normal[:4, rest] @ self.following
         self.gradient = gradient[:4] - normal[:4, rest] @ self.settling
 
-    def at(self, shares: FloatArray) -> _AtShares:
+    def at(self, shares: FloatArray) -> _Conditional:
         """Minimise over a, b, c within their bounds at each share."""
         value, change = self.value, np.zeros((len(shares), 4, 3))
         change[:, [0, 3], [A, C]] = 1.0
@@ -156,16 +156,16 @@ class _Losses:
         both = np.outer(self.free, self.free)
         spread = np.linalg.inv((normal + np.diag(whole)) * both + np.diag(1.0 - self.free)) * both
         left = gradient - np.einsum("kpq,kq->kp", normal, step)
-        return _AtShares(step, off, change, chi2, spread, left)
+        return _Conditional(step, off, change, chi2, spread, left)
 
     def averaged(
         self,
         share: float,
-        mean: _AtShares,
+        mean: _Conditional,
         shares: FloatArray,
-        found: _AtShares,
+        found: _Conditional,
         weight: FloatArray,
-    ) -> Shared:
+    ) -> Marginal:
         """All parameters at the mean share, and what theirs at the others scatter."""
         others = found.parts @ self.following.T + self.settling
         (own,), (settled,) = mean.step, mean.parts @ self.following.T + self.settling
@@ -182,7 +182,7 @@ class _Losses:
         off[:, :3], off[:, SHARE] = found.step - own, shares - share
         off[:, self.rest] = others - settled
         matrix += (weight[:, None] * off).T @ off
-        return Shared(best, matrix, gradient, float(mean.chi2[0]))
+        return Marginal(best, matrix, gradient, float(mean.chi2[0]))
 
 
 def _not_negative(

@@ -9,13 +9,24 @@ from typing import Final, Literal
 
 import numpy as np
 
-from pendpipe.analysis.fit.fixed import share_of
 from pendpipe.analysis.fit.least_squares import Bounds, Quadratic
 from pendpipe.analysis.fit.rounding import rounded
 from pendpipe.analysis.torque import TOP
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian
-from pendpipe.dynamics.eq8 import OFFSET, OMEGA, SHARE, START, TIME, A, B, C, Drag, Restoring
+from pendpipe.dynamics.eq8 import (
+    OFFSET,
+    OMEGA,
+    SHARE,
+    START,
+    TIME,
+    A,
+    B,
+    C,
+    Drag,
+    Restoring,
+    share_of,
+)
 
 Seen = Literal["angle", "rate", "position"]
 
@@ -44,11 +55,11 @@ class Waveform:
         The readings, shape (n,).
     noise_rms
         Standard deviation of one.
-    split
-        What is told of b's parts: ``"hysteretic"`` or ``"viscous"`` with its rate (1/s)
-        held fixed; empty when the share is marginalised.
+    held_parts
+        The parts of b that are held: ``"hysteretic"`` or ``"viscous"`` with its rate (1/s); empty
+        when the share is marginalised.
     step
-        The step of readings whose rounding is not random (see above); `noise_rms` is
+        The step of readings whose rounding is not random (see `rounding`); `noise_rms` is
         then that before the rounding. Zero: the readings scatter as `noise_rms` says.
     restoring, drag
         The law's restoring torque, and the form of its drag.
@@ -61,7 +72,7 @@ class Waveform:
     time_s: FloatArray
     values: FloatArray
     noise_rms: float
-    split: Mapping[str, float]
+    held_parts: Mapping[str, float]
     step: float = 0.0
     restoring: Restoring = "linear"
     drag: Drag = "energy"
@@ -70,15 +81,15 @@ class Waveform:
     _last: list[tuple[FloatArray, FloatArray, FloatArray]] = field(
         default_factory=list, init=False, repr=False, compare=False
     )
-    _left: list[tuple[FloatArray, FloatArray]] = field(
+    _residuals: list[tuple[FloatArray, FloatArray]] = field(
         default_factory=list, init=False, repr=False, compare=False
     )
 
     def model(self, value: FloatArray) -> tuple[Eq8, Release]:
         """What moves, and from where, for a set of parameters."""
         a, b, c, share, omega, angle, time, offset = value[:DRIFT].tolist()
-        told = share_of(self.split, b)
-        share = share if told is None else told
+        known = share_of(self.held_parts, b)
+        share = share if known is None else known
         law = Eq8(omega, a, share * b, (1.0 - share) * b, c, self.restoring, self.drag)
         return law, Release(time, angle, offset if self.seen == "angle" else 0.0)
 
@@ -102,9 +113,9 @@ class Waveform:
 
     def residual(self, value: FloatArray) -> FloatArray:
         """Readings less model, shape (n,)."""
-        if not (self._left and np.array_equal(self._left[0][0], value)):
-            self._left[:] = [(value.copy(), self._residual(value))]
-        return self._left[0][1]
+        if not (self._residuals and np.array_equal(self._residuals[0][0], value)):
+            self._residuals[:] = [(value.copy(), self._residual(value))]
+        return self._residuals[0][1]
 
     def _residual(self, value: FloatArray) -> FloatArray:
         model, release = self.model(value)
@@ -132,17 +143,16 @@ class Waveform:
     def chi2(self, value: FloatArray) -> float:
         """What `evaluate` has, without the derivatives."""
         try:
-            left = self.residual(value) if self._has_motion(value) else None
+            return self.deviance(self.residual(value)) if self._has_motion(value) else math.inf
         except ValueError:
-            left = None
-        return math.inf if left is None else self.unlikely(left)
+            return math.inf
 
-    def unlikely(self, left: FloatArray) -> float:
+    def deviance(self, residual: FloatArray) -> float:
         """Return -2 ln likelihood of some residuals."""
         if self.step == 0.0:
-            return float(left @ left) / self.noise_rms**2
-        unused = np.empty_like(left), np.empty_like(left)
-        return float(rounded(left, 0.5 * self.step, self.noise_rms, *unused))
+            return float(residual @ residual) / self.noise_rms**2
+        unused = np.empty_like(residual), np.empty_like(residual)
+        return float(rounded(residual, 0.5 * self.step, self.noise_rms, *unused))
 
     def read(self, value: FloatArray, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Readings of the law, shape (n,), and their derivatives by the engine's and the drift.
@@ -189,12 +199,12 @@ class Waveform:
             except ValueError:
                 # Overdamped: far from anything that turns.
                 return refused
-            left = self.values[piece] - reading
+            residual = self.values[piece] - reading
             if self.step == 0.0:
-                part, score, weighted = float(left @ left), left, jacobian
+                part, score, weighted = float(residual @ residual), residual, jacobian
             else:
-                score, weights = np.empty_like(left), np.empty_like(left)
-                part = rounded(left, 0.5 * self.step, self.noise_rms, score, weights)
+                score, weights = np.empty_like(residual), np.empty_like(residual)
+                part = rounded(residual, 0.5 * self.step, self.noise_rms, score, weights)
                 weighted = jacobian * weights[:, None]
             chi2 += part
             slope += jacobian.T @ score
@@ -220,14 +230,14 @@ class Waveform:
         return np.array([*law.rates(), law.angular_frequency, *start])
 
     def parts_of_b(self, share: float) -> tuple[float, float]:
-        """How a change of b goes to its parts: what is told of one leaves it to the other."""
-        if self.split:
-            share = float("viscous" in self.split)
+        """How a change of b goes to its parts: what is held of one leaves it to the other."""
+        if self.held_parts:
+            share = float("viscous" in self.held_parts)
         return share, 1.0 - share
 
     def change(self, value: FloatArray) -> FloatArray:
         """Derivative of the engine's parameters by ours, shape (9, 9)."""
-        by_share = 0.0 if self.split else float(value[B])
+        by_share = 0.0 if self.held_parts else float(value[B])
         change = np.zeros((9, 9))
         change[[0, 3, 4, 5, 6, 7, 8], [A, C, OMEGA, START, TIME, OFFSET, DRIFT]] = 1.0
         change[1:3, B] = self.parts_of_b(float(value[SHARE]))
