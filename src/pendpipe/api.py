@@ -51,7 +51,7 @@ _FIGURES_OF_A_DIAGNOSIS: Final = partial(importlib.import_module, "pendpipe.figu
 
 
 def find_free_decay(recording: Source) -> "FreeDecay":
-    """Find the part of a recording in which the pendulum swings by itself.
+    """Find the part of a recording in which the pendulum swings freely.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def fit(
     *,
     method: Annotated[
         Literal["auto", "waveform", "turning-points"] | None,
-        Option("waveform or turning-points to have only that one"),
+        Option("fit all readings, the turning points, or let the decay decide"),
     ] = "auto",
     restoring: Restoring = "auto",
     baseline: Baseline = "eq8",
@@ -106,14 +106,16 @@ def fit(
     clock_ppm: Annotated[
         float | None,
         Option(
-            "what the clock may be off by, parts per million: it enters the errors", "PPM", POSITIVE
+            "standard deviation of the clock's rate, parts per million: enters the errors",
+            "PPM",
+            POSITIVE,
         ),
     ] = None,
     scale_percent: Annotated[
         float | None,
         Option(
-            "what V/rad, or a camera's scale, may be off by, in percent: in the errors of a, c and"
-            " the amplitude",
+            "standard deviation of the scale (V/rad, a camera's), percent: enters the errors of a,"
+            " c and the amplitude",
             "P",
             Number(0, 100),
         ),
@@ -121,8 +123,8 @@ def fit(
     length_m: Annotated[
         float | None,
         Option(
-            "length of a simple pendulum, m, as 0.600 or 0.600(1): gives g, and angles of"
-            " positions",
+            "length of a simple pendulum, m, as 0.600 or 0.600(1): gives g, and converts positions"
+            " to angles",
             "M",
             measured_number,
             flag="--length",
@@ -131,7 +133,7 @@ def fit(
     period: Annotated[
         "float | Estimate | None",
         Option(
-            "period of small swings, s, as 1.42 or 1.42(1), where amplitudes alone are given",
+            "period of small swings, s, as 1.42 or 1.42(1), for a file of amplitudes",
             "S",
             measured_number,
             heading=ALTERNATIVES,
@@ -143,22 +145,22 @@ def fit(
     """Fit a, b, c, frequency and amplitude to the free decay of a recording.
 
     Eq. 8 is fitted to all readings of the decay: angles and their rates swing by sin x, unless x
-    alone fits better by a likelihood ratio of 1000, and the drag has the likelier form. Where the
-    law contradicts the decrement of the turning points, these are fitted instead, or the larger
-    amplitudes alone. ``fit.light`` is green, amber or red, and
+    fits better by a likelihood ratio of 1000; the drag has the more likely of two forms. If the
+    law contradicts the decrement of the turning points, these are fitted instead, or only the
+    larger amplitudes. ``fit.light`` is green, amber or red, and
     ``fit.light_reason`` explains it (docs/fit.md).
 
     Parameters
     ----------
     recording
         A recording, the path of its file, a DataFrame with ``time_s`` and ``angle_rad`` (or
-        ``angle_deg``, ``volts``, ``displacement_m``), or times in s with the angles behind them.
-        Amplitudes alone (a ruler's, or speeds at a gate), and turning points, are fitted by Eq. 14.
+        ``angle_deg``, ``volts``, ``displacement_m``), or times in s (then give `angle_rad`).
+        Amplitudes (from a ruler), speeds at a gate and turning points are fitted by Eq. 14.
     angle_rad
         The angles at these times, rad.
     {options}
     points
-        Turning points measured before (`turning_points`): they name the decay.
+        Turning points measured before (`turning_points`): they define the decay.
     name
         What to call the recording in messages; by default its path.
 
@@ -171,7 +173,7 @@ def fit(
     Raises
     ------
     InputError
-        If there is no free decay, or the search did not settle.
+        If there is no free decay, or the fit did not converge.
 
     Examples
     --------
@@ -179,7 +181,7 @@ def fit(
     >>> print(result)  # doctest: +ELLIPSIS
     rod-pendulum.csv: angle, 50 Hz, 59.6 s, 52 swings from 4.94° to 1.51°   GREEN
       period, small swings  1.1454712(28) s  (1.1459 s at 4.21°)
-      clock                 one off by 50 ppm adds 6 × 10⁻⁵ s, which is not in the error ...
+      clock                 an error of 50 ppm adds 6 × 10⁻⁵ s, not included here (--clock-ppm)
       Q                     162.27(20) at 4.21° (73.4 mrad), 138.39(12) at 2.73° (47.6 mrad), ...
       damping               to 1/e in 59.186(73) s, to 1/2 in 41.025(51) s, decrement ...
       energy goes to        62 % viscous or internal (b), 34 % dry friction (c), at 4.21°; no ...
@@ -222,7 +224,7 @@ def fit(
     refuse_if(
         period is not None,
         "period",
-        "the recording shows its own",
+        "the recording itself shows the period",
         "leave it out (--fix holds it)",
     )
     if points is None:
@@ -260,7 +262,10 @@ def _given_period(period: "float | Estimate | None") -> "Estimate | None":
         return None
     given = period if isinstance(period, Estimate) else Estimate(float(period), 0.0, "s")
     refuse_if(
-        not 0.0 < given.value < math.inf, "period", f"{given.value!r} is no period", "give seconds"
+        not 0.0 < given.value < math.inf,
+        "period",
+        f"{given.value!r} is not a period",
+        "give seconds",
     )
     return given
 
@@ -277,14 +282,17 @@ def diagnose(
         float,
         Option("false-alarm probability for a recording that lacks nothing", "P", Number(0, 1)),
     ] = 0.01,
-    seed: Annotated[int, Option("of the random draws", "N", NATURAL)] = 0,
-    together: Annotated[bool, Option("several recordings are of one pendulum")] = False,
+    seed: Annotated[int, Option("seed of the random draws", "N", NATURAL)] = 0,
+    together: Annotated[bool, Option("the recordings are of one pendulum")] = False,
     own: Annotated[
         Sequence[str],
-        Option("of several recordings: what each has of its own (a, b, c, frequency)", "NAME"),
+        Option(
+            "with several recordings: a parameter that each has of its own (a, b, c, frequency)",
+            "NAME",
+        ),
     ] = (),
     same_sensor: Annotated[
-        bool, Option("of several recordings: the sensor's errors are shared as well")
+        bool, Option("with several recordings: they share the sensor's errors")
     ] = False,
     points: "TurningPoints | None" = None,
     name: str | None = None,
@@ -300,15 +308,15 @@ def diagnose(
     ----------
     recording
         A recording, or the path of its file; or several of one pendulum (a list, or a mapping
-        of their names), which are then one measurement: physics shared, start and noise each
-        its own (docs/several.md).
+        of their names): they share the physics, and each has its own start and noise
+        (docs/several.md).
     {options}
     points
-        Turning points measured before (`turning_points`): they name the decay.
+        Turning points measured before (`turning_points`): they define the decay.
     name
         What to call the recording in messages; by default its path.
     provenance
-        Goes into the result.
+        Stored in the result.
     progress
         Receives a line for each step.
 
@@ -316,8 +324,7 @@ def diagnose(
     -------
     Diagnosis
         Prints as a dozen lines; ``.summary``, ``.verdict``, ``.effects``, ``.plot()``,
-        ``.to_dict()``,
-        ``.save(folder)``.
+        ``.to_dict()``, ``.save(folder)``.
 
     Raises
     ------
@@ -349,7 +356,7 @@ def diagnose(
             f"{len(recording)} recordings are given",
             "say together=True if they are of one pendulum; else diagnose them one by one",
         )
-        refuse_if(fixed, "fixed", "nothing is held in several recordings", "leave it out")
+        refuse_if(fixed, "fixed", "no parameter can be held in several recordings", "leave it out")
         if not isinstance(recording, Mapping):
             files = [
                 f"recording {number}" if isinstance(each, Recording) else each

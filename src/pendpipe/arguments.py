@@ -34,7 +34,7 @@ Arguments: TypeAlias = argparse.Namespace
 
 _FORCE: Final = {
     "action": "store_true",
-    "help": "replace files that pendpipe did not make (never an input, nor a raw file)",
+    "help": "replace files that pendpipe did not make (never an input or a raw file)",
 }
 
 
@@ -155,7 +155,7 @@ def _calibrated(path: Path | None) -> float | None:
     try:
         constant = read_json(path)["volts_per_radian"]
     except (KeyError, TypeError):
-        raise InputError(path, "this is no calibration", "run pendpipe calibrate") from None
+        raise InputError(path, "this is not a calibration", "run pendpipe calibrate") from None
     return None if constant is None else float(constant["value"])
 
 

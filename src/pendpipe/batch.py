@@ -53,9 +53,9 @@ def fit_many(
     examples/none.csv: there is no such file; check the path
     """
     own = {"name", "points"} & options.keys()
-    refuse_if(own, ", ".join(own), "it is for one recording", "leave it out")
+    refuse_if(own, ", ".join(own), "this option is for one recording", "leave it out")
     refuse_if(
-        processes is not None and processes < 1, "processes", f"{processes} is none", "give 1"
+        processes is not None and processes < 1, "processes", f"{processes} are too few", "give 1"
     )
     work = partial(_fit, options)
     return _with_bar(work, recordings, processes or cores(), progress)

@@ -138,7 +138,7 @@ def measured(text: str) -> Estimate:
     """
     found = re.fullmatch(r"\s*(\d*\.?\d*)(?:\((\d+\.?\d*)\))?\s*", text)
     if found is None or not any(map(str.isdigit, found[1])) or not float(found[1]) > 0.0:
-        raise ValueError(f"{text!r} is no positive number like 0.600 or 0.600(1)")
+        raise ValueError(f"{text!r} is not a positive number like 0.600 or 0.600(1)")
     digits, inside = found.groups()
     last = 10.0 ** -len(digits.partition(".")[2])
     sd = 0.0 if inside is None else float(inside) * (1.0 if "." in inside else last)

@@ -61,7 +61,7 @@ class Number:
     def problem(self, value: Any) -> str:
         """Say what is wrong with a value; nothing where it is one of these numbers."""
         if not isinstance(value, int if self.whole else int | float) or isinstance(value, bool):
-            return f"{value!r:.40} is no {'whole ' * self.whole}number"
+            return f"{value!r:.40} is not a {'whole ' * self.whole}number"
         if self.whole:
             return "" if value >= self.low else f"it must not be negative (it is {value})"
         if self.low < value < self.high:
@@ -125,8 +125,8 @@ SENSOR: Final = "the sensor's constant, V/rad"
 Restoring: TypeAlias = Annotated[
     Literal["auto", "linear", "sine"] | None,
     Option(
-        "the restoring torque: linear (a torsion wheel, a spring), sine (a pendulum), or auto, what"
-        " the recording asks for"
+        "the restoring torque: linear (a torsion wheel, a spring), sine (a pendulum), or auto"
+        " (the recording decides)"
     ),
 ]
 Baseline: TypeAlias = Annotated[
@@ -136,7 +136,7 @@ Baseline: TypeAlias = Annotated[
 Fixed: TypeAlias = Annotated[
     Mapping[str, float] | None,
     Option(
-        "hold a parameter, as for a prediction (a, b, c, frequency, amplitude, offset,"
+        "hold a parameter, to test a prediction (a, b, c, frequency, amplitude, offset,"
         " quality_factor_hysteretic, quality_factor_viscous)",
         "NAME=VALUE",
         flag="--fix",
@@ -252,17 +252,17 @@ def checked(verb: _Verb) -> _Verb:
 
 
 SHARED: Final[Flags] = {
-    "--verbose": {"help": "all that was found, how it was read, and harmless notes"} | _TRUE,
+    "--verbose": {"help": "all findings, how the file was read, and harmless notes"} | _TRUE,
     "-v": {"help": "the same", "dest": "verbose"} | _TRUE,
     "--json": {"help": "print one JSON object"} | _TRUE,
     "--calibration": {
-        "help": "the sensor's, from pendpipe calibrate",
+        "help": "the sensor's calibration, from pendpipe calibrate",
         "metavar": "JSON",
         "type": Path,
     }
     | INPUT,
     "--turning-points": {
-        "help": "of an earlier stage, with their cuts",
+        "help": "turning points turning points of an earlier stage, with their cuts",
         "metavar": "CSV",
         "type": Path,
     }
@@ -276,7 +276,7 @@ SHARED: Final[Flags] = {
     | INPUT,
     "--record": {"help": "the campaign's name for this record", "metavar": "NAME"},
     "--refused": {
-        "help": "write here why the record can't be used, and end with 0, instead of ending with 2",
+        "help": "if the record can't be used, write the reason here and end with 0, not 2",
         "metavar": "FILE",
         "type": Path,
     }

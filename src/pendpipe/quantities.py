@@ -127,7 +127,7 @@ def _minus(number: str) -> str:
 
 
 def in_columns(rows: Sequence[Sequence[str]]) -> str:
-    """Rows of words in columns as wide as they need, a line a row.
+    """Rows of words in columns as wide as they need, one line per row.
 
     >>> print(in_columns([("f", "0.5 Hz"), ("Q limit", "136")]))
     f        0.5 Hz

@@ -30,20 +30,20 @@ def read(
     unit: Annotated[
         str | None,
         Option(
-            "of the readings: rad, deg, V, mm, counts, ...; of both: ms:deg",
+            "unit of the readings: rad, deg, V, mm, counts, ...; ms:deg sets time and reading",
             "UNIT",
             heading=A_GUESS,
         ),
     ] = None,
     sample_rate: Annotated[
         float | None,
-        Option("samples a second, instead of the time column", "HZ", heading=A_GUESS),
+        Option("samples per second, instead of the time column", "HZ", heading=A_GUESS),
     ] = None,
     decimal: Annotated[
         str | None, Option("decimal sign, '.' or ','", "SIGN", heading=A_GUESS)
     ] = None,
     delimiter: Annotated[
-        str | None, Option("sign between cells, or tab, space", "SIGN", heading=A_GUESS)
+        str | None, Option("separator of the cells: a sign, tab or space", "SIGN", heading=A_GUESS)
     ] = None,
     volts_per_radian: VoltsPerRadian = None,
     start: Annotated[

@@ -203,7 +203,7 @@ class Recording:
             return float(text)
         except ValueError:
             raise InputError(
-                f"{place}, metadata {key}", f"'{text}' is no number", f"write '# {key}: 3.85'"
+                f"{place}, metadata {key}", f"'{text}' is not a number", f"write '# {key}: 3.85'"
             ) from None
 
     def between(self, start_s: float | None, stop_s: float | None) -> Self:
@@ -239,7 +239,7 @@ class Recording:
         Raises
         ------
         InputError
-            If the recording's own constant is no number, or 0; if it is an accelerometer's pull
+            If the recording's own constant is not a number, or 0; if it is an accelerometer's pull
             along the string, whose frequency is twice the pendulum's; or if the numbers are such as
             no pendulum gives, and their squares or their differences no computer holds.
         """
@@ -256,7 +256,7 @@ class Recording:
         refuse_if(
             abs(abs(float(np.median(values))) / _GRAVITY - 1.0) < 0.03,
             place,
-            "it hangs about 9.8 m/s^2: the pull along the string, which swings twice in a period",
+            "this is the pull along the string (about 9.8 m/s^2), which swings twice per period",
             "give the axis along the swing, or the gyroscope, with --column (--unit counts takes it"
             " as it stands)",
         )
@@ -450,7 +450,7 @@ def plain_lines(recording: Recording, *, original: bool = False) -> Iterator[str
 
 
 def write_plain(path: str | Path, recording: Recording, *, original: bool = False) -> None:
-    """Write the plain CSV form: metadata lines, header, a row a sample, all digits.
+    """Write the plain CSV form: metadata lines, header, one row per sample, all digits.
 
     An `original`, the recording of an instrument, is the user's own from then on.
     """
@@ -481,7 +481,7 @@ def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
     try:
         text = read_text(place, "check the path") if data is None else data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise InputError(place, "this is no UTF-8 text", "run pendpipe convert first") from None
+        raise InputError(place, "this is not UTF-8 text", "run pendpipe convert first") from None
     lines, notes = whole_lines(text)
     above = list(takewhile(lambda line: line.startswith("#") or not line.strip(), lines))
     first = len(above)
@@ -574,7 +574,7 @@ def _numbers(
                 float(cells[index])
             except ValueError:
                 raise InputError(
-                    where, f"'{cells[index].strip()}' is no number", "correct or drop the row"
+                    where, f"'{cells[index].strip()}' is not a number", "correct or drop the row"
                 ) from None
     raise InputError(place, "the rows can't be read as numbers", "run pendpipe inspect")
 

@@ -390,8 +390,8 @@ def test_faults_of_the_port_are_one_line_each(tmp_path: Path) -> None:
     plain = tmp_path / "file"
     plain.touch()
     assert "there is no such port" in refused(str(tmp_path / "ttyUSB9"))
-    assert "this is no serial port" in refused(str(plain))
-    assert "this is no port of an instrument" in refused("nonsense://x")
+    assert "this is not a serial port" in refused(str(plain))
+    assert "this is not the port of an instrument" in refused("nonsense://x")
     assert "nothing listens there" in refused("socket://127.0.0.1:1")
     with SimulatedDevice("di2108", swing) as device, Line(device.port, 4800):
         assert "the port is busy" in refused(device.port)
@@ -426,9 +426,9 @@ def test_nothing_but_a_port_is_opened_and_no_file_is_touched(port: str, tmp_path
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
-        ({"rate_hz": 0.0}, "rate_hz: 0 is no positive number"),
-        ({"rate_hz": math.nan}, "rate_hz: nan is no positive number"),
-        ({"duration_s": -1.0}, "duration_s: -1 is no positive number"),
+        ({"rate_hz": 0.0}, "rate_hz: 0 is not a positive number"),
+        ({"rate_hz": math.nan}, "rate_hz: nan is not a positive number"),
+        ({"duration_s": -1.0}, "duration_s: -1 is not a positive number"),
         ({"channels": (9,)}, "has no channel 9"),
         ({"channels": ()}, "has no channel none"),
     ],

@@ -153,7 +153,7 @@ def test_damage_in_a_raw_file_costs_a_gap_and_shifts_nothing(kind: str) -> None:
 def test_another_file_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "other.raw"
     path.write_bytes(content)
-    with pytest.raises(InputError, match=r"other\.raw: this is no raw recording"):
+    with pytest.raises(InputError, match=r"other\.raw: this is not a raw recording"):
         read_raw(path)
 
 
@@ -249,7 +249,7 @@ def test_a_full_disk_keeps_every_whole_frame() -> None:
     assert b"".join(pieces).startswith(raw.data)
     described = len(disk.content) - len(disk.content.partition(b"\n")[2])
     frame = len(Frame(b"D", 0.0, b"").packed())
-    # The description stands twice, the second time as a frame.
+    # The description is listed twice, the second time as a frame.
     assert len(raw.data) // 20 == (1200 - 2 * described + 1 - frame) // (frame + 20)
 
 
@@ -300,7 +300,7 @@ def test_a_killed_recorder_leaves_a_recording_that_opens(tmp_path: Path, answer_
         assert raw.stat().st_size - kept.damaged_bytes >= size - 5000
         recording = read_plain(out)
         assert np.abs(recording.values - slow(recording.time_s)).max() < 3e-4
-    with pytest.raises(InputError, match="no raw recording is overwritten"):
+    with pytest.raises(InputError, match="a raw recording is never overwritten"):
         acquire_simulated("di2108", slow, rate_hz=60.0, duration_s=1.0, raw_path=raw)
 
 
@@ -414,7 +414,7 @@ def test_attempts_without_a_scan_do_not_count(tmp_path: Path) -> None:
     (tmp_path / "empty.raw").touch()
     assert read_attempts(tmp_path.iterdir()) == []
     (tmp_path / "damaged.raw").write_bytes(b"x" * 500)
-    with pytest.raises(InputError, match=r"damaged\.raw: this is no raw recording"):
+    with pytest.raises(InputError, match=r"damaged\.raw: this is not a raw recording"):
         read_attempts(tmp_path.iterdir())
     sound = kept(tmp_path, 3, 10, None)
     assert [one.path for one in read_attempts(tmp_path.iterdir())] == [sound]

@@ -141,5 +141,5 @@ def test_where_nothing_is_recorded_there_is_nothing_to_view(
     answer_of: Any,
 ) -> None:
     assert answer_of(["acquire", "--view", "--serve", "di2108"], 2).err.startswith(
-        "pendpipe: --view: nothing is recorded here"
+        "pendpipe: --view: it shows a recording in progress"
     )

@@ -135,7 +135,7 @@ def test_damping_time_half_life_and_decrement_are_q_in_other_words() -> None:
 
 def test_what_the_clock_leaves_out_is_said_or_enters_the_error() -> None:
     fit = fitted(viscous(TIME))
-    assert "one off by 50 ppm adds" in str(fit)
+    assert "an error of 50 ppm adds" in str(fit)
     known = fitted(viscous(TIME), clock_ppm=20.0)
     both = math.hypot(fit["period"].sd, 2e-5 * PERIOD)
     assert known["period"].sd == pytest.approx(both, rel=1e-3)
@@ -410,7 +410,7 @@ def test_command_reads_degrees_and_decimal_commas(tmp_path: Path) -> None:
         ("angle_rad,current\n0,1\n", "column volts is needed"),
         ("phi,volts\n0,1\n", "angle_rad or angle_deg or displacement_m"),
         ("angle_rad,angle_deg,volts\n0,0,1\n", "exactly one"),
-        ("angle_rad,volts\n0,1\n1,two\n2,3\n", "line 3: volts 'two' is no number"),
+        ("angle_rad,volts\n0,1\n1,two\n2,3\n", "line 3: volts 'two' is not a number"),
         ("angle_rad,volts\n0,1\n1\n", "line 3: volts is missing"),
         ("angle_rad,volts\n0,1\n1,2\n2,3\n1e12,4\n", "line 5: angle_rad is 1e12"),
         ("angle_rad,volts\n0,1\n1,nan\n", "line 3: volts is nan"),

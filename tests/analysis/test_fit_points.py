@@ -443,13 +443,15 @@ def test_a_length_makes_angles_of_speeds_and_of_positions() -> None:
 
 
 def test_fewer_than_five_amplitudes_are_refused() -> None:
-    with pytest.raises(pp.InputError, match="4 amplitudes tell no a, b and c; give 5 or more"):
+    with pytest.raises(
+        pp.InputError, match="4 amplitudes are too few for a, b and c; give 5 or more"
+    ):
         pp.fit(TIME[:4], FALL[:4])
     assert pp.fit(TIME[:5], FALL[:5])["b"].value > 0.0
 
 
 def test_a_swing_is_not_asked_for_its_period() -> None:
-    with pytest.raises(pp.InputError, match="the recording shows its own"):
+    with pytest.raises(pp.InputError, match="the recording itself shows the period"):
         pp.fit("examples/rod-pendulum.csv", period=1.2)
 
 

@@ -293,7 +293,7 @@ def test_where_only_the_smallest_swings_contradict_the_larger_are_fitted() -> No
     values[late:] *= np.exp(-0.3 * (TIME[late:] - TIME[late]))
     result = fit_recording(recorded(values, TIME, 1e-5), restoring="linear")
     assert result.light == "amber"
-    assert "not that of the fitted law" in result.light_reason
+    assert "does not follow the fitted law" in result.light_reason
     assert result.cuts[-1]["stop_s"] == pytest.approx(TIME[-1])
     loss = [result.value(name) for name in "abc"] @ np.array([0.3**2, 0.3, 1.0])
     assert loss == pytest.approx(0.02 * 0.3 + 1e-3, rel=0.01)

@@ -93,13 +93,15 @@ def test_rest_pull_hold_and_stop_are_cut(amplitude: float, noise: float, step: f
     assert found.half_period_s == pytest.approx(PERIOD / 2, rel=0.02)
 
 
-@pytest.mark.parametrize("what", ["seen by an encoder, a row a count", "with a hole", "at 7 Hz"])
+@pytest.mark.parametrize(
+    "what", ["seen by an encoder, one row per count", "with a hole", "at 7 Hz"]
+)
 def test_uneven_and_sparse_samples_change_nothing(what: str) -> None:
     swing = oscillation(0.5, 0.02, 2e-3, 80.0)
     parts = [still(0.0, 5.0), ramp(0.0, 0.5, 1.5), swing, still(float(swing[-1]), 5.0)]
     even = recording(parts, step=0.004)
     keep = np.ones(len(even), dtype=bool)
-    if what == "seen by an encoder, a row a count":
+    if what == "seen by an encoder, one row per count":
         keep[1:] = np.diff(even.values) != 0
     elif what == "with a hole":
         keep[1500:1540] = False

@@ -405,7 +405,7 @@ def test_a_fit_that_did_not_settle_is_no_result(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(by_waveform, "minimise", hasty)
     time = np.arange(0.0, 200.0, 0.05)
     decay = recorded(sample(Eq8(OMEGA, 0.1, 0.0, 0.01), Release(-0.3, 0.1), time), time, 1e-5)
-    with pytest.raises(InputError, match="the waveform fit did not settle"):
+    with pytest.raises(InputError, match="the waveform fit did not converge"):
         fit_recording(decay, method="waveform")
     # Left to itself it takes what did settle.
     assert fit_recording(decay).method == "turning-points"

@@ -285,7 +285,7 @@ def test_one_row_a_count() -> None:
     points = find_turning_points(recording)
     angle, _, _ = errors(points, model, release)
     assert np.max(np.abs(angle[1:-1])) < 0.1 * step
-    assert any("one row a count" in note for note in points.notes)
+    assert any("one row per count" in note for note in points.notes)
 
 
 def test_the_table_is_read_as_it_was_written(tmp_path: Path) -> None:

@@ -371,7 +371,7 @@ def test_a_call_that_cannot_be_understood_is_one_line(
     words = ["challenge", "make", "d", "--sealed", "s", "--items", "x"]
     status, _, line = called(words, capsys)
     assert status == 2
-    assert "'x' is no whole number" in line
+    assert "'x' is not a whole number" in line
     assert line.count("\n") == 1
 
 

@@ -193,7 +193,7 @@ def test_a_place_that_cannot_be_written_is_the_users_fault(
     ("words", "about"),
     [
         (["turning-points", "f.csv"], "--out"),
-        (["diagnose", "f.csv", "--out", "d", "--level", "x"], "'x' is no number"),
+        (["diagnose", "f.csv", "--out", "d", "--level", "x"], "'x' is not a number"),
         (["diagnose", "f.csv", "--out", "d", "--level", "2"], "between 0 and 1"),
         (["fit", "f.csv", "--out", "o", "--start", "x"], "--start"),
     ],
@@ -282,9 +282,9 @@ def test_a_seed_below_zero_or_of_words_is_refused(
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("title: One\nseed: " + "7" * 5000, "this is no YAML"),
-        ("title: One\nseed: 1\ntitle: Two\n", "line 3: the key 'title' stands twice"),
-        ("diagnose: {enabled: true, seed: 1, enabled: false}\n", "'enabled' stands twice"),
+        ("title: One\nseed: " + "7" * 5000, "this is not YAML"),
+        ("title: One\nseed: 1\ntitle: Two\n", "line 3: the key 'title' is listed twice"),
+        ("diagnose: {enabled: true, seed: 1, enabled: false}\n", "'enabled' is listed twice"),
     ],
 )
 def test_a_configuration_is_refused_in_one_line(text: str, problem: str, tmp_path: Path) -> None:

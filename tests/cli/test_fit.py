@@ -94,7 +94,8 @@ def test_the_suffix_decides_the_form_of_the_table(
     # So it is with one file.
     assert cli.main(["fit", ROD, "--out", str(tmp_path / f"one.{form}")]) == 0
     assert (
-        "its form is unknown" in answer_of(["fit", ROD, "--out", str(tmp_path / "one.xyz")], 2).err
+        "its format is unknown"
+        in answer_of(["fit", ROD, "--out", str(tmp_path / "one.xyz")], 2).err
     )
 
 
@@ -148,7 +149,7 @@ def test_a_figure_is_drawn_where_it_is_asked_for(tmp_path: Path, answer_of: Any)
     assert "Amplitude" in text
     assert ">Q<" in text
     assert (
-        "form is unknown" in answer_of(["fit", ROD, "--figure", str(tmp_path / "rod.bmp")], 2).err
+        "format is unknown" in answer_of(["fit", ROD, "--figure", str(tmp_path / "rod.bmp")], 2).err
     )
     assert "--figure" in answer_of(["fit", ROD, STRING, "--figure", str(figure)], 2).err
 
@@ -175,7 +176,7 @@ def test_a_file_that_is_no_calibration_is_refused_in_a_line(
     said = answer_of(
         ["fit", str(recording), "--calibration", str(calibration)], 2
     ).err.splitlines()[-1]
-    assert said == f"pendpipe: {calibration}: this is no calibration; run pendpipe calibrate"
+    assert said == f"pendpipe: {calibration}: this is not a calibration; run pendpipe calibrate"
 
 
 # Every command that answers prints one JSON object where it is asked to.

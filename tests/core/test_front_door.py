@@ -286,7 +286,7 @@ FAULTS = {
     "missing column": ("time,volts\n0,1\n", "line 1", "time_s is missing"),
     "no reading": ("time_s,current\n0,1\n", "line 1", "exactly one of"),
     "two readings": ("time_s,volts,angle_rad\n0,1,2\n", "line 1", "exactly one of"),
-    "text in a number": ("time_s,volts\n0,1\n1,two\n", "line 3", "'two' is no number"),
+    "text in a number": ("time_s,volts\n0,1\n1,two\n", "line 3", "'two' is not a number"),
     "short row": ("time_s,volts\n0,1\n1\n", "line 3", "1 cells, not 2"),
     "time falls": ("time_s,volts\n0,1\n2,1\n1,1\n", "line 4", "does not rise"),
     "time repeats": ("time_s,volts\n0,1\n0,1\n", "line 3", "does not rise"),

@@ -263,11 +263,11 @@ def test_the_answer_has_a_dozen_lines_in_the_order_of_the_questions() -> None:
     lines = str(found).splitlines()
     assert len(lines) <= 12
     order = [
-        "a.csv: missing: impulse, and a rest of unknown cause",
+        "a.csv: missing: impulse, and a misfit of unknown cause",
         "  how much it matters   the fit misses the readings by 200 µrad (noise 100 µrad): T0",
         "  where                 throughout the record; what is left lies in the phase (80 %)",
         "  how sure              impulse 90 %; cycles left out of the fit are predicted better in",
-        "  looked for and not it second mode, ",
+        "  looked for, not found second mode, ",
         "  decide by ",
         "  quote                 T0 1.098901(28) s",
     ]

@@ -336,7 +336,7 @@ def test_a_zero_before_every_number_is_whole_or_its_own_column(tmp_path: Path) -
     [
         (spoil(7, "0.12,inf")(SPOILT), "line 8: 1 reading(s) that are infinite"),
         (spoil_two_in_a_hundred("nan,0.4")(SPOILT), "line 51: the time is missing or NaN"),
-        (spoil_two_in_a_hundred("{},oops")(SPOILT), "line 51: 'oops' is no number"),
+        (spoil_two_in_a_hundred("{},oops")(SPOILT), "line 51: 'oops' is not a number"),
         (text(np.where(TIME < 0.11, TIME, TIME - 0.05), ANGLE, digits=4), "the time falls (0.1 is"),
         (HEAD, "no block of rows with numbers"),
         ("", "the file is empty"),

@@ -114,14 +114,14 @@ REFUSED: dict[str, tuple[bytes, str, str]] = {
     "a cell of text": (
         workbook(run=[[t, "lost" if n % 42 == 41 else x] for n, (t, x) in enumerate(PAIRS)]),
         "a.xlsx",
-        "line 42: 'lost' is no number",
+        "line 42: 'lost' is not a number",
     ),
     "Capstone's project": (zipped(main__xml="<x/>"), "a.cap", "PASCO Capstone"),
     "Capstone's experiment": (zipped(a__cap="x", b__csv=PLAIN), "a.zip", "export its data"),
     "Capstone's data": (zipped(data___17__tmp="x", b__csv=PLAIN), "a.zip", "export its data"),
     "an archive without a table": (zipped(a__jpg="x"), "a.zip", "no CSV"),
     **{
-        f"a cut file of {name}": (pack(PLAIN.encode())[:-9], "a", "cut short|can't be unpacked")
+        f"a cut file of {name}": (pack(PLAIN.encode())[:-9], "a", "truncated|can't be unpacked")
         for name, pack in (("gzip", gzip.compress), ("bzip2", bz2.compress), ("xz", lzma.compress))
     },
 }  # fmt: skip
@@ -231,8 +231,8 @@ def test_arrays_are_counted_before_they_are_unpacked(tmp_path: Path, form: str) 
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ([b"t,theta\n", b"1," * 10_000_000, b"1\n", b"2," * 10_000_000, b"2\n"], "letters long"),
-        ([b"9" * 1_000_000] * 100, "letters long"),
+        ([b"t,theta\n", b"1," * 10_000_000, b"1\n", b"2," * 10_000_000, b"2\n"], "characters long"),
+        ([b"9" * 1_000_000] * 100, "characters long"),
         ([b"#\n" * 100_000] * 100, "no row of numbers|no block of rows"),
     ],
     ids=["columns", "line", "remarks"],

@@ -216,7 +216,7 @@ def test_a_di149_capture_is_scaled_and_timed(tmp_path: Path) -> None:
 def test_a_spoilt_scan_of_a_capture_is_named(tmp_path: Path) -> None:
     path = tmp_path / "a.cso"
     path.write_text("start\nsc 1 2\nsc 3\nsc 4 5\nstop\n")
-    with pytest.raises(InputError, match="line 3: 'sc 3' is no whole scan"):
+    with pytest.raises(InputError, match="line 3: 'sc 3' is not a complete scan"):
         read(path)
 
 
@@ -438,11 +438,11 @@ def test_a_form_that_is_only_read_is_refused_before_anything_is_done(
     name: str, tmp_path: Path, answer_of: Any
 ) -> None:
     assert (
-        "this form is read, not written"
+        "this format can be read, not written"
         in answer_of(["convert", str(tmp_path / "nowhere.csv"), str(tmp_path / name)], 2).err
     )
     call = ["acquire", "--device", "simulated:di2108", "--out", str(tmp_path / name)]
-    assert "this form is read, not written" in answer_of(call, 2).err
+    assert "this format can be read, not written" in answer_of(call, 2).err
 
 
 def test_convert_there_and_back(tmp_path: Path, answer_of: Any) -> None:

@@ -154,10 +154,10 @@ def test_refused_records_stand_with_their_line_and_without_folders(example: Any)
         "branch": "",
         "geometry": "",
         "temperature_c": None,
-        "refused": "/home/someone/lab/run.csv, line 7: 'x' is no number; mend the row",
+        "refused": "/home/someone/lab/run.csv, line 7: 'x' is not a number; mend the row",
     }
     text = rendered(example, content)
-    assert "run.csv, line 7: &#39;x&#39; is no number; mend the row" in text
+    assert "run.csv, line 7: &#39;x&#39; is not a number; mend the row" in text
     assert "someone" not in text
     assert re.search(r'class="light none"><span aria-hidden="true">○</span> refused', text)
     Outline(text)
@@ -327,7 +327,7 @@ def test_a_diagnosis_is_told_before_and_after_on_the_page(example: Any, tmp_path
     assert "not analysable" in section
     assert none not in section
     own = page[page.index('id="record-1"') : page.index('id="record-2"')]
-    for words in (f"missing: circular error in {found}", "looked for and not it", "second mode"):
+    for words in (f"missing: circular error in {found}", "looked for, not found", "second mode"):
         assert words in own
     cells = r'<th scope="row">b</th><td>0\.01230\(10\) s⁻¹</td><td>0\.01170\(10\) s⁻¹</td>'
     assert re.search(cells, own)

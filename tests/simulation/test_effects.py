@@ -187,7 +187,7 @@ def test_a_soft_limit_bends_either_side_alike(tmp_path: Path) -> None:
         (table("cubic-stiffness", k4=1.0), "unknown parameter 'k4'; known are k3"),
         (table("impulse", dv=1.0), "'time' is missing; add it, in s"),
         (table("quadratic-drag", a=-1.0), "'a' is -1; give a number from 0 to 100, in 1/"),
-        ('[[effects]]\nid = "cubic-stiffness"\nk3 = "x"\n', "'k3' is no number"),
+        ('[[effects]]\nid = "cubic-stiffness"\nk3 = "x"\n', "'k3' is not a number"),
         (table("missing-codes", number=3), "(missing-codes): there are no missing codes without"),
         (table("coulomb-friction", c=1.0), "the pendulum does not swing"),
     ],

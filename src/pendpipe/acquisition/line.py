@@ -52,9 +52,9 @@ def check_port(port: str) -> None:
     except (OSError, ValueError):
         mode = 0
     for wrong, problem in (
-        ("://" in port or port.startswith("simulated:"), "this is no port of an instrument"),
+        ("://" in port or port.startswith("simulated:"), "this is not the port of an instrument"),
         # Whether there is one at all is told by opening it.
-        (mode and not stat.S_ISCHR(mode), "this is no serial port"),
+        (mode and not stat.S_ISCHR(mode), "this is not a serial port"),
     ):
         refuse_if(wrong, port, problem, _FORMS if "port of" in problem else _LIST)
 
@@ -205,7 +205,7 @@ def cannot_open(port: str, fault: Exception) -> InputError:
         ),
         (windows == 87, "the port's driver refuses the setting of the line", no_setting),
         ("refused" in text, "nothing listens there", "start the device, or correct the address"),
-        ("configure port" in text, "this is no serial port", _LIST),
+        ("configure port" in text, "this is not a serial port", _LIST),
         (True, f"the port can't be opened ({text})", _LIST),
     )
     return next(InputError(port, problem, remedy) for met, problem, remedy in cases if met)

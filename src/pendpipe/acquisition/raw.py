@@ -333,7 +333,7 @@ def check_description(place: str, raw: RawRecording) -> None:
         *((key not in header, f"{key} is missing") for key in _NEEDED),
         *((not isinstance(header.get(key), str), f"{key} is no text") for key in _TEXTS),
         *(
-            # (A comparison with NaN is false; and True is no number.)
+            # (A comparison with NaN is false; and True is not a number.)
             (not (type(value) in (int, float) and low <= value <= high), f"{key} is {value!r:.40}")
             for key, (low, high) in _NUMBERS.items()
             for value in (header.get(key, low),)
@@ -364,7 +364,7 @@ def _header(place: str, content: bytes) -> tuple[Mapping[str, Any], int]:
     """Return the description, from the first line or its copy, and where the frames begin."""
     end = content.find(b"\n", 0, _LONGEST_HEADER)
     if end < 0 and (content.startswith(_BEGINNING) or _BEGINNING.startswith(content)):
-        problem = "this is no raw recording of pendpipe, or only its beginning"
+        problem = "this is not a raw recording of pendpipe, or only its beginning"
         raise NothingRecordedError(place, problem, "give another file")
     header = _description(content[: max(end, 0)])
     if header is None:
@@ -374,7 +374,7 @@ def _header(place: str, content: bytes) -> tuple[Mapping[str, Any], int]:
         problem = (
             "the description of the recording is damaged"
             if content.startswith(_BEGINNING)
-            else "this is no raw recording of pendpipe"
+            else "this is not a raw recording of pendpipe"
         )
         raise InputError(place, problem, "give another copy")
     refuse_if(

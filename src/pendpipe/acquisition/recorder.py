@@ -82,7 +82,7 @@ class AcquisitionRequest:
             refuse_if(
                 value is not None and not (math.isfinite(value) and value > 0),
                 name,
-                f"{value or 0:g} is no positive number",
+                f"{value or 0:g} is not a positive number",
                 "give one above 0",
             )
 
@@ -405,7 +405,7 @@ def _opened(raw_path: str | Path | None) -> AbstractContextManager[IO[bytes]]:
     except FileExistsError:
         raise InputError(
             path,
-            "there is such a file already, and no raw recording is overwritten",
+            "the file exists, and a raw recording is never overwritten",
             f"name another one (pendpipe acquire --recover {path} --out FILE.csv decodes it)",
         ) from None
     except OSError as fault:
@@ -425,8 +425,7 @@ def _cannot_write(place: str | Path, fault: OSError) -> InputError:
     return InputError(
         place,
         f"can't be written ({fault.strerror})",
-        "make room, or give another file; what was kept till then is opened with "
-        "pendpipe acquire --recover",
+        "make room, or give another file; pendpipe acquire --recover opens what was kept",
     )
 
 

@@ -19,15 +19,17 @@ def acquire(
         str | None,
         Option("the instrument: di154rs, di2108, ...; it is asked when not given", "MODEL"),
     ] = None,
-    rate_hz: Annotated[float, Option("scans a second", "HZ", flag="--rate")] = 60.0,
-    duration_s: Annotated[float, Option("length, s", "S", flag="--duration")] = 60.0,
+    rate_hz: Annotated[float, Option("scans per second", "HZ", flag="--rate")] = 60.0,
+    duration_s: Annotated[
+        float, Option("length of the recording, s", "S", flag="--duration")
+    ] = 60.0,
     range_volts: Annotated[float | None, Option("the signal stays within +-V", "V")] = None,
     reconnect_s: Annotated[
         float,
-        Option("how long a device that was unplugged is waited for, s", "S", flag="--reconnect"),
+        Option("how long to wait for an unplugged device, s", "S", flag="--reconnect"),
     ] = 30.0,
     clock_scale: Annotated[
-        float, Option("simulated seconds in a real one", "FACTOR", POSITIVE)
+        float, Option("simulated seconds per real second", "FACTOR", POSITIVE)
     ] = 1.0,
     volts_per_radian: Annotated[float | None, Option(SENSOR, "V")] = None,
     channel: int = 1,
@@ -35,7 +37,7 @@ def acquire(
     raw_path: str | Path | None = None,
     progress: "ProgressLine | None" = None,
 ) -> "Recording":
-    """Record from a Dataq instrument, or from a simulated one.
+    """Record from a DATAQ instrument, or from a simulated one.
 
     Parameters
     ----------
@@ -46,11 +48,12 @@ def acquire(
     channel
         As printed on the box.
     signal
-        What a simulated instrument reads: times in s to volts. By default a decaying pendulum.
+        What a simulated instrument reads: a function from times in s to volts. By default a
+        decaying pendulum.
     raw_path
-        A new file that keeps the bytes off the wire; in memory only where not given.
+        A new file for the bytes from the line; by default they stay in memory.
     progress
-        A display that is kept up to date.
+        A display to update.
 
     Returns
     -------

@@ -122,7 +122,7 @@ def _number(
         value = float(text)
     except ValueError:
         raise InputError(
-            where, f"{name} '{text}' is no number", "correct or drop the row"
+            where, f"{name} '{text}' is not a number", "correct or drop the row"
         ) from None
     # (Nor is NaN below it.)
     refuse_if(not abs(value) < _LARGEST, where, f"{name} is {text}", "correct or drop the row")

@@ -416,7 +416,7 @@ def _looked_at(
         recording.holds_amplitudes,
         place,
         "it holds amplitudes, not a recording of the swing",
-        "pendpipe fit takes Eq. 14 of them",
+        "use pendpipe fit, which fits Eq. 14 to them",
         NotAnalysableError,
     )
     # A whole recording is not copied.
@@ -427,7 +427,7 @@ def _looked_at(
         len(values) < 8 or span == 0.0,
         place,
         "the reading never changes" if len(values) >= 8 else f"{len(values)} samples only",
-        "is this the right channel?",
+        "choose another with --channel or --column",
         NotAnalysableError,
     )
     noise = noise_rms(values, recording.resolution, quieter=0.1)
@@ -641,12 +641,12 @@ def _refuse_without_fall(
     run: Run,
     least: float,
 ) -> None:
-    """Refuse motion that does not decay, or that hardly stands out of noise and step."""
+    """Refuse motion that does not decay, or that hardly exceeds noise and step."""
     swing = run.swing
     refuse_if(
         float(swing[:3].max()) < 3.0 * least and len(swing) < _MANY,
         place,
-        f"the largest half cycle ({swing[:3].max():.2g}) hardly stands out of noise and step"
+        f"the largest half cycle ({swing[:3].max():.2g}) hardly exceeds noise and step"
         f" ({least:.2g})",
         "record with a larger amplitude",
         NotAnalysableError,

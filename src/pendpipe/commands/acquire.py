@@ -51,11 +51,11 @@ from pendpipe.options import (
     )
     | {
         "--list": {"action": "store_true", "help": "list ports; with --port, identify its device"},
-        "--channel": {"type": int, "help": "as printed on the box (1)"},
+        "--channel": {"type": int, "help": "number of the channel, as printed on the box (1)"},
         "--samples": {
             "type": POSITIVE,
             "metavar": "N",
-            "help": "length, instead of --duration",
+            "help": "number of scans, instead of --duration",
         },
         "--out": {"metavar": "FILE", "help": "the recording; FILE.wdh for WinDaq"} | OUTPUTS,
         "--raw": {
@@ -69,18 +69,18 @@ from pendpipe.options import (
         },
         "--accept-short": {
             "action": "store_true",
-            "help": "take what was kept when the line was lost for the recording",
+            "help": "accept what was recorded before the line was lost",
         },
         "--view": {
             "action": "store_true",
-            "help": "show what is recorded on a page of this machine; its address is printed",
+            "help": "show the recording on a local web page; prints its address",
         },
         "--signal": {
             "metavar": "TOML",
-            "help": "with --serve: what it reads, as for pendpipe simulate",
+            "help": "with --serve: the signal, a model as for pendpipe simulate",
         }
         | INPUT,
-        "--link": {"choices": ("pty", "socket"), "help": "with --serve: on which line"},
+        "--link": {"choices": ("pty", "socket"), "help": "with --serve: the kind of line"},
     }
     | flags_of(verbs.acquire)
     | {
@@ -88,7 +88,7 @@ from pendpipe.options import (
             "type": NATURAL,
             "metavar": "N",
             "default": 0,
-            "help": "of the simulated noise (0)",
+            "help": "seed of the simulated noise (0)",
         }
     }
     | under(
@@ -110,7 +110,7 @@ def run(arguments: Arguments) -> None:
     refuse_if(
         arguments.view and not (arguments.port or arguments.device),
         "--view",
-        "nothing is recorded here that could be shown",
+        "it shows a recording in progress, and this call makes none",
         "give --port PORT or --device simulated:di2108",
     )
     kinds = {"serve": _serve, "caliper": _caliper, "campaign": _stage}
@@ -229,7 +229,7 @@ def _stage(arguments: Arguments) -> None:
         refuse_if(
             arguments.anew,
             f"record {record.record}",
-            "it comes from no instrument",
+            "its source is not an instrument",
             "leave out --anew",
         )
     run_stage(
@@ -263,7 +263,7 @@ def _from_device(arguments: Arguments, raw: Path) -> None:
     refuse_if(
         device and not device.startswith("simulated:"),
         f"--device {device}",
-        "only simulated devices go here",
+        "this option is for simulated devices",
         "give simulated:di2108",
     )
     options, simulated = given(arguments, verbs.acquire), None

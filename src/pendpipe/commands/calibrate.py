@@ -40,11 +40,14 @@ from pendpipe.stages.refusal import run_stage
             "metavar": "M",
             "help": "standard deviation of a displacement (the caliper's)",
         },
-        "--delimiter": {"metavar": "SIGN", "help": "between the cells; guessed from the header"},
+        "--delimiter": {
+            "metavar": "SIGN",
+            "help": "separator of the cells; guessed from the header",
+        },
         "--decimal": {
             "metavar": "SIGN",
             "choices": ".,",
-            "help": "decimal mark; guessed from the delimiter",
+            "help": "decimal sign; guessed from the delimiter",
         },
     }
     | under(

@@ -155,7 +155,9 @@ def _diagnose_several(arguments: Arguments) -> int:
         ("--fix", arguments.fixed),
         ("--turning-points", arguments.turning_points),
     ):
-        refuse_if(value, option, "it is for one recording", "give one FILE, or leave it out")
+        refuse_if(
+            value, option, "this option is for one recording", "give one FILE, or leave it out"
+        )
     refuse_if(
         arguments.record is None and not arguments.together,
         "diagnose",

@@ -1,9 +1,10 @@
 """Fit a, b, c, Q and the period of free decays.
 
-One FILE prints its fit; several print a table, a line a recording. --method waveform fits Eq. 8
+One FILE prints its fit; several print a table, one line per recording. --method waveform fits Eq. 8
 to all readings, --method turning-points fits Eq. 14 to the turning points (the paper's way), and
 auto, the default, takes the turning points, or the larger amplitudes alone, only where the
-waveform's law contradicts the decay. The restoring torque is sin x where the recording asks for it.
+waveform's law contradicts the decay. The restoring torque is sin x unless the recording
+rejects it.
 
 The light compares period and Q with those that the turning points show without a law. green: right
 to 5 %, and the misfit moves them by less than their errors. amber: it names what can't be quoted.
@@ -61,20 +62,26 @@ from pendpipe.report.class_table import Fitted, form_of, printed, together, writ
             "action": "store_true",
             "help": "print a law that contradicts the decay, status 0",
         },
-        "--wide": {"action": "store_true", "help": "of several FILEs: a, b, c in columns"},
+        "--wide": {"action": "store_true", "help": "with several FILEs: columns for a, b and c"},
     }
     | flags_of(api.fit)
     | {
         "--frequency": {
             "type": measured_number,
             "metavar": "HZ",
-            "help": "its inverse, Hz",
+            "help": "frequency of small swings, Hz, instead of the period",
             "heading": ALTERNATIVES,
         },
     }
     | flags("--verbose", "-v", "--json", "--turning-points", "--calibration")
     | flags("--record", "--refused")
-    | {"--seed": {"type": NATURAL, "metavar": "N", "help": "recorded only"}}
+    | {
+        "--seed": {
+            "type": NATURAL,
+            "metavar": "N",
+            "help": "stored with the result; a fit draws no random numbers",
+        }
+    }
 )
 def run(arguments: Arguments) -> int:
     """Fit and print; write what is asked for."""
@@ -91,7 +98,7 @@ def run(arguments: Arguments) -> int:
     refuse_if(
         figure and figure.suffix not in (".svg", ".png", ".pdf"),
         f"--figure {figure}",
-        "its form is unknown",
+        "its format is unknown",
         "end its name in .svg, .png or .pdf",
     )
     result = _fit(arguments)
@@ -181,7 +188,7 @@ def _table(arguments: Arguments) -> int:
         refuse_if(
             getattr(arguments, option),
             f"--{option.replace('_', '-')}",
-            "it belongs to one FILE",
+            "this option is for one FILE",
             "fit that file alone",
         )
     fits, found, notes = [], [], list[str]()

@@ -25,7 +25,7 @@ from pendpipe.version import __version__
 COMMANDS: Final = {
     "inspect": "what a recording holds: format, channels, rate, gaps, clipping",
     "convert": "any supported recording to the plain CSV form or to WinDaq (.wdh)",
-    "acquire": "record from a Dataq instrument, real or simulated",
+    "acquire": "record from a DATAQ instrument, real or simulated",
     "calibrate": "volts against angles to V/rad, with a linearity test",
     "simulate": "a recording from a described pendulum and measurement chain",
     "turning-points": "the turning points of one recording",
@@ -36,10 +36,10 @@ COMMANDS: Final = {
     "campaign": "run a campaign: every recording of a table, by Snakemake",
     "figures": "the figures 3 to 10 of a campaign",
     "report": "one self-contained page about a campaign",
-    "doctor": "what is wrong with a campaign's results, and what is safe to do",
+    "doctor": "what is wrong with a campaign's results, and how to repair it safely",
     "config": "check a configuration, or print its schema",
     "effects": "the catalogue of what may have been left out",
-    "completion": "what makes a shell complete commands, options and files",
+    "completion": "the completion script of a shell",
     "stage": "one stage of a chunk of a campaign's records, as a job of the workflow",
 }
 """The commands with the line that ``--help`` shows for each."""

@@ -32,7 +32,10 @@ class Sheet(NamedTuple):
             "help": "the page (FILE.html), or the table of several; - is standard output",
         }
         | OUTPUT,
-        "--no-diagnosis": {"action": "store_true", "help": "the fit alone, in a second"},
+        "--no-diagnosis": {
+            "action": "store_true",
+            "help": "leave out the diagnosis",
+        },
     }
     | flags("--calibration")
 )
@@ -44,7 +47,7 @@ def run(arguments: Arguments) -> int:
     refuse_if(
         out and not is_stream(out) and Path(out).suffix.lower() not in (".html", ".htm"),
         f"--out {out}",
-        "its form is unknown",
+        "its format is unknown",
         "end its name in .html",
     )
     if len(arguments.files) > 1:

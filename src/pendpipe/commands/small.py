@@ -132,11 +132,11 @@ def simulate(arguments: Arguments) -> None:
     tell_written(arguments.out, f"{len(recording)} samples in {recording.unit}")
 
 
-@command({"--list": {"action": "store_true", "help": "one line an effect"}} | flags("--json"))
+@command({"--list": {"action": "store_true", "help": "one line per effect"}} | flags("--json"))
 def effects(arguments: Arguments) -> None:
     """Print the catalogue of effects that may have been left out.
 
-    With --list, one line an effect: identifier, kind, name.
+    With --list, one line per effect: identifier, kind, name.
     """
     from pendpipe.effects.catalogue import CATALOGUE
 
@@ -388,7 +388,7 @@ def _profile(name: str) -> Path:
 
 @command({"shell": {"choices": ("bash", "zsh", "tcsh"), "help": "the shell to print it for"}})
 def completion(arguments: Arguments) -> None:
-    """Print what makes a shell complete commands, options and files.
+    """Print the completion script of a shell: for commands, options and files.
 
     Its place is ~/.local/share/bash-completion/completions/pendpipe for bash, a file _pendpipe in a
     folder of fpath for zsh, and a file that ~/.tcshrc sources for tcsh.

@@ -1,6 +1,6 @@
 """Measure the turning points of a free decay, each from all readings of its half cycle.
 
-The table has a row a turning point: its half cycle's number, time and signed angle about
+The table has one row per turning point: its half cycle's number, time and signed angle about
 the level, with standard deviations (independent of each other), and the level. The head
 holds what they share: noise, the level's standard deviation, the spans that were cut.
 """

@@ -1,7 +1,7 @@
 """A campaign: the configuration and its table of records, read, checked and held together.
 
-The table, ``config/records.tsv``, has a row a record. An error is one line with the nearest known
-name.
+The table, ``config/records.tsv``, has one row per record. An error is one line with the nearest
+known name.
 """
 
 import csv
@@ -97,7 +97,7 @@ def read_records(path: str | Path) -> list[Record]:
     Raises
     ------
     InputError
-        On a missing or unknown column, a name that is no name or stands twice, or text
+        On a missing or unknown column, a name that is no name or is listed twice, or text
         where a number belongs: file, line, what, remedy.
     """
     place = Path(path)
@@ -113,7 +113,7 @@ def read_records(path: str | Path) -> list[Record]:
         for wrong, problem, remedy in (
             (name not in names, f"the column '{name}' is missing", "separate columns by tabs"),
             (name not in COLUMNS, f"unknown column '{name}'", nearest(name, COLUMNS)),
-            (names.count(name) > 1, f"the column '{name}' stands twice", "drop one"),
+            (names.count(name) > 1, f"the column '{name}' is listed twice", "drop one"),
         ):
             refuse_if(wrong, f"{place}, line {rows[0][0]}", problem, remedy)
     records: list[Record] = []
@@ -128,11 +128,11 @@ def read_records(path: str | Path) -> list[Record]:
         )
         cells += [""] * (len(names) - len(cells))
         records.append(_record(where, dict(zip(names, cells, strict=True))))
-    refuse_if(not records, place, "the table has no records", "add a row a record")
+    refuse_if(not records, place, "the table has no records", "add one row per record")
     # Windows takes names that differ in case only for one.
     counts = Counter(entry.record.lower() for entry in records)
     again = [entry.record for entry in records if counts[entry.record.lower()] > 1]
-    refuse_if(again, place, f"the record '{''.join(again[-1:])}' stands twice", "rename one")
+    refuse_if(again, place, f"the record '{''.join(again[-1:])}' is listed twice", "rename one")
     return records
 
 
@@ -233,7 +233,7 @@ def read_configuration(path: str | Path) -> dict[str, Any]:
     refuse_if(
         not isinstance(content, dict),
         place,
-        "this is no mapping of keys to values",
+        "this is not a mapping of keys to values",
         "see config/README.md",
     )
     return dict(content)
@@ -244,14 +244,14 @@ def _yaml(place: Path, text: str) -> Any:
     import yaml
 
     class Loader(yaml.SafeLoader):
-        """Refuses a key that stands twice, where YAML takes the last."""
+        """Refuses a key that is listed twice, where YAML takes the last."""
 
         def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:
             keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
             for key, _ in reversed(node.value):
                 again = isinstance(key, yaml.ScalarNode) and keys.count(key.value) > 1
                 if again and key.value != "<<":
-                    twice = f"the key '{key.value:.60}' stands twice"
+                    twice = f"the key '{key.value:.60}' is listed twice"
                     raise yaml.MarkedYAMLError(problem=twice, problem_mark=key.start_mark)
             return super().construct_mapping(node, deep)
 
@@ -261,7 +261,7 @@ def _yaml(place: Path, text: str) -> Any:
         line = fault.problem_mark.line + 1 if fault.problem_mark else 1
         raise InputError(f"{place}, line {line}", fault.problem or "no YAML", "fix it") from None
     except (yaml.YAMLError, RecursionError, ValueError) as fault:  # a number of 5000 digits
-        raise InputError(place, f"this is no YAML ({fault})", "fix it") from None
+        raise InputError(place, f"this is not YAML ({fault})", "fix it") from None
 
 
 def load_campaign(content: Mapping[str, Any], place: str | Path) -> Campaign:
@@ -300,14 +300,14 @@ def _check_results(results: str, place: str | Path) -> None:
     refuse_if(
         not results.strip() or results.startswith("-"),
         where,
-        f"'{results}' is no folder",
+        f"'{results}' is not a folder",
         "name one, such as results",
     )
     wrong = next((sign for sign in results if sign in _NOT_IN_A_FOLDER or sign < " "), None)
     refuse_if(
         wrong is not None,
         where,
-        f"{wrong!r} can't stand in its name",
+        f"{wrong!r} can't be part of its name",
         "use letters, digits, spaces, / . _ -",
     )
     folder = Path(results)

@@ -107,10 +107,10 @@ def diagnose_several(
         If there is one recording only, a name is unknown, or one can't be analysed.
     """
     if len(recordings) < 2:
-        raise InputError("diagnose", "one recording is not several", "give at least two")
+        raise InputError("diagnose", "only one recording is given", "give at least two")
     if unknown := [name for name in own if name not in MAY_DIFFER]:
         remedy = f"known are {', '.join(MAY_DIFFER)}"
-        raise InputError("--own", f"'{unknown[0]}' is no parameter that can be shared", remedy)
+        raise InputError("--own", f"'{unknown[0]}' is not a parameter that can be shared", remedy)
     if "frequency" not in own:
         _check_one_pendulum(recordings, names)
     outcomes = []

@@ -184,7 +184,7 @@ class Summary:
             ("where", self.where),
             ("how sure", self.certainty),
             ("candidates", self.candidates),
-            ("looked for and not it", looked + (f" ({more} more: -v)" if more > 0 else "")),
+            ("looked for, not found", looked + (f" ({more} more: -v)" if more > 0 else "")),
             ("decide by", self.decide_by),
             ("quote", self.quote),
         )
@@ -279,7 +279,7 @@ def summarise(diagnosis: Diagnosis) -> Summary:
     rest = diagnosis.remainder is not None and diagnosis.remainder.systematic
     if names:
         headline = f"missing: {'; '.join(names)}"
-        headline += ", and a rest of unknown cause" if rest or len(named) < len(found) else ""
+        headline += ", and a misfit of unknown cause" if rest or len(named) < len(found) else ""
     else:
         headline = "something is missing, its cause is NOT known"
     unit = _unit(diagnosis)
@@ -422,7 +422,7 @@ def _matters(diagnosis: Diagnosis, changes: Sequence[Change], unit: str) -> str:
         f" {replace(each.with_missing, unit=each.fitted.unit).or_limit()}"
         for each in moved
     ]
-    what = ", ".join(words) if words else "it moves no number by two standard deviations"
+    what = ", ".join(words) if words else "no number moves by two standard deviations"
     return f"the fit misses the readings by {left} (noise {noise}): {what}"
 
 
@@ -443,7 +443,7 @@ def _certainty(diagnosis: Diagnosis, named: Sequence[str], *, rest: bool) -> str
         for each in diagnosis.missing
         if class_of(each)[0][0] >= NAMED and not _is_described(each)
     ]
-    text = ", ".join(sure) if sure else "nothing above 50 %" if not named else ""
+    text = ", ".join(sure) if sure else "no cause above 50 %" if not named else ""
     held = diagnosis.held_out
     if held is not None and math.isfinite(held.gain):
         well = held.better if held.gain >= 0.0 else held.blocks - held.better
@@ -508,7 +508,7 @@ def _quote(diagnosis: Diagnosis, changes: Sequence[Change]) -> str:
                 f" {short_size(e.amplitude_rad, unit)}"
                 for e in ends
             )
-            said.append(f"Q {values} (they need no law)")
+            said.append(f"Q {values} (independent of any law)")
     moved = [each.quantity for each in changes if each.quantity in "abc" and each.moved_sd > _MOVED]
     if moved:
         said.append(f"not {', '.join(moved)}")

@@ -32,7 +32,7 @@ def lobatto_integration(degree: int) -> FloatArray:
 
 
 def powers_of_chebyshev(count: int) -> FloatArray:
-    """Return the coefficients of the powers z^i in T_k, one row a k, for k < count."""
+    """Return the coefficients of the powers z^i in T_k, one row per k, for k < count."""
     rows = np.zeros((count, count))
     for k in range(count):
         rows[k, : k + 1] = chebyshev.cheb2poly(np.eye(count)[k, : k + 1])

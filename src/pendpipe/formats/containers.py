@@ -91,7 +91,12 @@ def _of_members(place: Path, members: dict[str, bytes], options: ReadOptions) ->
         for name, content in members.items()
     ]
     refuse_if(not tables and states and all(states), place, SETTINGS, WAVEFORM)
-    refuse_if(not tables, place, f"the archive has no table ({reason})", "give the file in it")
+    refuse_if(
+        not tables,
+        place,
+        f"the archive has no table ({reason})",
+        "unpack it, and give the file inside",
+    )
     best = max(tables, key=lambda name: len(tables[name].columns[0].values))
     return _noted(tables[best], f"'{best}' of the archive", [n for n in tables if n != best])
 

@@ -172,8 +172,8 @@ def _unpacked(place: Path, data: bytes) -> bytes:
     refuse_if(
         not unpacker.eof,
         place,
-        "what is packed in it is cut short, or too large",
-        "give the file in it",
+        "its packed content is truncated or too large",
+        "unpack it, and give the file inside",
     )
     return content
 
@@ -413,7 +413,7 @@ class Inspection:
     weak_guesses
         What was guessed on slender grounds, with the option that overrides it.
     why
-        How the file was understood, a line a decision.
+        How the file was understood, one line per decision.
     kind
         ``motion``, ``steady or driven``, ``amplitudes``, ``periods``, ``spectrum``, ``passages``.
     """
@@ -481,8 +481,8 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
     refuse_if(
         not choice.readings and not choice.channels,
         place,
-        "there is no column but the time",
-        "give readings beside it",
+        "there is no column besides the time",
+        "add the readings",
     )
     choice = replace(choice, readings=choice.readings or choice.channels[:1])
     column, weak = choice.readings[0], tuple[str, ...]()

@@ -512,7 +512,7 @@ class ReadOptions:
         refuse_if(
             self.start_s is not None and self.stop_s is not None and self.stop_s <= self.start_s,
             "--stop",
-            "it does not lie after --start",
+            "it is not after --start",
             "swap the two",
         )
 

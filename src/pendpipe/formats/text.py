@@ -112,8 +112,8 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
     refuse_if(
         len(lines[longest]) > _LONGEST_LINE,
         f"{place}, line {longest + 1}",
-        f"the line is {len(lines[longest])} letters long",
-        "give a table with a row a sample",
+        f"the line is {len(lines[longest])} characters long",
+        "give a table with one row per sample",
     )
     first: Exception | None = None
     some = lines
@@ -144,8 +144,8 @@ def _plain_table(
         refuse_if(
             first > _LONGEST_HEADER,
             place,
-            f"no row of numbers stands in the first {_LONGEST_HEADER} lines",
-            "give a table with a row a sample",
+            f"there is no row of numbers in the first {_LONGEST_HEADER} lines",
+            "give a table with one row per sample",
         )
         try:
             return _table(
@@ -169,7 +169,7 @@ def _with_decimals(
     refuse_if(
         len(ways) > 1,
         place,
-        "commas stand between its numbers and in them: a row may be "
+        "its commas are both separators and decimal signs: a row may be "
         + " or ".join(f"'{named(way, lines[first], layout)}'" for way in ways[:3]),
         "give --decimal , or --decimal . (or export it with semicolons)",
     )
@@ -243,7 +243,7 @@ def _size(cell: str, layout: Layout) -> tuple[int, int]:
 def _at_once(
     lines: Sequence[str], first: int, layout: Layout, header: Header
 ) -> list[Column] | None:
-    """Read a block of nothing but numbers, a row a line; ``None`` if it is anything else.
+    """Read a block of nothing but numbers, one row per line; ``None`` if it is anything else.
 
     (By NumPy: to import pandas takes longer than to read a million rows.)
     """
@@ -338,7 +338,7 @@ def _width(rows: Sequence[tuple[int, str, list[str]]], layout: Layout) -> int:
 def _text_of(cells: Sequence[str], layout: Layout) -> tuple[bool, bool]:
     """Say whether a line is text, as loggers print between the rows; and whether it begins so.
 
-    A row with one cell that is no number is a row with a fault.
+    A row with one cell that is not a number is a row with a fault.
     """
     if not re.match(r"[^\W\d]{3}|\D*$", cells[0]):
         return False, False
@@ -382,7 +382,7 @@ def _columns(
     refuse_if(
         len(spoilt) == len(columns),
         f"{place}, line {numbers[row]}",
-        f"'{text[:60]}' is no number",
+        f"'{text[:60]}' is not a number",
         "correct or drop the row",
     )
     garbled = {

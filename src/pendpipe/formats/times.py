@@ -72,7 +72,7 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     Raises
     ------
     InputError
-        When there is no time, or it falls, repeats or is no number: file, line, remedy.
+        When there is no time, or it falls, repeats or is not a number: file, line, remedy.
     """
     reading = choice.readings[0] if choice.readings else table.columns[0]
     every = np.arange(len(reading.values))
@@ -139,14 +139,16 @@ def _from_column(
 def refuse_text(table: Table, column: Column, remedy: str) -> None:
     """Refuse a column by the first of its cells that should be a number and is not."""
     row, text = next(iter(column.garbled.items()), (0, ""))
-    refuse_if(column.garbled, table.where(row), f"'{text}' is no number", remedy)
+    refuse_if(column.garbled, table.where(row), f"'{text}' is not a number", remedy)
 
 
 def _time_unit(column: Column, reading: Column, options: ReadOptions) -> tuple[float, str, bool]:
     """Find the seconds in one unit of the time column, the reason, and whether it is weak."""
     if (asked := options.units[0]) is not None:
         given = unit_of(asked) or Unit("none", 1.0)
-        refuse_if(given.kind != "time", "--unit", f"'{asked}' is no unit of time", "give s, ms, us")
+        refuse_if(
+            given.kind != "time", "--unit", f"'{asked}' is not a unit of time", "give s, ms, us"
+        )
         return given.factor, "", False
     values = column.values[np.isfinite(column.values)]
     largest = float(np.abs(values).max(initial=0.0))
@@ -454,7 +456,7 @@ def _frames(
 
 
 def _keep_last(choice: Choice, base: TimeBase) -> None:
-    """For one row a count: of the rows in one tick of the clock keep the last."""
+    """For one row per count: of the rows in one tick of the clock keep the last."""
     jumps = np.abs(np.diff(_values(choice, base)))
     count = float(np.median(jumps)) if len(jumps) and np.all(np.diff(base.time_s) >= 0) else 0.0
     if count > 0 and np.mean(np.abs(jumps - count) < 0.01 * count) >= 0.9:

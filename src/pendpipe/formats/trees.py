@@ -135,7 +135,7 @@ def _array_of_list(entries: list[Any]) -> Any:
 
 
 def _unfolded(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Give records that hold lists of records, as sensors send them in blocks, a row a sample."""
+    """Give records that hold lists of records (blocks of a sensor), one row per sample."""
     held = [
         k for k, v in records[0].items() if isinstance(v, list) and v and isinstance(v[0], dict)
     ]

@@ -68,7 +68,7 @@ def readings(table: Table, choice: Choice, options: ReadOptions, base: TimeBase)
     refuse_if(
         any(len(c.values) != rows for c in choice.readings) or base.rows.max(initial=0) >= rows,
         table.place,
-        "the columns are of unequal length",
+        "the columns have unequal lengths",
         "choose with --column",
     )
     time_s = np.full(rows, np.nan)
@@ -124,8 +124,7 @@ def _unit(
     refuse_if(
         written is not None or role in ("none", "time", "index"),
         table.place,
-        f"'{column.label}' ({column.unit or 'by its name'}) is nothing that a pendulum's"
-        " motion is read from",
+        f"'{column.label}' ({column.unit or 'by its name'}) does not describe a pendulum's motion",
         "choose another with --column, or give its unit with --unit",
     )
     finite = column.values[np.isfinite(column.values)]

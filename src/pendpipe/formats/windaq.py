@@ -161,7 +161,7 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
     refuse_if(
         not size,
         place,
-        "this is no WinDaq file, or its header is damaged (the mark 0x8001 is missing)",
+        "this is not a WinDaq file, or its header is damaged (the mark 0x8001 is missing)",
         f"open and save it in WinDaq, or {_ANOTHER_COPY}",
     )
     told = np.frombuffer(data, _HEADER, 1)[0]
@@ -431,7 +431,7 @@ def _checked(place: Path, data: bytes, header: WindaqHeader) -> tuple[WindaqHead
     refuse_if(
         header.data_bytes > 64 * max(available, 1) or available < unit,
         place,
-        f"the WinDaq header is damaged ({seen}) and nothing in the file tells the true one",
+        f"the WinDaq header is damaged ({seen}) and nothing in the file shows the true value",
         "repair it with the vendor's tool, or give another copy",
     )
     whole, left = available // unit * unit, available % unit
@@ -651,10 +651,13 @@ def read_capture(place: Path, data: bytes, options: ReadOptions) -> Table:
     if not width or len(rows[last]) != width:
         notes.append(f"the last scan (line {last}) is cut short and left out")
         del rows[last]
-    refuse_if(not rows, place, "there is no whole scan", "record again, or give another file")
+    refuse_if(not rows, place, "there is no complete scan", "record again, or give another file")
     odd = next((number for number, row in rows.items() if not row or len(row) != width), 0)
     refuse_if(
-        odd, f"{place}, line {odd}", f"'{scans.get(odd, '')[:60]}' is no whole scan", "drop the row"
+        odd,
+        f"{place}, line {odd}",
+        f"'{scans.get(odd, '')[:60]}' is not a complete scan",
+        "drop the row",
     )
     rates = re.findall(r"srate\s+(?:x([0-9a-f]{1,8})|(\d{1,9}))", text)
     srate = int(rates[-1][0] or rates[-1][1], 16 if rates[-1][0] else 10) if rates else 0

@@ -62,7 +62,7 @@ def on_grid(place: str | Path, recording: Recording) -> tuple[IntArray, float, _
         worst > _UNEVEN,
         place,
         f"the samples are not evenly spaced (by up to {worst:.2g} of an interval)",
-        "this form has no times: write OUT.csv instead",
+        "this format has no times: write OUT.csv instead",
     )
     pauses = [(int(at) + 1, float(steps[at]) - interval_s) for at in breaks]
     in_all_s = sum(missing for _, missing in pauses)
@@ -102,7 +102,7 @@ def check_name(path: str | Path) -> None:
     refuse_if(
         Path(path).suffix.lower() in _READ_ONLY,
         path,
-        "this form is read, not written",
+        "this format can be read, not written",
         "name it OUT.csv or OUT.wdh",
     )
 

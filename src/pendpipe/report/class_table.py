@@ -86,7 +86,7 @@ def form_of(out: str | Path) -> str:
     refuse_if(
         suffix not in FORMS,
         f"--out {out}",
-        "its form is unknown",
+        "its format is unknown",
         f"end its name in {', '.join(FORMS[:-1])} or {FORMS[-1]}",
     )
     return suffix
@@ -177,7 +177,7 @@ _REMARK: Final = 60
 
 
 def printed(fits: Sequence[Fitted], *, wide: bool = False) -> str:
-    """Lay a class out, a line a file, a unit a number; then what the files say together."""
+    """Lay a class out, one line per file; then what the files say together."""
     rows = [_row(each, wide=wide) for each in fits]
     head = (*HEAD[:-1], *(WIDE if wide else ()), HEAD[-1])
     kept = sum(each.fit is not None and each.fit.light != "red" for each in fits)

@@ -324,7 +324,7 @@ def _reference(comparison: Comparison) -> str:
 
 
 def as_text(rows: list[Row]) -> str:
-    """The same table for a terminal, a line a number."""
+    """The same table for a terminal, one line per number."""
     return in_columns(
         [
             (

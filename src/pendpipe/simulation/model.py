@@ -118,7 +118,7 @@ def read_model(source: str | Path | Mapping[str, Any]) -> Model:
         )
         return Model.model_validate(content)
     except tomllib.TOMLDecodeError as problem:
-        raise InputError(place, f"this is no TOML ({problem})", "correct it") from None
+        raise InputError(place, f"this is not TOML ({problem})", "correct it") from None
     except ValidationError as fault:
         raise as_input_error(place, fault, Model) from None
 
@@ -157,7 +157,7 @@ def _value(place: str, parameter: Parameter, table: Mapping[str, Any]) -> float:
     name = f"'{parameter.name}'"
     refuse_if(given is None, place, f"{name} is missing", f"add it{unit}")
     is_number = isinstance(given, int | float) and not isinstance(given, bool)
-    refuse_if(not is_number, place, f"{name} is no number", f"give a number{unit}")
+    refuse_if(not is_number, place, f"{name} is not a number", f"give a number{unit}")
     refuse_if(
         not parameter.low <= given <= parameter.high,
         place,

@@ -108,7 +108,7 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool, accept_sho
     refuse_if(
         record.channel and not record.channel.isdecimal(),
         f"record {record.record}",
-        f"channel '{record.channel}' is no number",
+        f"channel '{record.channel}' is not a number",
         "fix the cell",
     )
     channel = int(record.channel) if record.channel else None

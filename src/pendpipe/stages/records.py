@@ -1,4 +1,4 @@
-"""One table of a campaign's records: period, Q, losses, verdict or refusal, a row a record.
+"""One table of a campaign's records: period, Q, losses, verdict or refusal, one row per record.
 
 The ending of each FILE says its form: .parquet keeps numbers as they are, .csv is for spreadsheets.
 """
@@ -49,7 +49,7 @@ def run(arguments: Arguments) -> None:
     """Write the table in each form that is asked for."""
     for out in arguments.out:
         known = out.suffix in (".parquet", ".csv")
-        refuse_if(not known, out, "its form is unknown", "end its name in .parquet or .csv")
+        refuse_if(not known, out, "its format is unknown", "end its name in .parquet or .csv")
     campaign = load(arguments.campaign)
     names = ["fit.json", "calibration.json"]
     names += ["diagnosis/diagnosis.json"] if campaign.configuration.diagnose.enabled else []

@@ -126,7 +126,7 @@ class Driver(ABC):
         refuse_if(
             plain_name(found.model) != plain_name(self.model),
             self.line.port,
-            f"this is a {found.model}, no {self.model}",
+            f"this is a {found.model}, not a {self.model}",
             "give its --model",
         )
         return found

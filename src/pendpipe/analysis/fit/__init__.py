@@ -116,14 +116,14 @@ def fit_recording(
     refuse_if(
         lost,
         place,
-        f"no law follows it: the best misses the swings by {100.0 * missed:.0f} %",
+        f"no law describes it: the best fit misses the swings by {100.0 * missed:.0f} %",
         "cut bursts and jumps out with --start and --stop, or see pendpipe diagnose",
         NotAnalysableError,
     )
     refuse_if(
         not result.settled,
         place,
-        f"the {result.method.replace('-', ' ')} fit did not settle",
+        f"the {result.method.replace('-', ' ')} fit did not converge",
         "cut the recording with --start and --stop, or see pendpipe diagnose",
         NotAnalysableError,
     )
@@ -174,8 +174,10 @@ def _fit(
     if _stands(by_points):
         # What all readings deny is not quoted.
         kept = tuple(name for name in by_points.quotable if name in ("period", "Q"))
-        why = result.light_reason if result.settled else "their fit did not settle"
-        reason = f"don't quote a, b, c: of all readings {why}; period and Q are the turning points'"
+        why = result.light_reason if result.settled else "the fit did not converge"
+        reason = (
+            f"don't quote a, b, c: with all readings {why}; period and Q are the turning points'"
+        )
         return replace(_amber(by_points, reason), quotable=kept)
     for part in _larger_amplitudes(points):
         larger = _waveform(samples, part, baseline, fixed, restoring, length_m, stated=stated)
@@ -291,7 +293,7 @@ def _larger_amplitudes(points: TurningPoints) -> Iterator[TurningPoints]:
 def _of_larger(result: FitResult, points: TurningPoints, part: TurningPoints) -> FitResult:
     least = float(part.amplitude_rad[-1])
     size = f"{least:.2g} {pretty_unit(points.unit)}".rstrip()
-    below = f"below {size} the decay is not that of the fitted law"
+    below = f"below {size} the decay does not follow the fitted law"
     cut = {"start_s": float(part.time_s[-1]), "stop_s": points.stop_s, "reason": below}
-    why = f"don't quote any of it below {size}: the decay there is not that of the fitted law"
+    why = f"don't quote anything below {size}: there the decay does not follow the fitted law"
     return replace(_amber(result, why), cuts=(*result.cuts, cut))

@@ -137,7 +137,7 @@ def _points_of(recording: Recording, length_m: float | None, place: str | Path) 
     refuse_if(
         len(time) < _FEWEST,
         place,
-        f"{len(time)} amplitudes tell no a, b and c",
+        f"{len(time)} amplitudes are too few for a, b and c",
         f"give {_FEWEST} or more",
         NotAnalysableError,
     )

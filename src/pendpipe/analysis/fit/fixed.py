@@ -36,7 +36,9 @@ def parse_fixed(words: Iterable[str], baseline: Baseline = "eq8") -> dict[str, f
         try:
             fixed[name] = float(text)
         except ValueError:
-            raise InputError(f"--fix {word}", f"'{text}' is no number", "give a number") from None
+            raise InputError(
+                f"--fix {word}", f"'{text}' is not a number", "give a number"
+            ) from None
     check_fixed(fixed, baseline)
     return fixed
 

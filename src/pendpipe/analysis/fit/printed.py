@@ -156,7 +156,7 @@ def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
     by_clock = period.sd < _CLOCK * period.value and result.method != "amplitudes"
     if by_clock and result.clock_ppm is None:
         moved = with_error(float(f"{_CLOCK * period.value:.1g}"), None, "s")
-        yield "clock", f"one off by 50 ppm adds {moved}, which is not in the error (--clock-ppm)"
+        yield "clock", f"an error of 50 ppm adds {moved}, not included here (--clock-ppm)"
     if qualities:
         found = ", ".join(
             f"{_number(each.quality_factor)} at {size(each.amplitude_rad, unit)}"
@@ -196,7 +196,7 @@ def energy(result: FitResult) -> str:
     large = result.quality_factors[0]
     where = short_size(large.amplitude_rad, result.parameters["amplitude"].unit)
     if large.dominant is None:
-        return f"the decay does not tell drag, viscous loss and dry friction apart (at {where})"
+        return f"the decay does not separate drag, viscous loss and dry friction (at {where})"
     ordered = sorted(large.losses.items(), key=lambda pair: -pair[1].value)
     named = [
         f"{100.0 * share.value:.0f} % {SHORT[name]} ({name})"
@@ -327,8 +327,8 @@ def _arm(result: FitResult, omega: float, length: Estimate | None, gravity: floa
     refuse_if(
         unit not in ("rad", "m"),
         "--length" if length else "--gravity",
-        f"the amplitude is no angle (its unit is {unit})",
-        "give --unit, so that the correction for its size is known",
+        f"the amplitude is not an angle (its unit is {unit})",
+        "give --unit: its correction needs an angle",
     )
     if unit == "rad":
         return 1.0

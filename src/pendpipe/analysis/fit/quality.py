@@ -125,14 +125,14 @@ def quality_at(result: FitResult, amplitude_rad: float) -> Estimate:
     Raises
     ------
     InputError
-        If it is no amplitude; or, where no law describes the decay, none at which its
+        If it is not an amplitude; or, where no law describes the decay, none at which its
         turning points show Q.
     """
     unit = result.parameters["amplitude"].unit
     refuse_if(
         not (math.isfinite(amplitude_rad) and amplitude_rad > 0.0),
         "amplitude_rad",
-        f"{amplitude_rad!r} is no amplitude",
+        f"{amplitude_rad!r} is not an amplitude",
         f"give a positive number of {unit}",
     )
     if result.light != "red":

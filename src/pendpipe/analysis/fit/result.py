@@ -81,7 +81,7 @@ def drawer_of(drawn_by: Callable[[], Any] | None) -> Any:
     """Return the module that draws a result: that of the front door (`pendpipe.api`)."""
     if drawn_by is None:
         remedy = "take that of pendpipe.fit or pendpipe.diagnose, or a function of pendpipe.figures"
-        raise InputError("plot", "this result has nothing that draws it", remedy)
+        raise InputError("plot", "this result can't be drawn", remedy)
     return drawn_by()
 
 
@@ -316,11 +316,11 @@ class FitResult:
 
     def _readings(self, what: str) -> tuple[TurningPoints, Recording]:
         if self.points is None or self.decay is None:
-            raise InputError(what, "the readings are not with this fit", "fit the recording anew")
+            raise InputError(what, "this fit does not hold its readings", "fit the recording anew")
         return self.points, self.decay
 
     def to_frame(self) -> DataFrame:
-        """Return a table with a row a number: value, sd, low95, high95, unit.
+        """Return a table with one row per number: value, sd, low95, high95, unit.
 
         The parameters, the period of small swings, Q at the amplitude released (``Q``), at the
         three amplitudes (``Q(0.51 rad)``) and its limit (``Q limit``), and the shares of the
@@ -620,4 +620,4 @@ def read_fit(path: str | Path) -> FitResult:
     try:
         return FitResult.from_json(content)
     except (KeyError, TypeError) as fault:
-        raise InputError(path, f"this is no fit ({fault})", "run pendpipe fit") from None
+        raise InputError(path, f"this is not a fit ({fault})", "run pendpipe fit") from None

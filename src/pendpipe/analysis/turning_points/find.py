@@ -331,7 +331,7 @@ def find_turning_points(recording: Recording, place: str | Path = "recording") -
     NotAnalysableError
         Dead or saturated channel, amplitude below the noise, under three half cycles.
     InputError
-        A sensor constant that is no number.
+        A sensor constant that is not a number.
     """
     return turning_points_of(prepare(recording, place), place)
 
@@ -383,7 +383,7 @@ def _measured(samples: Samples, place: str | Path) -> TurningPoints:
     refuse_if(
         not np.any(_known(first)),
         place,
-        "too few readings in a cycle (four at least, twelve where they are uneven)",
+        "too few readings per cycle (at least four, or twelve if they are uneven)",
         "sample faster",
         NotAnalysableError,
     )
@@ -401,7 +401,7 @@ def _refuse_few(samples: Samples, found: int, place: str | Path) -> None:
     refuse_if(
         found < 3 and swing < 12.0 * noise,
         place,
-        f"no motion stands out of the noise ({noise:.3g} rms)",
+        f"no motion exceeds the noise ({noise:.3g} rms)",
         "raise the amplitude, or pick another channel",
         NotAnalysableError,
     )
@@ -673,6 +673,6 @@ def _notes(samples: Samples, keep: BoolArray, level: Level) -> tuple[str, ...]:
             samples.held,
             f"readings are held: {samples.held} row(s) repeat the one above, and are left out",
         ),
-        (samples.counts, "one row a count: the times of the counts are the data"),
+        (samples.counts, "one row per count: the times of the counts are the data"),
     )
     return tuple(note for is_so, note in notes if is_so)

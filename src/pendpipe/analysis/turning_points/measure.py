@@ -561,7 +561,7 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
     NotAnalysableError
         Dead or saturated channel, too few readings.
     InputError
-        A sensor constant that is no number.
+        A sensor constant that is not a number.
     """
     if recording.quantity == "volts":
         recording = recording.as_motion(place=place)

@@ -138,7 +138,7 @@ class TurningPoints:
 
 
 def write_turning_points(path: str | Path, points: TurningPoints) -> None:
-    """Write ``turning_points.csv``: lines ``# key: value``, header, a row a turning point."""
+    """Write ``turning_points.csv``: lines ``# key: value``, header, one row per turning point."""
     head = {
         "unit": points.unit,
         "frequency_hz": repr(points.apparent_frequency_hz),
@@ -188,7 +188,7 @@ def read_turning_points(path: str | Path) -> TurningPoints:
     refuse_if(
         start == len(lines) or lines[start].strip() != ",".join(COLUMNS),
         place,
-        "this is no table of turning points",
+        "this is not a table of turning points",
         "run pendpipe turning-points",
     )
     try:
