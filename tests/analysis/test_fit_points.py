@@ -456,7 +456,7 @@ def test_a_swing_is_not_asked_for_its_period() -> None:
 
 
 def test_amplitudes_are_no_recording_of_the_swing() -> None:
-    with pytest.raises(pp.InputError, match=r"pendpipe fit takes Eq\. 14 of them"):
+    with pytest.raises(pp.InputError, match=r"use pendpipe fit, which fits Eq\. 14 to them"):
         pp.diagnose(pp.Recording(time_s=TIME, angle_rad=FALL))
 
 

@@ -299,7 +299,7 @@ def test_where_only_the_smallest_swings_contradict_the_larger_are_fitted() -> No
     assert loss == pytest.approx(0.02 * 0.3 + 1e-3, rel=0.01)
     # A reading whose unit nobody knows has a size without one.
     bare = fit_recording(replace(recorded(values, TIME, 1e-5), quantity="reading"))
-    assert re.search(r"below 0\.\d+: the decay there is not that", bare.light_reason)
+    assert re.search(r"below 0\.\d+: there the decay does not follow", bare.light_reason)
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/recordings here")

@@ -184,7 +184,7 @@ def test_bursts_are_a_refusal_in_words() -> None:
     values = 0.5 * np.exp(-0.03 * time) * np.cos(8.44 * time)
     for start in np.flatnonzero(random.random(len(time)) < 0.02).tolist():
         values[start : start + 3] += 0.6 * random.standard_normal() * abs(values[start])
-    with pytest.raises(pp.InputError, match=r"no law follows it|no free decay|did not settle"):
+    with pytest.raises(pp.InputError, match=r"no law describes it|no free decay|did not converge"):
         pp.fit(pp.Recording(time, displacement_m=values))
 
 

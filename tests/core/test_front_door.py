@@ -410,5 +410,5 @@ def test_a_pull_along_the_string_is_refused(level: float, unit: str, refused: bo
     if not refused:
         assert phone.as_motion() is phone
         return
-    with pytest.raises(InputError, match=r"twice in a period; give the axis along the swing"):
+    with pytest.raises(InputError, match=r"twice per period; give the axis along the swing"):
         phone.as_motion()
