@@ -64,8 +64,7 @@ from pendpipe.options import (
         },
         "--anew": {
             "action": "store_true",
-            "help": "record even if there is a recording: of a campaign's record, or not yet"
-            " written",
+            "help": "record again, even if a recording exists or is not yet written as CSV",
         },
         "--accept-short": {
             "action": "store_true",
