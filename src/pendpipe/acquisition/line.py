@@ -51,19 +51,18 @@ def check_port(port: str) -> None:
         mode = Path(port).stat().st_mode
     except (OSError, ValueError):
         mode = 0
-    for wrong, problem in (
-        ("://" in port or port.startswith("simulated:"), "this is not the port of an instrument"),
-        # Whether there is one at all is told by opening it.
-        (mode and not stat.S_ISCHR(mode), "this is not a serial port"),
-    ):
-        refuse_if(wrong, port, problem, _FORMS if "port of" in problem else _LIST)
+    refuse_if(
+        "://" in port or port.startswith("simulated:"),
+        port,
+        "this is not the port of an instrument",
+        "give /dev/ttyUSB0, COM3, socket://HOST:PORT or rfc2217://HOST:PORT"
+        " (a simulated one has --device)",
+    )
+    # Whether there is one at all is told by opening it.
+    refuse_if(mode and not stat.S_ISCHR(mode), port, "this is not a serial port", _LIST)
 
 
 _LIST: Final = "pendpipe acquire --list shows the ports"
-_FORMS: Final = (
-    "give /dev/ttyUSB0, COM3, socket://HOST:PORT or rfc2217://HOST:PORT"
-    " (a simulated one has --device)"
-)
 
 
 class Line(AbstractContextManager["Line"]):
@@ -170,20 +169,7 @@ class Line(AbstractContextManager["Line"]):
             ) from None
 
 
-_ARE_BUSY: Final = (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK)
-_FORBID: Final = (errno.EACCES, errno.EPERM)
 _WINDOWS: Final = re.compile(r"Error\(\d+, .*, None, (\d+)\)")
-_BUSY: Final = (
-    "close the program that uses it: WinDaq, a terminal (lsof {port} names it; ModemManager tries"
-    " new ports for some seconds)"
-)
-_NO_DRIVER: Final = (
-    "unplug the device and plug it in again; dmesg, or the Device Manager, shows what became of it"
-)
-_FORBIDDEN: Final = (
-    "join its group, which ls -l {port} shows (sudo usermod -aG dialout $USER), log out and in"
-    " again; on macOS give the /dev/cu.* name"
-)
 
 
 def cannot_open(port: str, fault: Exception) -> InputError:
@@ -192,18 +178,32 @@ def cannot_open(port: str, fault: Exception) -> InputError:
     number = getattr(fault, "errno", None)
     found = _WINDOWS.search(text)
     windows = int(found[1]) if found else None
-    no_setting = "check that it is the instrument's port; if so, install its driver anew"
     cases = (
         (number == errno.ENOENT or windows in (2, 3), "there is no such port", _LIST),
-        # Windows lets one program at a time have a port, and calls that a denied access.
-        (number in _ARE_BUSY or windows in (5, 32), "the port is busy", _BUSY.format(port=port)),
-        (number in _FORBID, "you may not open the port", _FORBIDDEN.format(port=port)),
+        (
+            # Windows lets one program at a time have a port, and calls that a denied access.
+            number in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK) or windows in (5, 32),
+            "the port is busy",
+            f"close the program that uses it: WinDaq, a terminal (lsof {port} names it;"
+            " ModemManager tries new ports for some seconds)",
+        ),
+        (
+            number in (errno.EACCES, errno.EPERM),
+            "you may not open the port",
+            f"join its group, which ls -l {port} shows (sudo usermod -aG dialout $USER), log out"
+            " and in again; on macOS give the /dev/cu.* name",
+        ),
         (
             number in (errno.ENXIO, errno.ENODEV, errno.EIO) or windows in (31, 121, 433, 995),
             "no working device is behind the port",
-            _NO_DRIVER,
+            "unplug the device and plug it in again; dmesg, or the Device Manager, shows what"
+            " became of it",
         ),
-        (windows == 87, "the port's driver refuses the setting of the line", no_setting),
+        (
+            windows == 87,
+            "the port's driver refuses the setting of the line",
+            "check that it is the instrument's port; if so, install its driver anew",
+        ),
         ("refused" in text, "nothing listens there", "start the device, or correct the address"),
         ("configure port" in text, "this is not a serial port", _LIST),
         (True, f"the port can't be opened ({text})", _LIST),

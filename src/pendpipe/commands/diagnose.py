@@ -9,7 +9,6 @@ With --together several FILEs are recordings of one pendulum: physics shared, st
 its own (docs/several.md).
 """
 
-from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -130,23 +129,22 @@ def _diagnose(arguments: Arguments, fixed: dict[str, float]) -> int:
         if isinstance(error, DamagedError) or not Path(arguments.file).is_file():
             raise
         return _not_analysable(arguments, within_results(error, arguments.refused), provenance)
+    name = "standard input" if arguments.file == "-" else Path(arguments.file).name
+    return _report(arguments, outcome, name)
+
+
+def _report(arguments: Arguments, outcome: Diagnosis, name: str) -> int:
+    """Write the result, and print a dozen lines; with ``--verbose`` all that was found."""
     content = outcome.to_dict() if arguments.out is None else _write(arguments, outcome)
+    text = f"{name}: {content['statement']}"
     if arguments.verbose:
         for warning in content["warnings"]:
-            tell(f"{arguments.file}: {warning}")
-    name = "standard input" if arguments.file == "-" else Path(arguments.file).name
-    print_answer(arguments, content, _answer(arguments, content, name))
+            tell(f"{name}: {warning}")
+        excluded = "; ".join(f"{each['id']} {each['p_value']:.2g}" for each in content["excluded"])
+        looked = [f"Looked for, with p-values: {excluded}."] if excluded else []
+        text = "\n".join([text, "", content["details"], *looked])
+    print_answer(arguments, content, text)
     return FOUND if arguments.fail_on == content["verdict"] else 0
-
-
-def _answer(arguments: Arguments, content: Mapping[str, Any], name: str) -> str:
-    """Return the dozen lines; with ``--verbose`` all that was found behind them."""
-    statement = f"{name}: {content['statement']}"
-    if not arguments.verbose:
-        return statement
-    excluded = "; ".join(f"{each['id']} {each['p_value']:.2g}" for each in content["excluded"])
-    looked = [f"Looked for, with p-values: {excluded}."] if excluded else []
-    return "\n".join([statement, "", content["details"], *looked])
 
 
 def _diagnose_several(arguments: Arguments) -> int:
@@ -188,11 +186,7 @@ def _diagnose_several(arguments: Arguments) -> int:
         together=True,
         provenance={"inputs": made, "seed": arguments.seed, "level": arguments.level},
     )
-    if arguments.out is not None:
-        joint.save(arguments.out)
-    content, name = joint.to_dict(), f"{listed(list(recordings))} together"
-    print_answer(arguments, content, _answer(arguments, content, name))
-    return FOUND if arguments.fail_on == joint.verdict else 0
+    return _report(arguments, joint, f"{listed(list(recordings))} together")
 
 
 def _outcome(arguments: Arguments, recording: Any, **more: Any) -> Diagnosis:
@@ -204,9 +198,8 @@ def _outcome(arguments: Arguments, recording: Any, **more: Any) -> Diagnosis:
 
 def _write(arguments: Arguments, outcome: Diagnosis) -> dict[str, Any]:
     """Draw the figures that are wanted, then write the result that names them."""
-    wanted = arguments.figures == "all" or (
-        arguments.figures == "found" and outcome.verdict == "missing-physics"
-    )
+    asked = {"all": True, "found": outcome.verdict == "missing-physics", "none": False}
+    wanted = asked[arguments.figures] and not outcome.alone
     _remove_figures(arguments.out)
     if wanted:
         _print_progress("drawing")

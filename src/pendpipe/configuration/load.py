@@ -126,8 +126,7 @@ def read_records(path: str | Path) -> list[Record]:
             f"{len(cells)} cells, not {len(names)}",
             "separate by one tab",
         )
-        cells += [""] * (len(names) - len(cells))
-        records.append(_record(where, dict(zip(names, cells, strict=True))))
+        records.append(_record(where, dict(zip(names, cells, strict=False))))
     refuse_if(not records, place, "the table has no records", "add one row per record")
     # Windows takes names that differ in case only for one.
     counts = Counter(entry.record.lower() for entry in records)
@@ -138,13 +137,16 @@ def read_records(path: str | Path) -> list[Record]:
 
 def _record(where: str, row: dict[str, str]) -> Record:
     """Make a record from the cells of a row."""
-    _check_name(where, row["record"])
+    _check_name(where, row.get("record", ""))
     refuse_if(
-        not row["source"], where, "the source is blank", "write simulated, dataq:<port> or a file"
+        not row.get("source"),
+        where,
+        "the source is blank",
+        "write simulated, dataq:<port> or a file",
     )
-    if row.get("pendulum"):
-        _check_name(where, row["pendulum"])
     cells: dict[str, Any] = {name: text for name, text in row.items() if text}
+    if "pendulum" in cells:
+        _check_name(where, cells["pendulum"])
     try:
         return Record(**cells)
     except ValidationError as fault:
