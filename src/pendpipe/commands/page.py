@@ -76,9 +76,7 @@ def _sheet(arguments: Arguments, file: str) -> Sheet:
     result = replace(api.fit(recording, name=file), provenance=provenance, name=name)
     outcome = None
     if not arguments.no_diagnosis and result.method != "amplitudes":
-        from pendpipe.diagnosis.run import diagnose_recording
-
-        outcome = diagnose_recording(recording, place=file)
+        outcome = api.diagnose(recording, name=file)
     page = render_recording(name, recording, result, outcome)
     return Sheet(Fitted(file, replace(result, points=None, decay=None)), page, tuple(notes))
 

@@ -196,6 +196,12 @@ class Campaign:
         return Path(self.configuration.results)
 
     @property
+    def sensor(self) -> Path | None:
+        """The result of the caliper run; None where the campaign has no such run."""
+        there = self.configuration.calibration is not None
+        return self.folder / "calibration" / "sensor.json" if there else None
+
+    @property
     def selected(self) -> tuple[Record, ...]:
         """The records to run: all, or those that the configuration names in ``only``."""
         return tuple(map(self.record, self.configuration.only)) or self.records

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -20,6 +20,7 @@ from typing import Any, Final, NamedTuple
 
 from pendpipe.configuration import jobs
 from pendpipe.configuration.load import Campaign, Record
+from pendpipe.configuration.models import Configuration
 from pendpipe.manifest import (
     Findings,
     Manifest,
@@ -56,11 +57,14 @@ class Stage:
         The files of a record's folder that it reads.
     output
         The file there that the following stages read.
+    options
+        Options of its command that are no files.
     """
 
     name: str
     inputs: tuple[str, ...]
     output: str
+    options: Callable[[Configuration, Record], dict[str, Any]] = lambda _settings, _record: {}
 
     @property
     def module(self) -> str:
@@ -76,13 +80,34 @@ STAGES: Final = {
     stage.name: stage
     for stage in (
         Stage("acquire", (), "recording.csv"),
-        Stage("calibrate", ("recording.csv",), "calibration.json"),
+        Stage(
+            "calibrate",
+            ("recording.csv",),
+            "calibration.json",
+            lambda _, record: {"volts-per-radian": record.volts_per_radian},
+        ),
         Stage("turning-points", ("recording.csv", "calibration.json"), "turning_points.csv"),
-        Stage("fit", ("recording.csv", "calibration.json", "turning_points.csv"), "fit.json"),
+        Stage(
+            "fit",
+            ("recording.csv", "calibration.json", "turning_points.csv"),
+            "fit.json",
+            lambda settings, record: {
+                "method": settings.fit.method,
+                "restoring": record.restoring or None,
+                "seed": settings.seed,
+            },
+        ),
         Stage(
             "diagnose",
             ("recording.csv", "calibration.json", "turning_points.csv"),
             "diagnosis/diagnosis.json",
+            lambda settings, record: {
+                "baseline": settings.diagnose.baseline,
+                "level": settings.diagnose.level,
+                "figures": settings.diagnose.figures,
+                "restoring": "linear" if record.restoring == "linear" else None,
+                "seed": settings.seed,
+            },
         ),
     )
 }
@@ -131,60 +156,33 @@ def split(records: dict[str, Record], batch: int) -> dict[str, tuple[Record, ...
 def call(campaign: Campaign, stage: Stage, record: Record, configuration: str) -> list[str]:
     """Return the words of the command that does a stage for one record."""
     home = campaign.folder / record.record
-    files: dict[str, Any] = {}
+    files: dict[str, Any] = {
+        Path(name).stem.replace("_", "-"): home / name for name in stage.inputs[1:]
+    }
     if stage.name == "acquire":
         files["campaign"] = configuration
     if stage.name == "calibrate":
-        files["sensor"] = _sensor(campaign)
-    if "calibration.json" in stage.inputs:
-        files["calibration"] = home / "calibration.json"
-    if "turning_points.csv" in stage.inputs:
-        files["turning-points"] = home / "turning_points.csv"
+        files["sensor"] = campaign.sensor
     out = home / stage.output
     files["out"] = out.parent if stage.name == "diagnose" else out
     files["refused"] = None if campaign.configuration.strict else home / "refused.json"
-    options = files | _options(campaign, stage, record) | {"record": record.record}
+    options = files | stage.options(campaign.configuration, record) | {"record": record.record}
     given = [f"--{name}={value}" for name, value in options.items() if value is not None]
     return [stage.name, *(str(home / name) for name in stage.inputs[:1]), *given]
-
-
-def _options(campaign: Campaign, stage: Stage, record: Record) -> dict[str, Any]:
-    """The options of a stage's command that are no files."""
-    settings = campaign.configuration
-    if stage.name == "calibrate":
-        return {"volts-per-radian": record.volts_per_radian}
-    if stage.name == "fit":
-        restoring = record.restoring or None
-        return {"method": settings.fit.method, "restoring": restoring, "seed": settings.seed}
-    if stage.name == "diagnose":
-        asked = settings.diagnose
-        return {
-            "baseline": asked.baseline,
-            "level": asked.level,
-            "figures": asked.figures,
-            "restoring": "linear" if record.restoring == "linear" else None,
-            "seed": settings.seed,
-        }
-    return {}
-
-
-def _sensor(campaign: Campaign) -> Path | None:
-    if campaign.configuration.calibration is None:
-        return None
-    return campaign.folder / "calibration" / "sensor.json"
 
 
 def settings(campaign: Campaign, stage: Stage, record: Record, made: Manifest | None = None) -> str:
     """What the configuration says of one record's stage: a part of its key."""
     if stage.name == "acquire":
         return jobs.acquisition(campaign, record, made)
-    return f"{record.record} {campaign.configuration.strict} {_options(campaign, stage, record)}"
+    options = stage.options(campaign.configuration, record)
+    return f"{record.record} {campaign.configuration.strict} {options}"
 
 
 def key(campaign: Campaign, stage: Stage, record: Record) -> str:
     """Digest all that a record's stage depends on: settings, code and what it reads."""
     home = campaign.folder / record.record
-    sensor = _sensor(campaign) if stage.name == "calibrate" else None
+    sensor = campaign.sensor if stage.name == "calibrate" else None
     files = [home / name for name in stage.inputs] + ([sensor] if sensor else [])
     read = recorded(files)
     return jobs.digest([settings(campaign, stage, record), _code(stage.module), read])

@@ -27,7 +27,6 @@ from pendpipe.stages.results import (
     read_results,
     record_files,
     record_theory,
-    sensor_file,
     twins,
 )
 from pendpipe.stages.separate import is_line
@@ -47,7 +46,7 @@ def run(arguments: Arguments) -> None:
     campaign = load(arguments.campaign)
     inputs = [
         arguments.separation,
-        sensor_file(campaign),
+        *filter(None, [campaign.sensor]),
         *record_files(campaign, "fit.json", "calibration.json", "turning_points.csv"),
     ]
     outputs = [arguments.out, arguments.summary]
@@ -93,7 +92,7 @@ def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: P
                 read_turning_points(campaign.folder / result.record.record / "turning_points.csv")
             )
         ],
-        "calibration": read_json(sensor_file(campaign)) if settings.calibration else None,
+        "calibration": read_json(campaign.sensor) if campaign.sensor else None,
         "provenance": {
             "version": __version__,
             "code": code_version("pendpipe.stages.compare"),

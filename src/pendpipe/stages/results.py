@@ -49,11 +49,6 @@ def record_files(campaign: Campaign, *names: str) -> list[Path]:
     return [campaign.folder / row.record / name for row in campaign.records for name in names]
 
 
-def sensor_file(campaign: Campaign) -> Path:
-    """The result of the campaign's caliper run."""
-    return campaign.folder / "calibration" / "sensor.json"
-
-
 def read_results(campaign: Campaign) -> list[RecordResult]:
     """Read every record's fit, in the order of the table."""
     results = []
