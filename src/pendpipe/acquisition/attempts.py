@@ -7,7 +7,7 @@ always decoded from such a file, so it can be made again at any time.
 import re
 import secrets
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -145,12 +145,6 @@ def refuse_lost(attempt: RawRecording, remedy: str) -> None:
         f"{attempt.lost_line}; {kept_s:.6g} s{asked} are kept in {attempt.path}",
         remedy,
     )
-
-
-def mark_saved(path: Path, out: Path) -> None:
-    """Note in a raw file, where it may be written to, that its recording was written."""
-    with suppress(OSError):
-        append_event(path, event="saved", file=out.name)
 
 
 @contextmanager

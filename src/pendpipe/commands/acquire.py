@@ -147,6 +147,7 @@ def _record(arguments: Arguments) -> None:
     """Record, or write what an earlier call has recorded and could not write."""
     refuse_if(not arguments.out, "--out", "no file is named", "give --out FILE.csv")
     from pendpipe.acquisition import attempts
+    from pendpipe.acquisition.raw import append_event
     from pendpipe.formats.writing import check_name, write
 
     out = Path(arguments.out)
@@ -189,7 +190,8 @@ def _record(arguments: Arguments) -> None:
     with attempts.kept_in(raw, out):
         lost = write(out, recording, original=True)
     if not arguments.recover:
-        attempts.mark_saved(raw, out)
+        with suppress(OSError):
+            append_event(raw, event="saved", file=out.name)
     for note in (*recording.notes, *lost):
         print(f"pendpipe: {out}: {note}", file=sys.stderr)
     rate = recording.metadata["sample_rate_hz"]

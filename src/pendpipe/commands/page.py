@@ -14,6 +14,7 @@ from pendpipe.arguments import FILES, Arguments, command, read_motion, tell
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.options import OUTPUT, flags
 from pendpipe.process import cores, in_order
+from pendpipe.report.class_table import Fitted, class_page
 
 
 class Sheet(NamedTuple):
@@ -66,7 +67,6 @@ def run(arguments: Arguments) -> int:
 
 def _sheet(arguments: Arguments, file: str) -> Sheet:
     """Make the page of one recording."""
-    from pendpipe.report.class_table import Fitted
     from pendpipe.report.page import render_recording
 
     notes: list[str] = []
@@ -82,7 +82,6 @@ def _sheet(arguments: Arguments, file: str) -> Sheet:
 
 
 def _of_file(arguments: Arguments, file: str) -> Sheet:
-    from pendpipe.report.class_table import Fitted
 
     try:
         return _sheet(arguments, file)
@@ -93,7 +92,6 @@ def _of_file(arguments: Arguments, file: str) -> Sheet:
 def _class(arguments: Arguments) -> int:
     """Write a page a recording, and the table of all."""
     from pendpipe.files import check_output, distinct_names, make_folder, write_whole
-    from pendpipe.report.class_table import class_page
 
     refuse_if(arguments.out == "-", "--out -", "there are several pages", "name a file")
     out = Path(arguments.out or "class.html")

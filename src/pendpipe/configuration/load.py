@@ -21,7 +21,6 @@ from pendpipe.configuration.models import WATER_C, Celsius, Configuration, Geome
 from pendpipe.errors import InputError, nearest, refuse_if
 from pendpipe.files import is_file, names_in, read_json, read_text
 
-REQUIRED: Final = ("record", "source")
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 LONGEST_NAME: Final = 100
 """The names of files made from it stay below the 255 bytes that file systems allow."""
@@ -109,7 +108,7 @@ def read_records(path: str | Path) -> list[Record]:
     ]
     refuse_if(not rows, place, "the table is empty", f"begin with the columns {', '.join(COLUMNS)}")
     names = [name.strip() for name in rows[0][1].split("\t")]
-    for name in (*REQUIRED, *names):
+    for name in ("record", "source", *names):
         for wrong, problem, remedy in (
             (name not in names, f"the column '{name}' is missing", "separate columns by tabs"),
             (name not in COLUMNS, f"unknown column '{name}'", nearest(name, COLUMNS)),

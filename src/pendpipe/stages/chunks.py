@@ -124,9 +124,7 @@ def chunks_of(campaign: Campaign) -> dict[str, tuple[Record, ...]]:
         return {f"{ALONE}{record.record}": (record,) for record in campaign.selected}
     batch = campaign.configuration.batch or batch_for(len(campaign.records))
     live = [record for record in campaign.records if record.source.startswith("dataq:")]
-    others = {record.record: record for record in campaign.records}
-    for record in live:
-        del others[record.record]
+    others = {record.record: record for record in campaign.records if record not in live}
     return {f"{ALONE}{record.record}": (record,) for record in live} | split(others, batch)
 
 

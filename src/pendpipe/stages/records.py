@@ -57,7 +57,7 @@ def run(arguments: Arguments) -> None:
     with job(campaign.folder, "records", inputs=inputs, outputs=arguments.out):
         table = records_table(campaign)
         for out in arguments.out:
-            write_whole(out, _parquet(table) if out.suffix == ".parquet" else _csv(table))
+            write_whole(out, _in_form(table, out.suffix))
 
 
 def records_table(campaign: Campaign) -> pa.Table:
@@ -83,17 +83,12 @@ def _row(campaign: Campaign, result: RecordResult) -> dict[str, Any]:
     return {name: row.get(name) for name in COLUMNS}
 
 
-def _parquet(table: pa.Table) -> bytes:
-    from pyarrow import parquet
+def _in_form(table: pa.Table, form: str) -> bytes:
+    from pyarrow import csv, parquet
 
     stream = io.BytesIO()
-    parquet.write_table(table, stream)
-    return stream.getvalue()
-
-
-def _csv(table: pa.Table) -> bytes:
-    from pyarrow import csv
-
-    stream = io.BytesIO()
-    csv.write_csv(table, stream, csv.WriteOptions(quoting_style="needed"))
+    if form == ".parquet":
+        parquet.write_table(table, stream)
+    else:
+        csv.write_csv(table, stream, csv.WriteOptions(quoting_style="needed"))
     return stream.getvalue()
