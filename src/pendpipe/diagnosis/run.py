@@ -24,7 +24,7 @@ from pendpipe.diagnosis.detect import LEVEL
 from pendpipe.diagnosis.forensics.codes import with_true_step
 from pendpipe.diagnosis.forensics.lost_samples import loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
-from pendpipe.diagnosis.held_out import held_out
+from pendpipe.diagnosis.held_out import HeldOut, held_out
 from pendpipe.diagnosis.hypothesis import Hypothesis, Task, catalogue_beside
 from pendpipe.diagnosis.projection import whitened
 from pendpipe.diagnosis.refine import Fit
@@ -206,49 +206,31 @@ def diagnose_decay(
         remedy = "cut it with --start and --stop, or change what is held with --fix"
         raise NotAnalysableError(place, f"the model can't follow it ({error})", remedy) from error
     effects = _in_order(found, weighed, samples)
-    gap = gap_note((whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
-    rounding = found.data.step / 12.0**0.5
-    stamps = tuple(note for note in (gap, *found.notes.values()) if note)
+    missing = any(effect.identifier != COLOURED_NOISE for effect in effects)
     # With a red light the fit has lost the motion, which the search follows by its phase; and a
     # part of b that is held bounds b here alone.
-    stands = fit is not None and fit.light != "red" and not beginning.model.parts
-    before = _fitted_model(with_errors(found.baseline, found.data, found.noise), found)
-    if fit and stands:
-        printed = FittedModel.of_fit(fit)
-        of_all = fit.method == "waveform" and not fit.cuts and fit.zero_drift is None
-        # What it leaves of other readings, or beside a zero that drifts, compares with nothing.
-        before = printed if of_all else replace(before, parameters=printed.parameters)
-    alike = found.fit.value is found.baseline.value
-    same = alike and found.fit.error_scale == 1.0
-    law = law_of(found, weighed)
-    after = before if same else _fitted_model(found.fit, found, law)
-    drag_form = fit.drag_form if fit and stands else "energy"
-    presumed = _presumed(found, drag_form)
-    swung = found.baseline.model.restoring
-    noise_rms = after.noise_rms_rad
-    missing = any(effect.identifier != COLOURED_NOISE for effect in effects)
-    held = None
-    if missing and not alike:
-        progress("predicting cycles that are left out of the fit")
-        models = found.baseline, found.fit, found.data, found.noise
-        held = held_out(*models, beginning.held, found.held)
+    stands = fit if fit and fit.light != "red" and not beginning.model.parts else None
+    before, after, law = _models(found, weighed, stands)
+    drag_form, swung = stands.drag_form if stands else "energy", found.baseline.model.restoring
     swings = _small_swings(law, found)
+    gap = gap_note((whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
+    stamps = tuple(note for note in (gap, *found.notes.values()) if note)
     return Diagnosis(
         baseline,
         before,
         after,
-        noise_rms,
+        after.noise_rms_rad,
         "missing-physics" if missing else "consistent",
         found.p_value,
-        (*presumed, *effects),
-        held,
+        (*_presumed(found, drag_form), *effects),
+        _left_out(found, beginning.held, progress) if missing else None,
         after.residual_rms_rad,
         found.unexplained,
         statement(
             swinging(baseline, swung, drag_form),
             before,
             effects,
-            noise_rms,
+            after.noise_rms_rad,
             found.p_value,
             found.unexplained,
             level,
@@ -256,7 +238,7 @@ def diagnose_decay(
             remainder=found.remainder,
             swings=swings,
             notes=stamps,
-            rounded=noise_rms <= rounding,
+            rounded=after.noise_rms_rad <= found.data.step / 12.0**0.5,
         ),
         warnings=(*points.notes, *stamps),
         remainder=found.remainder,
@@ -271,6 +253,36 @@ def diagnose_decay(
         else (),
         search=found,
     )
+
+
+def _models(
+    found: Hypothesis, weighed: Sequence[Weighed], fit: FitResult | None
+) -> tuple[FittedModel, FittedModel, Fit]:
+    """Return the baseline as it is printed, the model with what is missing, and its law.
+
+    The baseline's numbers are those of the fit, where that stands.
+    """
+    before = _fitted_model(with_errors(found.baseline, found.data, found.noise), found)
+    if fit:
+        printed = FittedModel.of_fit(fit)
+        of_all = fit.method == "waveform" and not fit.cuts and fit.zero_drift is None
+        # What it leaves of other readings, or beside a zero that drifts, compares with nothing.
+        before = printed if of_all else replace(before, parameters=printed.parameters)
+    law = law_of(found, weighed)
+    same = _adds_nothing(found) and found.fit.error_scale == 1.0
+    return before, before if same else _fitted_model(found.fit, found, law), law
+
+
+def _adds_nothing(found: Hypothesis) -> bool:
+    return found.fit.value is found.baseline.value
+
+
+def _left_out(found: Hypothesis, held: Sequence[int], progress: Progress) -> HeldOut | None:
+    """Predict cycles that are left out of the fit, by the baseline and by another model."""
+    if _adds_nothing(found):
+        return None
+    progress("predicting cycles that are left out of the fit")
+    return held_out(found.baseline, found.fit, found.data, found.noise, held, found.held)
 
 
 def _in_order(

@@ -10,15 +10,15 @@ from __future__ import annotations
 
 import math
 from collections import ChainMap
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import numpy as np
 
 from pendpipe.analysis.fit.result import Baseline, units
 from pendpipe.analysis.torque import TOP, swing_phase
-from pendpipe.arrays import BoolArray, FloatArray, IntArray
+from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data
@@ -44,6 +44,7 @@ from pendpipe.diagnosis.result import (
 )
 from pendpipe.diagnosis.rivals import Scale
 from pendpipe.diagnosis.search import LESS_FRICTION, run_search
+from pendpipe.diagnosis.stacked import StackedData, StackedNoise
 from pendpipe.diagnosis.summary import COLOURED_NOISE, DOUBTFUL, statement
 from pendpipe.diagnosis.values import constants_of
 from pendpipe.diagnosis.weighing import (
@@ -147,28 +148,8 @@ def diagnose_several(
     law = with_other_descriptions(law_of(found, weighed), found, weighed)
     after = _Together(found, found.fit, law, outcomes, names, own)
     before = replace(after, improved=found.baseline, law=found.baseline)
-    named, differing = [], []
-    for step, each in zip(found.steps, weighed, strict=True):
-        effect, one = step.winner.lead.effect, effect_named(found, step, each)
-        if isinstance(effect, Differs):
-            differing.append(after.contradiction(effect, one))
-        else:
-            sizes = [one.parameters[each.name] for each in effect.parameters[: effect.sizes]]
-            known = effect.parameter_free or effect.kind == "unnamed"
-            if not known and all(abs(e.value) < _NOT_ZERO_SD * e.sd for e in sizes):
-                one = replace(one, probability=min(one.probability, DOUBTFUL))
-            everywhere = Location(summary="it shows in all recordings together")
-            named.append(replace(one, location=everywhere))
-    events = [
-        replace(each, location=replace(each.location, summary=f"in {name} alone"))
-        for name, outcome, part in zip(names, outcomes, law.at.parts, strict=True)
-        for each in outcome.missing
-        if each.kind not in ("unnamed", "parameter")
-        and (
-            each.identifier in {one.identifier for one in part.model.effects if happened(one)}
-            or not by_identifier(each.identifier).has_signature
-        )
-    ]
+    named, differing = after.effects(weighed)
+    events = after.events()
     p_value = min([found.p_value, *(outcome.p_value for outcome in outcomes)])
     p_value = min(1.0, (len(outcomes) + 1) * p_value)
     own_forms = [each for each in outcomes[0].effects if each.presumed]
@@ -220,115 +201,6 @@ def diagnose_several(
         alone=tuple(outcomes),
         recordings=tuple(told),
     )
-
-
-@dataclass(frozen=True)
-class StackedData(Data):
-    """Readings of several recordings.
-
-    Parameters
-    ----------
-    alone
-        Of each recording; the weights of all stand before theirs.
-    """
-
-    alone: tuple[Data, ...] = ()
-
-    @classmethod
-    def of(cls, alone: Sequence[Data]) -> StackedData:
-        """Put them one after the other."""
-        series = ("time_s", "values", "weight")
-        joined = (np.concatenate([getattr(each, name) for each in alone]) for name in series)
-        time_s, values, weight = joined
-        return cls(
-            time_s,
-            values,
-            alone[0].interval_s,
-            uniform=False,
-            weight=weight,
-            unit=alone[0].unit,
-            alone=tuple(alone),
-        )
-
-    def each(self) -> list[Data]:
-        """Return each recording's readings, with the present weights."""
-        pairs = zip(self.alone, split(self.weight, self.alone), strict=True)
-        return [replace(data, weight=weight) for data, weight in pairs]
-
-    def residual(self, reading: FloatArray) -> FloatArray:
-        """Return readings minus model, with the mean rounding error of the model."""
-        pairs = zip(self.alone, split(reading, self.alone), strict=True)
-        return np.concatenate([data.residual(part) for data, part in pairs])
-
-
-@dataclass(frozen=True)
-class StackedNoise(Noise):
-    """Noise of several recordings; it is known from each of them alone.
-
-    Parameters
-    ----------
-    alone
-        Of each recording; the weights of all stand before theirs.
-    """
-
-    known: ClassVar[bool] = True
-    alone: tuple[Noise, ...] = ()
-
-    @classmethod
-    def of(cls, alone: Sequence[Noise]) -> StackedNoise:
-        """Put them one after the other."""
-        return cls(
-            np.concatenate([each.variance for each in alone]),
-            np.concatenate([each.weight for each in alone]),
-            alone=tuple(alone),
-        )
-
-    def _each(self) -> list[Noise]:
-        pairs = zip(self.alone, split(self.weight, self.alone), strict=True)
-        return [replace(noise, weight=weight) for noise, weight in pairs]
-
-    def _with(self, columns: FloatArray) -> Iterator[tuple[Noise, FloatArray]]:
-        return zip(self._each(), split(columns, self.alone), strict=True)
-
-    def whiten(self, columns: FloatArray) -> FloatArray:
-        """Turn readings (or columns of them) into numbers of unit variance, shape kept."""
-        return np.concatenate([noise.whiten(part) for noise, part in self._with(columns)])
-
-    def adjoint(self, columns: FloatArray) -> FloatArray:
-        """Apply the transpose of `whiten`."""
-        return np.concatenate([noise.adjoint(part) for noise, part in self._with(columns)])
-
-    @property
-    def scale(self) -> FloatArray:
-        """What each reading is multiplied by before its cosines are taken."""
-        return np.concatenate([noise.scale for noise in self._each()])
-
-    @property
-    def coloured(self) -> bool:
-        """Whether any of them is."""
-        return any(noise.coloured for noise in self.alone)
-
-    @property
-    def sd(self) -> FloatArray:
-        """Standard deviation of each reading."""
-        return np.concatenate([noise.sd for noise in self.alone])
-
-    def log_scale_variance(
-        self,
-        rows: FloatArray,
-        chosen: IntArray | None = None,  # noqa: ARG002
-    ) -> FloatArray:
-        """Return the variance of the logarithm of the noise that unit columns meet."""
-        parts = split(rows[:, : len(self.variance)].T, self.alone)
-        pairs = zip(self.alone, parts, strict=True)
-        found = [noise.log_scale_variance(part.T) for noise, part in pairs]
-        return np.asarray(np.sum(found, axis=0))
-
-
-def split(columns: FloatArray, alone: Sequence[Data] | Sequence[Noise]) -> list[FloatArray]:
-    """Return what belongs to each recording."""
-    counts = [len(each.weight) for each in alone]
-    return np.split(columns, np.cumsum(counts)[:-1])
 
 
 def search_together(
@@ -560,6 +432,37 @@ class _Together:
         sd = math.sqrt(max(float(row @ fit.covariance() @ row), 0.0))
         value, unit = float(row @ fit.value), units(self.found.data.unit)[name]
         return Estimate(scale * value, scale * sd, unit)
+
+    def effects(self, weighed: Sequence[Weighed]) -> tuple[list[FoundEffect], list[FoundEffect]]:
+        """Return what all recordings lack, and what they contradict each other in."""
+        named, differing = [], []
+        for step, each in zip(self.found.steps, weighed, strict=True):
+            effect, one = step.winner.lead.effect, effect_named(self.found, step, each)
+            if isinstance(effect, Differs):
+                differing.append(self.contradiction(effect, one))
+                continue
+            sizes = [one.parameters[each.name] for each in effect.parameters[: effect.sizes]]
+            known = effect.parameter_free or effect.kind == "unnamed"
+            if not known and all(abs(e.value) < _NOT_ZERO_SD * e.sd for e in sizes):
+                one = replace(one, probability=min(one.probability, DOUBTFUL))
+            everywhere = Location(summary="it shows in all recordings together")
+            named.append(replace(one, location=everywhere))
+        return named, differing
+
+    def events(self) -> list[FoundEffect]:
+        """Return what happened in one recording alone."""
+        return [
+            replace(each, location=replace(each.location, summary=f"in {name} alone"))
+            for name, outcome, part in zip(
+                self.names, self.outcomes, self.law.at.parts, strict=True
+            )
+            for each in outcome.missing
+            if each.kind not in ("unnamed", "parameter")
+            and (
+                each.identifier in {one.identifier for one in part.model.effects if happened(one)}
+                or not by_identifier(each.identifier).has_signature
+            )
+        ]
 
     def contradiction(self, effect: Differs, found: FoundEffect) -> FoundEffect:
         """Return what the recordings contradict each other in, with each one's value."""
