@@ -86,7 +86,7 @@ def test_a_class_is_listed_with_the_likeliest_first() -> None:
     )
     assert details(fitted)[1].startswith(
         "Drifting frequency 67 %, drifting clock 20 %, a restoring torque of unknown form < 1 %"
-        " (not told apart); of drifting clock: rate = "
+        " (not distinguished); of drifting clock: rate = "
     )
 
 

@@ -335,4 +335,4 @@ def test_an_effect_of_another_package_is_found(
     entries = [Entry("absent"), Entry("other", known[0])]
     monkeypatch.setattr(catalogue, "entry_points", lambda **_: entries)
     assert tuple(catalogue._found()) == (*known, known[0])
-    assert "the plugin 'absent' is passed over" in capsys.readouterr().err
+    assert "the plugin 'absent' is skipped" in capsys.readouterr().err

@@ -357,12 +357,12 @@ def test_a_plugin_that_fails_is_named_and_passed_over(
     plugins.append(Entry(name))
     recording = read(path)
     np.testing.assert_allclose(recording.values, ANGLE_RAD, atol=1e-6)
-    (note,) = (note for note in recording.notes if "passed over" in note)
+    (note,) = (note for note in recording.notes if "is skipped" in note)
     said = name.replace("BROKEN", "broken reader")
     assert said in note
     assert "\n" not in note
     path.write_bytes(b"\0\1\2" * 900)
-    with pytest.raises(InputError, match=f"no reader knows this file.*'{said}' is passed over"):
+    with pytest.raises(InputError, match=f"no reader knows this file.*'{said}' is skipped"):
         read(path)
 
 

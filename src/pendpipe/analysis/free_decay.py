@@ -396,7 +396,7 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
         refuse_if(
             not longer,
             place,
-            f"no free decay: {rivals + 1} short oscillations of {told.legs} half cycles or so",
+            f"no free decay, but {rivals + 1} short oscillations of about {told.legs} half cycles",
             "irregular motion can't be analysed",
             NotAnalysableError,
         )

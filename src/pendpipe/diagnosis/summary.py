@@ -641,7 +641,7 @@ def _effect(effect: FoundEffect) -> str:
     whose = "" if _leader(effect)[1] == effect.identifier else f"of {effect.name}: "
     parts = [
         ", ".join(f"{name} {percent(p)}" for p, name in members)
-        + (" (not told apart)" if len(members) > 1 else ""),
+        + (" (not distinguished)" if len(members) > 1 else ""),
         *(
             f"{whose}{name} = {each}"
             for name, each in effect.parameters.items()

@@ -438,7 +438,7 @@ def draw_causes(path: Path) -> Figure:
                 [*_in_class(patterns, within), methodcaller("set_title", title)],
                 {**limits, "ylabel": "Viscous loss above Eq. 16 (%)" if within else ""},
             )
-            for within, title in ((True, "not told apart"), (False, "rejected"))
+            for within, title in ((True, "not distinguished"), (False, "rejected"))
         ),
         across=True,
     )

@@ -340,7 +340,7 @@ def _readings(
     nameless = len(alive) > 1 and chosen[0].role == "unknown" and len(chosen) == 1
     unclear = any_clear and not chosen[0].swing.clear
     if (nameless and not why) or unclear:
-        what = "its name does not tell what it holds" if not unclear else "it hardly oscillates"
+        what = "its name does not say what it holds" if not unclear else "it hardly oscillates"
         return chosen, (), (f"{note}: {what} (--column)",)
     return chosen, (note,), ()
 

@@ -56,7 +56,7 @@ def list_in(
         return Listed(
             "periods",
             f"'{lasting[0].label}' holds periods, not a recording of the swing",
-            "give the recording of the swing: periods alone tell no loss",
+            "give the recording of the swing: periods alone do not show the loss",
             lasting[0],
         )
     clocked = time is not None and time.role == "time"
@@ -81,7 +81,7 @@ def list_in(
                 "passages",
                 f"'{column.label}' only counts, as passages of a light gate do: no recording of"
                 " the swing",
-                "give the recording of the swing: times of passages tell no amplitude",
+                "give the recording of the swing: times of passages do not show the amplitude",
                 column,
             )
     return None

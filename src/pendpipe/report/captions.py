@@ -75,7 +75,7 @@ CAPTIONS: Final = {
         "The viscous loss of every record in the fluid above that of Eq. 16, inputs as configured"
         " (symbols), and what each cause alone would add if its size were the best for these"
         " points (lines, one part for each branch). Left the causes that all records together"
-        " cannot tell apart, right those that they reject.",
+        " cannot distinguish, right those that they reject.",
         "A cause explains the mismatch only if its line has the sign, the size and the flatness"
         " of the points; how large it has to be for that is in the table.",
     ),

@@ -31,7 +31,7 @@ _KINDS: Final = {
 SHORT: Final = {"a": "drag ~ speed²", "b": "viscous or internal", "c": "dry friction"}
 _CLOCK: Final = 50e-6
 """By what part a laboratory's clock may well be off."""
-_TIMELESS: Final = "not shown by amplitudes: --period or --frequency tells it, and Q"
+_TIMELESS: Final = "not shown by amplitudes: give --period or --frequency, which also gives Q"
 _SLIGHT: Final = 0.05
 """Share of a loss below which it is not named."""
 _DIAGNOSE: Final = "pendpipe diagnose FILE says what the law lacks"
@@ -275,7 +275,7 @@ def following(result: FitResult) -> str:
     if "Q" not in result.quotable:
         return "record more swings: the turning points must show the decrement"
     if "losses" not in result.quotable:
-        return "release from farther out and record longer, to tell a, b and c apart"
+        return "release from farther out and record longer, to separate a, b and c"
     return "pendpipe page FILE makes a sheet to hand out; --figure draws it, --json is for programs"
 
 
@@ -348,5 +348,5 @@ def cause(quality: Quality) -> str:
     if not quality.losses:
         return WITHOUT_LAW
     if (name := quality.dominant) is None:
-        return "by losses that this fit does not tell apart"
+        return "by losses that this fit does not separate"
     return f"{100.0 * quality.losses[name].value:.0f} % {LOSSES[name]} ({name})"

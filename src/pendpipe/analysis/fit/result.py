@@ -559,7 +559,7 @@ def _warnings(result: FitResult, stretched: float) -> list[str]:
         ),
         (
             result.baseline == "eq8" and mixed and a.sd * y0 > _UNCLEAR * rate,
-            "a can't be told from b here: the record holds too little of large amplitudes (a tail);"
+            "a can't be separated from b here: the recording has too few large amplitudes (a tail);"
             " a, b, c of a tail depend on where it begins",
         ),
     )

@@ -189,7 +189,7 @@ def loss_confirmed(samples: Samples, about_s: float, period_s: float) -> Confirm
     ]
     others = [lost for at in places if (lost := _lost_time(samples, at, period_s)) is not None]
     if here is None or len(others) < _ELSEWHERE:
-        return Confirmation("too few readings about the instant tell", 1.0)
+        return Confirmation("there are too few readings about the instant", 1.0)
     usual = np.median(others, axis=0)
     sd = 1.4826 * np.median(np.abs(others - usual), axis=0)
     lost = here - usual

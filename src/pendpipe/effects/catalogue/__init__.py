@@ -35,7 +35,7 @@ def _found() -> Iterator[Effect]:
             effect = entry.load()
         except Exception as fault:
             said = " ".join(str(fault).split())[:120]
-            print(f"the plugin '{entry.name}' is passed over ({said})", file=sys.stderr)
+            print(f"the plugin '{entry.name}' is skipped ({said})", file=sys.stderr)
         else:
             yield from [effect] if isinstance(effect, Effect) else []
 

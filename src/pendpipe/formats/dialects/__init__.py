@@ -53,4 +53,4 @@ def of_file(head: bytes, suffix: str) -> tuple[list[Dialect], list[str]]:
 
 def _passed_over(name: str, fault: Exception) -> str:
     said = " ".join(str(fault).split())[:120]
-    return f"the plugin '{name}' is passed over ({type(fault).__name__}: {said})"
+    return f"the plugin '{name}' is skipped ({type(fault).__name__}: {said})"
