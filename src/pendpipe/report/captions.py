@@ -15,29 +15,29 @@ CAPTIONS: Final = {
     "fig03": Caption(
         "Figure 3. The sensor",
         "The sensor's volts against the angle that a caliper set, with the straight line.",
-        "The lower panel is data minus line: points that scatter about zero mean a linear sensor,"
-        " an arc or an S would mean that angles are read wrongly. Bars are one standard"
+        "The lower panel is data minus line: points that scatter about zero mean a linear sensor;"
+        " an arc or an S means that the sensor is nonlinear. Bars are one standard"
         " deviation; that of the slope is shared by all records.",
     ),
     "fig04": Caption(
         "Figure 4. Hysteretic damping, in air",
         "The limiting Q of each record in air against the square of its frequency.",
-        "A straight line through the origin is the mark of internal friction in the structure:"
-        " viscous damping with a constant coefficient would give Q ∝ f, a curve here. The lower"
+        "A straight line through the origin shows internal friction of the structure:"
+        " viscous damping with a constant coefficient gives Q ∝ f, a curve here. The lower"
         " panel is the relative deviation from the line; the grey band is the line's own"
         " standard deviation.",
     ),
     "fig05": Caption(
         "Figure 5. What water does to the period",
-        "Theory of how much buoyancy and the water that swings along (added mass) lengthen the"
-        " period, alone and together. Symbols are the records, lines the way between them.",
+        "By how much buoyancy and the water that swings along (added mass) lengthen the"
+        " period in theory, alone and together. Symbols are the records; lines join them.",
         "The scale is logarithmic. In the low branch the weights nearly balance, so a little"
-        " buoyancy takes away most of the restoring torque.",
+        " buoyancy cancels most of the restoring torque.",
     ),
     "fig06": Caption(
         "Figure 6. The history term",
         "The viscous limit of Q: Stokes' law for steady flow (dashed), Eq. 16 with its history"
-        " term 1 + a/δ (solid), and what was measured after Eq. 17 (symbols).",
+        " term 1 + a/δ (solid), and the measured values by Eq. 17 (symbols).",
         "The scale is the decimal logarithm, so 1 is a factor of ten. The arrows say by how much"
         " the history term divides Q in the middle of a branch.",
     ),
@@ -45,24 +45,24 @@ CAPTIONS: Final = {
         "Figure 7. A typical free decay",
         "Every sample of the typical record and the amplitude of the fitted law.",
         "The lower panel is data minus fit: the turning points less that amplitude, with their"
-        " standard deviations. A trend there would be physics that the model does not have.",
+        " standard deviations. A trend there is physics that the model lacks.",
     ),
     "fig08": Caption(
-        "Figure 8. The same decay's dissipation history",
+        "Figure 8. Q during the same decay",
         "Q of the fitted law against time. Circles are the logarithmic"
-        " decrement between turning points: they owe nothing to the model.",
-        "Q rises while the quadratic drag (a) dies away, is largest near y = √(c/a), and falls"
-        " when the bearing's friction (c) takes over. The dashed line is what exponential losses"
-        " alone would give. The band (95 %) may be thinner than the line.",
+        " decrement between turning points, independent of the model.",
+        "Q rises while the quadratic drag (a) decreases, is largest near y = √(c/a), and falls"
+        " when the bearing's friction (c) dominates. The dashed line has exponential losses"
+        " alone. The band (95 %) may be thinner than the line.",
     ),
     "fig09": Caption(
         "Figure 9. Experiment against theory",
-        "The limiting Q of every record in water, with Eq. 16 and the hysteretic part of figure"
-        " 4 together. No parameter is adjusted to these points.",
+        "The limiting Q of every record in water, with the sum of Eq. 16 and the hysteretic loss of"
+        " figure 4. No parameter is adjusted to these points.",
         "Lower panel: measured over theory, at each record's own geometry. A common shortfall"
         " means that the drag is larger than Eq. 16 by the factor printed there; the grey band is"
-        " what distances and diameter leave uncertain in the theory. At low frequency the points"
-        " come closer to 1 since hysteresis, not water, does the damping.",
+        " the uncertainty of the theory from distances and diameter. At low frequency the points"
+        " are closer to 1 because hysteresis, not water, damps the motion.",
     ),
     "fig10": Caption(
         "Figure 10. Hysteresis left out",
@@ -76,17 +76,17 @@ CAPTIONS: Final = {
         " (symbols), and what each cause alone would add if its size were the best for these"
         " points (lines, one part for each branch). Left the causes that all records together"
         " cannot distinguish, right those that they reject.",
-        "A cause explains the mismatch only if its line has the sign, the size and the flatness"
-        " of the points; how large it has to be for that is in the table.",
+        "A cause explains the mismatch only if its line has the sign, the size and the frequency"
+        " dependence of the points; the table gives the size that it would need.",
     ),
     "residual_map": Caption(
         "Residual, before and after",
         "Data minus model against time and phase of the cycle, in standard errors of a cell: the"
-        " baseline above, with what was left out below.",
+        " baseline above, with the missing effects below.",
         "Phase 0 is the turning point on the positive side, π that on the negative. Bands along"
-        " the time at the crossings (π/2, 3π/2) are a phase that runs away, at the turning points"
-        " an amplitude that does; upright stripes are sudden. What is left below should look"
-        " like noise.",
+        " the time axis at the crossings (π/2, 3π/2) are an error of the phase, at the turning"
+        " points an error of the amplitude; vertical stripes are events. The lower panel should"
+        " show only noise.",
     ),
     "waveform": Caption(
         "Waveform",
@@ -95,8 +95,8 @@ CAPTIONS: Final = {
     ),
     "quality": Caption(
         "Q against amplitude",
-        "Q of the fitted law (line), and what the turning points show without one (circles).",
-        "Q falls to the right where drag takes most, and to the left where dry friction does.",
+        "Q of the fitted law (line), and of the turning points without a law (circles).",
+        "Q falls to the right where drag dominates, and to the left where dry friction does.",
     ),
     "decay": Caption(
         "Decay",
@@ -109,39 +109,39 @@ CAPTIONS: Final = {
 
 OF_A_RECORDING: Final = {
     "residual": Caption(
-        "What the fitted law leaves",
+        "The residual of the fitted law",
         "The turning points less the amplitude of the fitted law, bars of one standard deviation.",
-        "Points that scatter about zero mean that the law loses what the decay loses; a course"
-        " is physics that it does not have.",
+        "Points that scatter about zero mean that the law describes the decay; a trend is"
+        " physics that it lacks.",
     ),
     "residual_map": CAPTIONS["residual_map"],
     "residual_spectrum": Caption(
         "Spectrum of the residual",
-        "What each model leaves, by frequency, with the noise and the harmonics of the motion.",
-        "A peak at a harmonic is a torque or a sensor that is not linear; a peak between them is"
-        " something else that swings or hums; what lies on the noise is explained.",
+        "Residuals of both models against frequency, with noise and harmonics of the motion.",
+        "A peak at a harmonic is a nonlinear torque or sensor; a peak between harmonics is"
+        " another vibration or a hum; a residual at the level of the noise is explained.",
     ),
     "damping": Caption(
         "Loss against amplitude",
         "Relative loss of amplitude of a few cycles at a time, of the readings and of both models.",
-        "A line that the points leave to one side has another law of loss: a slope upwards is"
-        " drag, a rise towards small amplitudes friction that does not vanish.",
+        "Points on one side of a line mean that the loss follows another law: an upward slope is"
+        " drag, a rise towards small amplitudes dry friction.",
     ),
     "frequency": Caption(
         "Frequency against amplitude",
         "Frequency of a few cycles at a time, of the readings and of both models.",
         "sin x lowers it with the square of the amplitude. Points off the line at small amplitudes"
-        " are a stiffer bearing, at random a clock.",
+        " suggest a stiffer bearing, points off at random the clock.",
     ),
     "decay": Caption(
         "The end of the decay, with both models",
-        "Amplitude of each cycle, and what the baseline and the extended model leave.",
-        "What was left out is the difference of the two residuals.",
+        "Amplitude of each cycle, and the residuals of the baseline and the extended model.",
+        "The difference of the two residuals is the missing effect.",
     ),
     "curve": Caption(
         "The unknown part",
         "The curve that describes what no name explains, with its 95 % band.",
-        "Its shape is the hint: where it leaves zero, something acts.",
+        "Its shape is a hint: something acts where it differs from zero.",
     ),
 }
 """Words for the figures of one recording's page."""
@@ -155,7 +155,7 @@ EQUATIONS: Final = (
         "The law of motion. Where a record swings by sin x, ω² sin x stands for ω² x, and"
         " 2ω²(1 − cos x) for ω²x² in ρ².",
     ),
-    ("Eq. 13", r"-\frac{dy}{dt} = a y^2 + b y + c", "What its amplitude y loses, to first order."),
+    ("Eq. 13", r"-\frac{dy}{dt} = a y^2 + b y + c", "The loss of its amplitude y, to first order."),
     ("Eq. 15", r"Q(y) = \frac{\pi f}{a y + b + c/y}", "The quality factor at an amplitude."),
     (
         "Eq. 16",
@@ -176,7 +176,7 @@ GLOSSARY: Final = (
     (
         "Turning point",
         "Where the pendulum stands still for an instant and turns back; its distance"
-        " from the level is the amplitude y.",
+        " from the equilibrium is the amplitude y.",
     ),
     (
         "Quality factor Q",
@@ -206,16 +206,16 @@ GLOSSARY: Final = (
     ),
     (
         "History term a/δ",
-        "What oscillation adds to Stokes' drag on a sphere of radius a: the fluid"
-        " remembers the motion before.",
+        "What oscillation adds to Stokes' drag on a sphere of radius a, because the"
+        " fluid remembers earlier motion.",
     ),
     ("Added mass", "The water that swings with the sphere and adds to its moment of inertia."),
     ("Moment of inertia I", "The resistance to angular acceleration, in kg m²."),
     ("Residual", "Data minus fit, always in this order."),
     (
         "χ² per degree of freedom",
-        "The mean square of residuals over the noise: 1 when the model"
-        " misses nothing, more when it does.",
+        "The mean square of the residual over that of the noise: 1 if the"
+        " model lacks nothing, more if it does.",
     ),
     (
         "Standard deviation (sd)",

@@ -472,8 +472,8 @@ def _qualities(result: FitResult) -> Iterator[tuple[str, ...]]:
 
 _SHEET: Final = Caption(
     "The decay, and its quality factor",
-    "Readings and fitted amplitude against time, what was left out shaded; Q against amplitude.",
-    "The line is the fitted law; the circles are the turning points alone and need no law.",
+    "Readings and fitted amplitude against time (cut parts shaded); Q against amplitude.",
+    "The line is the fitted law; the circles are the turning points alone, without a law.",
 )
 
 
