@@ -240,6 +240,7 @@ def pendulum(
             motion,
             (begin, begin + 60.0 / OMEGA),
             [angle, 0.0],
+            "DOP853",
             events=turns,
             rtol=1e-11,
             atol=1e-13,
@@ -368,7 +369,7 @@ def test_no_law_of_a_pendulum_that_swings_far_is_green_and_wrong(
 
 
 def test_a_law_that_contradicts_the_decay_is_not_printed(tmp_path: Path, answer_of: Any) -> None:
-    time = np.arange(0.0, 200.0, 0.05)
+    time = np.arange(0.0, 100.0, 0.05)
     write_plain(
         tmp_path / "decay.csv",
         recorded(sample(Eq8(OMEGA, viscous=0.02), Release(-0.3, 0.1), time), time, 1e-4),

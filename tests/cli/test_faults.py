@@ -99,24 +99,25 @@ def test_the_package_itself_can_be_run() -> None:
     assert "did you mean 'pendpipe inspect'?" in done.stderr
 
 
-def test_bash_completes_commands_and_their_options() -> None:
-    complete = (
-        f'source <("{sys.executable}" -m pendpipe completion bash);'
-        " COMP_WORDS=({}); COMP_CWORD={};"
-        ' _shtab_pendpipe; echo "${{COMPREPLY[@]}}"'
+def test_bash_completes_commands_and_their_options(tmp_path: Path, answer_of: Any) -> None:
+    (tmp_path / "completion").write_text(answer_of(["completion", "bash"]).out)
+    asked = {
+        ("pendpipe diagn", 1): ["diagnose", "diagnose-campaign"],
+        ("pendpipe fit --restor", 2): ["--restoring"],
+        ("pendpipe completion z", 2): ["zsh"],
+    }
+    complete = "".join(
+        f'COMP_WORDS=({words}); COMP_CWORD={position}; _shtab_pendpipe\necho "${{COMPREPLY[@]}}"\n'
+        for words, position in asked
     )
-    for words, position, expected in (
-        ("pendpipe diagn", 1, "diagnose diagnose-campaign"),
-        ("pendpipe fit --restor", 2, "--restoring"),
-        ("pendpipe completion z", 2, "zsh"),
-    ):
-        done = subprocess.run(
-            ["bash", "-c", complete.format(words, position)],
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        assert done.stdout.split() == expected.split()
+    said = subprocess.run(
+        ["bash", "-c", f"source ./completion\n{complete}"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert [line.split() for line in said.splitlines()] == list(asked.values())
 
 
 TIME_S = np.arange(300) / 15.0

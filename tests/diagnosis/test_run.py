@@ -462,7 +462,10 @@ def test_a_drag_that_follows_the_speed_is_fitted_and_presumed() -> None:
     [
         lambda time_s, angle: (time_s + 2e-5 * time_s**2, angle),  # fitted to turning points
         lambda time_s, angle: (time_s, angle + 2e-5 * time_s),  # fitted with a zero that drifts
-        lambda time_s, angle: (time_s, np.where(time_s > 80.0, 0.9 * angle, angle)),  # to a part
+        lambda time_s, angle: (  # to a part
+            time_s[:1600],
+            np.where(time_s > 40.0, 0.97 * angle, angle)[:1600],
+        ),
         lambda time_s, angle: (time_s, np.where(time_s == time_s[900], angle + 0.1, angle)),
     ],
     ids=["clock", "zero", "gain", "glitch"],

@@ -76,7 +76,7 @@ def test_shared_values_are_better_known_than_in_the_best_recording() -> None:
 
 
 def test_a_torque_that_is_known_is_that_of_all() -> None:
-    pair = [swing(amplitude, 7) for amplitude in (0.05, 0.4)]
+    pair = [swing(amplitude, 7).between(0.0, 40.0) for amplitude in (0.05, 0.4)]
     springs = pp.diagnose(pair, volts_per_radian=1.0, together=True, restoring="linear")
     assert {each.restoring for each in (springs, *springs.alone)} == {"linear"}
     assert "circular-error" not in {each.identifier for each in springs.effects}
