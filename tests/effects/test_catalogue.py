@@ -183,13 +183,18 @@ FREQUENCIES = ("f_2", "f_d", "f_h", "f_a", "detuning")
 BASELINE_STEPS = {A: 1e-5, B: 1e-5, C: 1e-6, OMEGA: 1e-5, START: 1e-5, TIME: 1e-5, OFFSET: 1e-5}
 
 
-@pytest.mark.parametrize("identifier", WITH_SIZE)
-def test_derivatives_by_the_effects_own_values(identifier: str) -> None:
-    """Derivatives against central differences, an instant's own neighbourhood apart."""
+def with_derivatives(identifier: str) -> tuple[Effect, Model, FloatArray, FloatArray]:
+    """An effect on the baseline: its model, their values, and the derivatives of the readings."""
     effect = by_identifier(identifier)
     model = Model(RECORD, 0.05).adding(effect)
     value = np.append(BASE, VALUES[identifier])
-    found = jacobian(model, value, model.evaluate(value))
+    return effect, model, value, jacobian(model, value, model.evaluate(value))
+
+
+@pytest.mark.parametrize("identifier", WITH_SIZE)
+def test_derivatives_by_the_effects_own_values(identifier: str) -> None:
+    """Derivatives against central differences, an instant's own neighbourhood apart."""
+    effect, model, value, found = with_derivatives(identifier)
     for index in range(len(BASE), model.size):
         name = ["size", *(p.name for p in effect.parameters)][
             index - len(BASE) + 1 - effect.parameter_free
@@ -215,10 +220,7 @@ def test_derivatives_by_the_baselines_values(identifier: str) -> None:
     What the effect itself adds to the readings is not followed into these columns: they are
     off by as much as the effect is of the amplitude, which slows a fit a little.
     """
-    effect = by_identifier(identifier)
-    model = Model(RECORD, 0.05).adding(effect)
-    value = np.append(BASE, VALUES[identifier])
-    found = jacobian(model, value, model.evaluate(value))
+    _, model, value, found = with_derivatives(identifier)
     for index, step in BASELINE_STEPS.items():
         expected = numerical(model, value, index, step)
         error = np.linalg.norm(found[:, index] - expected)

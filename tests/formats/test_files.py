@@ -197,35 +197,47 @@ def test_the_strength_of_a_tone_may_swing(tmp_path: Path) -> None:
     assert any("a tone whose strength swings" in note for note in recording.notes)
 
 
-def test_repeated_cells_are_counted_before_they_are_there(tmp_path: Path) -> None:
-    """2.3 million cells, each of which says that it stands for 64."""
-    cell = "<table:table-cell office:value='1234567.5' table:number-columns-repeated='64'/>"
-    path = tmp_path / "a.ods"
-    path.write_bytes(opendocument(f"<table:table-row>{1000 * cell}</table:table-row>" * 2300))
-    tracemalloc.start()
-    with pytest.raises(InputError, match="it has more than 600000 cells"):
-        read(path)
-    peak_bytes = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak_bytes < 100e6
+CELL = "<table:table-cell office:value='1234567.5' table:number-columns-repeated='64'/>"
 
 
-@pytest.mark.parametrize("form", ["npz", "h5"])
-def test_arrays_are_counted_before_they_are_unpacked(tmp_path: Path, form: str) -> None:
-    """Three hundred megabytes of zeros pack into three hundred kilobytes."""
-    path, zeros = tmp_path / f"a.{form}", np.zeros(40_000_000)
-    if form == "npz":
-        np.savez_compressed(path, time_s=TIME, angle_rad=zeros)
-    else:
-        with h5py.File(path, "w") as file:
-            file.create_dataset("angle_rad", data=zeros, chunks=(10**6,), compression=1)
-    del zeros
+def zeros(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        file.create_dataset("angle_rad", data=np.zeros(40_000_000), chunks=(10**6,), compression=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "said", "most_bytes"),
+    [
+        # 2.3 million cells, each of which says that it stands for 64.
+        (
+            "a.ods",
+            lambda path: path.write_bytes(
+                opendocument(f"<table:table-row>{1000 * CELL}</table:table-row>" * 2300)
+            ),
+            "it has more than 600000 cells",
+            100e6,
+        ),
+        # Three hundred megabytes of zeros pack into three hundred kilobytes.
+        (
+            "a.npz",
+            lambda path: np.savez_compressed(path, time_s=TIME, angle_rad=np.zeros(40_000_000)),
+            "it unpacks to 305 MB",
+            50e6,
+        ),
+        ("a.h5", zeros, "it unpacks to 305 MB", 50e6),
+    ],
+    ids=["repeated cells", "npz", "h5"],
+)
+def test_what_is_packed_is_counted_before_it_is_there(
+    tmp_path: Path, name: str, write: Callable[[Path], object], said: str, most_bytes: float
+) -> None:
+    write(tmp_path / name)
     tracemalloc.start()
-    with pytest.raises(InputError, match="it unpacks to 305 MB"):
-        read(path)
+    with pytest.raises(InputError, match=said):
+        read(tmp_path / name)
     peak_bytes = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak_bytes < 50e6
+    assert peak_bytes < most_bytes
 
 
 @pytest.mark.parametrize(
