@@ -104,13 +104,9 @@ def run_fit(home: Path) -> None:
         written.append(home / "fit.json")
 
 
-DAMAGES = pytest.mark.parametrize(
-    ("change", "problem"),
-    [(cut, "torn"), (emptied, "empty"), (altered, "altered")],
+@pytest.mark.parametrize(
+    ("change", "problem"), [(cut, "torn"), (emptied, "empty"), (altered, "altered")]
 )
-
-
-@DAMAGES
 def test_a_job_sets_a_damaged_input_aside_and_does_not_run(
     home: Path, change: Callable[[bytes], bytes], problem: str
 ) -> None:
@@ -126,29 +122,6 @@ def test_a_job_sets_a_damaged_input_aside_and_does_not_run(
     assert not recording.exists()
     (kept,) = home.glob("recording.csv.damaged-*")
     assert kept.read_bytes() == damaged
-
-
-@DAMAGES
-def test_planning_notices_a_damage_whose_time_was_put_back_and_touches_nothing(
-    home: Path, change: Callable[[bytes], bytes], problem: str
-) -> None:
-    assert noticed(home) == []
-    with_its_old_time(home / "fit.json", change)
-    before = sorted(home.rglob("*"))
-    (line,) = noticed(home)
-    assert line.startswith(f"{home / 'fit.json'}: ")
-    assert problem in line
-    assert sorted(home.rglob("*")) == before
-
-
-@pytest.mark.parametrize("stage", ["fit", "acquire"])
-def test_a_manifest_whose_time_lies_ahead_hides_no_damage(home: Path, stage: str) -> None:
-    """Somebody has touched it: the result is altered before that time and after the manifest."""
-    for path in (home / manifest.FOLDER).glob("*.json"):
-        os.utime(path, (4e9, 4e9))
-    with_its_old_time(home / {"fit": "fit.json", "acquire": "recording.csv"}[stage], altered)
-    (line,) = noticed(home)
-    assert "altered" in line
 
 
 def test_a_clock_that_was_set_back_hides_no_damage(
