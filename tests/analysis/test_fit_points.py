@@ -274,20 +274,6 @@ def test_far_from_bounds_the_interval_is_symmetric() -> None:
     assert (low, high) == pytest.approx((100.0 - HALF_95 * sd, 100.0 + HALF_95 * sd))
 
 
-def test_one_parameter_near_its_bound_keeps_the_upper_end() -> None:
-    """At 0.5 sd the lower end is the bound, the upper that of the free estimate."""
-    bounds = Bounds(np.zeros(1), np.full(1, np.inf))
-    ends = intervals95(np.array([0.5]), np.eye(1), np.zeros(1), bounds, [0])
-    assert ends[0] == pytest.approx((0.0, 0.5 + HALF_95))
-
-
-def test_at_the_bound_the_slope_shortens_the_interval() -> None:
-    """Minimum at -1 outside: chi^2 = (x + 1)^2 - 1 rises by 3.84 at sqrt(4.84) - 1."""
-    bounds = Bounds(np.zeros(1), np.full(1, np.inf))
-    ends = intervals95(np.zeros(1), np.eye(1), np.array([-1.0]), bounds, [0])
-    assert ends[0] == pytest.approx((0.0, math.sqrt(1.0 + HALF_95**2) - 1.0), abs=1e-3)
-
-
 def test_intervals_cover_the_truth_on_the_bound() -> None:
     """In truth c = 0, correlated with b: at least 95 % of the intervals hold both."""
     rng = np.random.default_rng(5)
