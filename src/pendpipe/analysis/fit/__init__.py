@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -200,11 +201,9 @@ def _waveform(
     stated: bool,
 ) -> FitResult:
     """Fit all readings, with the torque that is given, presumed, or that they ask for."""
-
-    def fitted(torque: Restoring) -> Forms | None:
-        return fitted_waveform(
-            samples, points, baseline=baseline, fixed=fixed, restoring=torque, length_m=length_m
-        )
+    fitted = partial(
+        fitted_waveform, samples, points, baseline=baseline, fixed=fixed, length_m=length_m
+    )
 
     def result(forms: Forms | None, torque: Restoring) -> FitResult:
         if forms is not None:
@@ -216,12 +215,12 @@ def _waveform(
     if restoring is None and not (stated and may_be_sine(points)):
         restoring = restoring_of(points, stated=stated)
     if restoring is not None:
-        return result(fitted(restoring), restoring)
+        return result(fitted(restoring=restoring), restoring)
     first = restoring_of(points)
     second: Restoring = "linear" if first == "sine" else "sine"
-    forms, others = fitted(first), None
+    forms, others = fitted(restoring=first), None
     if forms is None:
-        return result(fitted(second), second)
+        return result(fitted(restoring=second), second)
     own, other, odds = forms.fitted, None, _SURE
     if own.minimum.converged and forms.goodness.enlarged == 1.0:
         # What fits to the noise tells by itself how far off the other is.
@@ -229,7 +228,7 @@ def _waveform(
         odds = 0.5 * apart.chi2
         if apart.chi2 < _CERTAIN:
             other = own.with_torque(second, points, apart)
-    elif (others := fitted(second)) is not None:
+    elif (others := fitted(restoring=second)) is not None:
         other = others.fitted
     if other is not None:
         odds = min(max(own.better_by(other), -_SURE), _SURE)
@@ -238,14 +237,14 @@ def _waveform(
     no_pendulum = pendulum is not None and not pendulum.minimum.converged
     is_spring = for_spring > ODDS or no_pendulum
     if spring is not None and spring.minimum.converged and is_spring:
-        spring_forms = forms if first == "linear" else others or fitted("linear")
+        spring_forms = forms if first == "linear" else others or fitted(restoring="linear")
         found, words = result(spring_forms, "linear"), for_spring / math.log(10.0)
         said = (
             "x fits better than sin x by a likelihood ratio of"
             f" 10^{words:.0f}: a spring or torsion wheel"
         )
         return replace(found, torque_odds=for_spring, warnings=(*found.warnings, said))
-    found = result(forms if first == "sine" else others or fitted("sine"), "sine")
+    found = result(forms if first == "sine" else others or fitted(restoring="sine"), "sine")
     found = replace(found, torque_odds=-for_spring)
     if spring is None or for_spring < -ODDS or not spring.minimum.converged:
         return found

@@ -140,18 +140,7 @@ def fit_energies(
     slope = np.maximum(slope, 1e-3 * np.max(slope))
     shared = -points.level_coupling * points.side
     for _ in range(2):
-        both = y[1:] + y[:-1]
-        k = np.sin(0.5 * y) if sine else 0.5 * y
-        # The energy falls evenly along the path: means of k^2 and k of a half swing.
-        high, low = k[:-1], k[1:]
-        square = 0.5 * (high**2 + low**2)
-        mean = (2.0 * square + high * low) / (1.5 * np.maximum(high + low, 1e-300))
-        viscous = 4.0 * math.pi * square
-        if sine:
-            first, second = elliptic(square)
-            viscous = 16.0 * (second - (1.0 - square) * first)
-        linear = share * math.pi * both * mean + (1.0 - share) * viscous
-        losses = np.stack([2.0 * math.pi * both * square, linear, 0.5 * math.pi * both]) * swings
+        losses = _half_swing_losses(y, share, sine=sine) * swings
         lost = np.cumsum(np.pad(losses, ((0, 0), (1, 0))), axis=1)
         jacobian = np.stack([*(-lost / slope), slope[0] / slope, shared], axis=1)
         residual = (energy - energy[0]) / slope - jacobian @ (start - base)
@@ -163,6 +152,23 @@ def fit_energies(
         y = np.clip(model, 0.0, most)
     quadratic = moved(quadratic, step)
     return EnvelopeFit(value, quadratic, held, model, residual, converged=True)
+
+
+def _half_swing_losses(y: FloatArray, share: float, *, sine: bool) -> FloatArray:
+    """Energy lost between neighbouring turning points for a, b, c of one, over omega: (3, k - 1).
+
+    The energy falls evenly along the path, which gives the means of the modulus and its square.
+    """
+    both, modulus = y[1:] + y[:-1], np.sin(0.5 * y) if sine else 0.5 * y
+    high, low = modulus[:-1], modulus[1:]
+    square = 0.5 * (high**2 + low**2)
+    mean = (2.0 * square + high * low) / (1.5 * np.maximum(high + low, 1e-300))
+    viscous = 4.0 * math.pi * square
+    if sine:
+        first, second = elliptic(square)
+        viscous = 16.0 * (second - (1.0 - square) * first)
+    linear = share * math.pi * both * mean + (1.0 - share) * viscous
+    return np.stack([2.0 * math.pi * both * square, linear, 0.5 * math.pi * both])
 
 
 def _start(points: TurningPoints, fixed: Mapping[str, float]) -> tuple[FloatArray, tuple[int, ...]]:

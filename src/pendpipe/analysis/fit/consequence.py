@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.decrement import TOLERANCE, Check, Light
+from pendpipe.analysis.fit.decrement import CLEAR, TOLERANCE, Check, Light
 from pendpipe.analysis.fit.period import fit_period
 from pendpipe.analysis.fit.quality import relative_loss_sd
 from pendpipe.analysis.turning_points import TurningPoints
@@ -33,8 +33,6 @@ _FEWEST: Final = 6
 """Turning points of which a period is asked."""
 _LATE: Final = 4.0
 """Variance of their times over their own beyond which they are late as no law has it."""
-_CLEAR: Final = 8.0
-"""Standard deviations that a turning point must stand out."""
 _OFF: Final = 2.4
 """Standard deviations of the turning points beyond which a loss is off, where the law is known to
 miss something: one of three is by chance in one decay of twenty."""
@@ -58,7 +56,7 @@ def check_period(points: TurningPoints, law: Eq8) -> tuple[Check, ...]:
         Of the whole decay, and of its large, middle and small swings; empty where there are too
         few of them.
     """
-    clear = points.chosen(points.amplitude_rad > _CLEAR * points.angle_sd_rad)
+    clear = points.chosen(points.amplitude_rad > CLEAR * points.angle_sd_rad)
     count = len(clear)
     if count < _FEWEST or not np.all(np.isfinite(clear.time_sd_s)):
         # Somebody looked at these times, and nothing turned there.

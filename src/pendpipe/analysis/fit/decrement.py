@@ -31,7 +31,7 @@ _FALL: Final = 0.4
 _STEEP: Final = 0.5
 """The same over the fewest turning points: of Coulomb's straight line they show 2 % too little, and
 ever less nearer to the stop."""
-_SEEN: Final = 8.0
+CLEAR: Final = 8.0
 """Standard deviations that a turning point must stand out."""
 _MISSED: Final = 1e-6
 """Part of an amplitude by which the cycle about it may miss it."""
@@ -105,7 +105,7 @@ def check_decrement(points: TurningPoints, law: Eq8) -> tuple[Check, ...]:
     tuple of Check
         The large amplitude first; empty where there are too few turning points.
     """
-    least = np.maximum(_SEEN * points.angle_sd_rad, _STEPS * points.step_rad)
+    least = np.maximum(CLEAR * points.angle_sd_rad, _STEPS * points.step_rad)
     clear = points.chosen(points.amplitude_rad > least)
     while (
         len(clear) > 3 * _FEWEST
