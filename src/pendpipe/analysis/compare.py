@@ -5,6 +5,7 @@ tails.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -105,18 +106,16 @@ def tail_fits(points: TurningPoints) -> list[dict[str, Any]]:
     last = len(points) - FEWEST_IN_A_TAIL
     if last < 1:
         return []
-    starts = np.unique(np.linspace(0, last, TAILS).astype(np.int64))
-    return [tail for start in starts.tolist() if (tail := _tail(points, start))]
-
-
-def _tail(points: TurningPoints, start: int) -> dict[str, Any] | None:
-    part = points.chosen(np.arange(len(points)) >= start)
-    try:
-        found = fit_points(part).parameters
-    except InputError:
-        return None  # too little is left of it
-    return {
-        "start_s": float(part.time_s[0] - points.time_s[0]),
-        "amplitude_rad": float(abs(part.angle_rad[0])),
-        **{letter: found[letter].as_json() for letter in "abc"},
-    }
+    tails = []
+    for start in np.unique(np.linspace(0, last, TAILS).astype(np.int64)).tolist():
+        part = points.chosen(slice(start, None))
+        with suppress(InputError):  # too little is left of it
+            found = fit_points(part).parameters
+            tails.append(
+                {
+                    "start_s": float(part.time_s[0] - points.time_s[0]),
+                    "amplitude_rad": float(abs(part.angle_rad[0])),
+                    **{letter: found[letter].as_json() for letter in "abc"},
+                }
+            )
+    return tails

@@ -366,7 +366,10 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
         When there is no free decay of at least three half cycles: one line that says why.
     """
     time, values, least, half_period = _looked_at(recording, place)
-    pieces = [piece for piece in _pieces(time, 2.0 * half_period) if piece.stop - piece.start >= 8]
+    # A gap of a period parts the record: in it the motion could have done anything.
+    edges = (np.flatnonzero(np.diff(time) > 2.0 * half_period) + 1).tolist()
+    parted = pairwise([0, *edges, len(time)])
+    pieces = [slice(first, last) for first, last in parted if last - first >= 8]
     parts = [half_cycles(time[piece], values[piece], least, half_period) for piece in pieces]
     gapless = pieces == [slice(0, len(time))]
     whole = parts[0] if gapless else half_cycles(time, values, least, half_period)
@@ -510,12 +513,6 @@ def _flat_turns(time: FloatArray, values: FloatArray, run: Run) -> int | None:
     return None
 
 
-def _pieces(time: FloatArray, longest_s: float) -> list[slice]:
-    """Part the record at gaps in which the motion could have done anything."""
-    edges = (np.flatnonzero(np.diff(time) > longest_s) + 1).tolist()
-    return [slice(*ends) for ends in pairwise([0, *edges, len(time)])]
-
-
 def _chained(found: list[Run], told: Run) -> list[Run]:
     """The runs that one decay makes where gaps part the record, in the order of time."""
     chain = [told]
@@ -553,14 +550,6 @@ def _goes_on(run: Run, follower: Run) -> bool:
     few, many = 0.5 * number * min(losses), 2.0 * number * max(losses)
     agree = max(abs(count - number) for count in counts) < _COUNTED
     return agree and few - cycles.step < lost < many + cycles.step
-
-
-def _rise(swing: FloatArray) -> float:
-    """The most that swings grow again after having been smaller, over blocks that calm noise."""
-    if len(swing) < 2 * _BLOCKS:
-        return 0.0
-    means = np.array([float(np.mean(part)) for part in np.array_split(swing, _BLOCKS)])
-    return float(np.max(means - np.minimum.accumulate(means)))
 
 
 def _beating(
@@ -630,7 +619,11 @@ def _falls(run: Run, least: float) -> bool:
     third = max(1, len(swing) // 3)
     fall = float(np.mean(swing[:third]) - np.mean(swing[-third:]))
     scatter = float(np.std(np.diff(swing))) / np.sqrt(2.0)
-    few = max(3.0 * scatter / np.sqrt(third), _rise(swing), 0.3 * least, 1e-4 * float(swing[0]))
+    # The most that swings grow again after having been smaller, over blocks that calm noise.
+    blocks = np.array_split(swing, _BLOCKS) if len(swing) >= 2 * _BLOCKS else [swing[:1]]
+    means = np.array([float(np.mean(part)) for part in blocks])
+    rise = float(np.max(means - np.minimum.accumulate(means)))
+    few = max(3.0 * scatter / np.sqrt(third), rise, 0.3 * least, 1e-4 * float(swing[0]))
     return bool(fall > few)
 
 

@@ -180,16 +180,6 @@ def share_of_swing(share: float, _: Pendulum, span: Span) -> float:
     return share * span.first_amplitude
 
 
-def hundredth(_: Pendulum, __: Span) -> float:
-    """A pure number."""
-    return 0.01
-
-
-def hundredth_of_a_radian(pendulum: Pendulum, _: Span) -> float:
-    """Its time, s."""
-    return 0.01 / pendulum.angular_frequency
-
-
 @follows(
     "acceleration",
     attrgetter("angle"),
@@ -272,7 +262,7 @@ def profile_curve(motion: Motion, pendulum: Pendulum, profile: FloatArray) -> Fl
     "acceleration",
     attrgetter("time_s"),
     partial(instants, 10),
-    hundredth,
+    lambda _, __: 0.01,
     drawn=("value", "quadrature"),
     in_time=True,
     prior=-6.0,
@@ -400,7 +390,7 @@ def damping_in_time_curve(motion: Motion, pendulum: Pendulum, rate: FloatArray) 
     "reading",
     attrgetter("amplitude"),
     partial(amplitudes, 13),
-    hundredth,
+    lambda _, __: 0.01,
     over_logarithm=True,
     identifier="unnamed-measurement",
     name="a gain that depends on the swing in an unknown way",
@@ -419,7 +409,7 @@ def gain_curve(sampled: Sampled, pendulum: Pendulum, gain: FloatArray) -> FloatA
     "reading",
     attrgetter("amplitude"),
     partial(amplitudes, 13),
-    hundredth_of_a_radian,
+    lambda pendulum, _: 0.01 / pendulum.angular_frequency,
     over_logarithm=True,
     identifier="unnamed-measurement",
     name="a delay that depends on the swing in an unknown way",

@@ -139,10 +139,6 @@ class Span(NamedTuple):
         closer = 0.5 * share + 0.25 * (1.0 - np.cos(math.pi * share))
         return np.asarray(self.start_s + edge + (self.duration_s - 2.0 * edge) * closer)
 
-    def amplitudes(self, count: int) -> FloatArray:
-        """Amplitudes for a scan, in equal ratios, within those of the record."""
-        return np.geomspace(self.last_amplitude, self.first_amplitude, count + 2)[1:-1]
-
 
 class Effect:
     """One thing that may have been left out.

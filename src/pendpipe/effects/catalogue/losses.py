@@ -11,7 +11,6 @@ from pendpipe.dynamics.half_derivative import half_derivative
 from pendpipe.effects.effect import (
     Parameter,
     Pendulum,
-    Span,
     between,
     enters,
     half_cycle_of_release,
@@ -90,12 +89,6 @@ SPEED: Final = 0.1
 """rad/s at which the size is the friction's acceleration."""
 
 
-def envelope_factor(exponent: float) -> float:
-    """g_n = <|sin|^(n+1)>: c|v|^n lowers the amplitude by c (omega y)^n g_n/omega a second."""
-    gamma = math.gamma
-    return gamma(0.5 * exponent + 1.0) / (math.sqrt(math.pi) * gamma(0.5 * exponent + 1.5))
-
-
 @enters(
     "acceleration",
     identifier="power-law-damping",
@@ -127,7 +120,9 @@ def power_law_damping(
     """
     law = (1.0 - energy) * np.abs(motion.velocity / SPEED) ** exponent
     if energy:
-        alike = 0.5 * math.pi * envelope_factor(exponent)
+        # c|v|^n lowers the amplitude by c (omega y)^n <|sin|^(n+1)>/omega a second.
+        gammas = math.gamma(0.5 * exponent + 1.0) / math.gamma(0.5 * exponent + 1.5)
+        alike = 0.5 * math.sqrt(math.pi) * gammas
         speed = np.sqrt(pendulum.energy(motion.angle, motion.velocity))
         law = law + energy * alike * (speed / SPEED) ** exponent
     return np.asarray(-size * motion.direction * law)
@@ -162,13 +157,6 @@ def cubic_damping(motion: Motion, pendulum: Pendulum, size: float, position: flo
     return np.asarray(-size * square * motion.velocity)
 
 
-def _peak_velocities(span: Span) -> list[tuple[float, ...]]:
-    """Fractions of the peak velocities within the record."""
-    omega = span.pendulum.angular_frequency
-    slow, fast = 0.3 * omega * span.last_amplitude, 0.5 * omega * span.first_amplitude
-    return rows(between(slow, fast, 6))
-
-
 @enters(
     "acceleration",
     identifier="stribeck-friction",
@@ -182,7 +170,11 @@ def _peak_velocities(span: Span) -> list[tuple[float, ...]]:
     discriminating_test=(
         "lubricate or clean the pivot: the loss at small amplitude must change alone"
     ),
-    shapes=_peak_velocities,
+    # Fractions of the peak velocities within the record.
+    shapes=lambda span: rows(
+        span.pendulum.angular_frequency
+        * between(0.3 * span.last_amplitude, 0.5 * span.first_amplitude, 6)
+    ),
 )
 def stribeck_friction(motion: Motion, pendulum: Pendulum, size: float, v_s: float) -> FloatArray:
     """Dry friction that fades above a sliding velocity v_s: more loss at small amplitude."""
@@ -311,7 +303,9 @@ def history_force(motion: Motion, pendulum: Pendulum, size: float) -> FloatArray
         "change the fluid's viscosity: the kink in the damping must move, in amplitude"
     ),
     # Amplitudes within the record, and a short and a long burst.
-    shapes=lambda span: rows(span.amplitudes(12), (0.4, 1.2)),
+    shapes=lambda span: rows(
+        np.geomspace(span.last_amplitude, span.first_amplitude, 14)[1:-1], (0.4, 1.2)
+    ),
 )
 def vortex_shedding(
     motion: Motion, pendulum: Pendulum, loss: float, critical: float, lasts: float

@@ -136,11 +136,6 @@ def gain_drift(sampled: Sampled, pendulum: Pendulum, rate: float, tau: float) ->
     return np.asarray(rate * relaxed(elapsed(sampled.time_s), tau) * sampled.angle)
 
 
-def _decayed_at_the_end(values: FloatArray, duration_s: float) -> float:
-    level, tau = values.tolist()
-    return float(abs(level * math.expm1(-duration_s / tau)))
-
-
 @enters(
     "reading",
     identifier="ac-coupling",
@@ -149,7 +144,9 @@ def _decayed_at_the_end(values: FloatArray, duration_s: float) -> float:
     parameters=(Parameter("u", "rad", -10.0, 10.0), Parameter("tau", "s", 1e-2, 1e6)),
     example=(1e-3, 5.0),
     discriminating_test="tilt the sensor and hold it: behind a capacitor the reading goes back",
-    displacement=_decayed_at_the_end,
+    displacement=lambda values, duration_s: float(
+        abs(values[0] * math.expm1(-duration_s / values[1]))
+    ),
     shapes=lambda span: rows(between(span.period_s, 0.5 * span.duration_s, 4)),
 )
 def ac_coupling(sampled: Sampled, pendulum: Pendulum, level: float, tau: float) -> FloatArray:
