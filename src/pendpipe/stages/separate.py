@@ -114,12 +114,9 @@ def widened(estimate: Estimate, relative_sd: float) -> Estimate:
     every quality factor, doesn't change.
     """
     added = relative_sd * abs(estimate.value)
-    interval = estimate.interval95
-    if interval is not None:
-        half = Z95 * added
-        below, above = estimate.value - interval[0], interval[1] - estimate.value
-        interval = (
-            estimate.value - float(np.hypot(below, half)),
-            estimate.value + float(np.hypot(above, half)),
-        )
-    return replace(estimate, sd=float(np.hypot(estimate.sd, added)), interval95=interval)
+    below, above = np.abs(np.array(estimate.bounds95) - estimate.value)
+    ends = (
+        estimate.value - float(np.hypot(below, Z95 * added)),
+        estimate.value + float(np.hypot(above, Z95 * added)),
+    )
+    return replace(estimate, sd=float(np.hypot(estimate.sd, added)), interval95=ends)
