@@ -11,6 +11,7 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.dynamics import Eq8, Release, sample
+from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.baseline import HYSTERETIC, SHARE, TIME as TIME_S, VISCOUS, B, pendulum_of
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.effect import STRAIGHT_S, Span
@@ -36,6 +37,16 @@ def test_a_drifting_frequency_runs_ahead_with_the_square_of_time() -> None:
         assert window.angular_frequency / OMEGA - 1.0 == pytest.approx(
             eps * window.time_s, rel=0.02, abs=2e-5 * eps * 60.0 + 1e-6
         )
+
+
+def test_a_motion_that_starts_after_the_first_readings_has_none_for_them() -> None:
+    """It goes on for half a cycle before its first turning point, and no further."""
+    model, value = Model(TIME, 0.04), baseline(b=0.01)
+    value[TIME_S] = 0.2 * CYCLE
+    assert np.all(np.diff(model.evaluate(value).sampled.phase) > 0.0)
+    value[TIME_S] = 2.5 * CYCLE
+    with pytest.raises(NoMotionError, match="the start is out of reach"):
+        model.evaluate(value)
 
 
 def test_a_frequency_jumps() -> None:
