@@ -218,6 +218,16 @@ def test_a_healthy_pendulum_takes_one_line() -> None:
     assert healthy.to_dict()["summary"]["missing"] == []
 
 
+def test_a_misfit_that_chance_does_not_explain_is_not_nothing() -> None:
+    left = replace(diagnosis(), unexplained_p_value=5e-10)
+    said = "no cause is found for the small misfit that is left (p = 5e-10)"
+    assert left.statement == said
+    assert replace(left, level=1e-10).statement == "nothing is missing (p = 5e-10)"
+    for p, chance in ((0.4, " more than chance would"), (5e-10, ", but more than by chance")):
+        text = statement("eq8", FittedModel({}, 1e-4, 1.0), [], 1e-4, p, p, 0.01)
+        assert f"no effect of the catalogue improves the fit{chance}" in text
+
+
 def test_what_is_presumed_is_fitted_and_not_missing() -> None:
     presumed = replace(named("circular-error"), presumed=True)
     assert replace(diagnosis(), effects=(presumed,)).statement == (

@@ -194,8 +194,6 @@ def _visible(curve: Curve, part: FloatArray) -> tuple[Curve, FloatArray]:
     return curve.reduced(mixing), mixing.T @ part
 
 
-LEVEL: Final = 0.01
-"""The false-alarm probability: how often a recording that lacks nothing is reported."""
 CATALOGUE_SHARE: Final = 0.5
 """Part of the significance level for the scan of the catalogue."""
 RED_NOISE_SHARE: Final = 0.2

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from pendpipe.analysis.fit.result import FitResult, drawer_of
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.diagnosis.summary import BASELINES, Summary, html_of, summarise
+from pendpipe.diagnosis.summary import BASELINES, LEVEL, Summary, html_of, summarise
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.estimate import Estimate
 
@@ -303,6 +303,8 @@ class Diagnosis:
         Imports what draws it (`pendpipe.api`): a result knows no figures.
     restoring, drag_form
         The baseline's torque, and the form of drag that the readings prefer.
+    level
+        The p-value from which chance explains a misfit.
     """
 
     baseline_name: str
@@ -329,6 +331,7 @@ class Diagnosis:
     search: Hypothesis | None = field(default=None, repr=False, compare=False)
     alone: tuple[Diagnosis, ...] = field(default=(), repr=False, compare=False)
     recordings: tuple[dict[str, Any], ...] = ()
+    level: float = LEVEL
     drawn_by: Callable[[], Any] | None = field(default=None, repr=False, compare=False)
 
     @property

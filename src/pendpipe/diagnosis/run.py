@@ -20,7 +20,6 @@ from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import begin
 from pendpipe.diagnosis.cycles import SmallSwings, small_swings
 from pendpipe.diagnosis.data import with_scatter
-from pendpipe.diagnosis.detect import LEVEL
 from pendpipe.diagnosis.forensics.codes import with_true_step
 from pendpipe.diagnosis.forensics.lost_samples import loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
@@ -38,7 +37,7 @@ from pendpipe.diagnosis.result import (
     swinging,
 )
 from pendpipe.diagnosis.search import baseline_fitted, run_search
-from pendpipe.diagnosis.summary import COLOURED_NOISE, statement
+from pendpipe.diagnosis.summary import COLOURED_NOISE, LEVEL, statement
 from pendpipe.diagnosis.values import parameters_of
 from pendpipe.diagnosis.weighing import (
     Weighed,
@@ -252,6 +251,7 @@ def diagnose_decay(
         if found.first
         else (),
         search=found,
+        level=level,
     )
 
 

@@ -22,7 +22,6 @@ from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.detect import LEVEL
 from pendpipe.diagnosis.held_out import held_out
 from pendpipe.diagnosis.hypothesis import (
     Hypothesis,
@@ -45,7 +44,7 @@ from pendpipe.diagnosis.result import (
 from pendpipe.diagnosis.rivals import Scale
 from pendpipe.diagnosis.search import LESS_FRICTION, run_search
 from pendpipe.diagnosis.stacked import StackedData, StackedNoise
-from pendpipe.diagnosis.summary import COLOURED_NOISE, DOUBTFUL, statement
+from pendpipe.diagnosis.summary import COLOURED_NOISE, DOUBTFUL, LEVEL, statement
 from pendpipe.diagnosis.values import constants_of
 from pendpipe.diagnosis.weighing import (
     Weighed,
@@ -200,6 +199,7 @@ def diagnose_several(
         search=found,
         alone=tuple(outcomes),
         recordings=tuple(told),
+        level=level,
     )
 
 

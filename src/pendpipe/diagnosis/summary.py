@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 BASELINES: Final = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 """The baselines in words."""
+LEVEL: Final = 0.01
+"""The false-alarm probability: how often a recording that lacks nothing is reported."""
 NAMED: Final = 0.5
 """Probability from which a cause is named, its class counted together."""
 DOUBTFUL: Final = 0.05
@@ -265,7 +267,10 @@ def summarise(diagnosis: Diagnosis) -> Summary:
         coloured = "; its noise is coloured" if noise else ""
         wanders = any("the zero wanders" in note for note in diagnosis.warnings)
         zero = "; its zero wanders" if wanders else ""
-        return Summary(f"nothing is missing{beyond} ({p}){coloured}{zero}")
+        said = f"nothing is missing{beyond}"
+        if diagnosis.unexplained_p_value < diagnosis.level:
+            said = f"no cause is found{beyond} for the small misfit that is left"
+        return Summary(f"{said} ({p}){coloured}{zero}")
     contradicting = [
         each.name
         for each in found
@@ -624,9 +629,10 @@ def statement(
         agrees = f"the residual of {left} rms agrees with the noise ({noise_is})"
         if rounded and before.residual_rms_rad < noise_rms:
             agrees = f"it leaves {left} rms, less than the rounding adds ({noise_is})"
+        chance = " more than chance would" if unexplained >= level else ", but more than by chance"
         nothing = (
             f"{model} describes {what}: {agrees}, and no effect of the catalogue"
-            f" improves the fit more than chance would ({printed(unexplained)})."
+            f" improves the fit{chance} ({printed(unexplained)})."
         )
         lines = [nothing, *(f"{_capital(said)}." for said in noise)]
     return "\n".join([*lines, *([f"Note: {'; '.join(notes)}."] if notes else [])])
