@@ -191,8 +191,10 @@ class Recording:
 
     @cached_property
     def interval_s(self) -> float:
-        """The usual time between samples: the median of the differences."""
-        return float(np.median(np.diff(self.time_s))) if len(self) > 1 else float("nan")
+        """The usual time between samples, as `inspect` has it: gaps are left out."""
+        from pendpipe.formats.table import sample_rate
+
+        return 1.0 / sample_rate(self.time_s)
 
     def number(self, key: str, place: str | Path = "recording") -> float | None:
         """Read a number from the metadata of `place`; ``None`` where it is absent or blank."""

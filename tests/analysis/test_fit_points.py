@@ -446,6 +446,16 @@ def test_amplitudes_are_no_recording_of_the_swing() -> None:
         pp.diagnose(pp.Recording(time_s=TIME, angle_rad=FALL))
 
 
+def test_a_diagnosis_is_not_advised_where_it_refuses() -> None:
+    """Amplitudes that fall ever faster: no law of Eq. 13 does so."""
+    time = np.linspace(0.0, 400.0, 40)
+    noise = 1e-4 * np.random.default_rng(1).normal(size=40)
+    fit = pp.fit(time, 0.3 * np.exp(-((time / 300.0) ** 2)) + noise)
+    assert fit.light == "red"
+    assert "(from the amplitudes, without a law)" in str(fit)
+    assert str(fit).endswith("Next: --accept prints the law")
+
+
 def test_the_errors_of_a_b_and_the_half_life_cover_the_truth() -> None:
     """Fourteen amplitudes with all three losses, read to 0.5 % of the first, 120 times."""
     a, b, c = 0.01, 0.004, 1e-4

@@ -4,6 +4,7 @@ import json
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,9 @@ import pendpipe
 import pendpipe as pp
 from pendpipe import cli
 from pendpipe.analysis.fit import fit_recording
-from pendpipe.analysis.fit.decrement import check_decrement, loss_of, seen_loss
+from pendpipe.analysis.fit.decrement import Check, check_decrement, loss_of, seen_loss
 from pendpipe.analysis.fit.goodness import LEVEL, judge
+from pendpipe.analysis.fit.quality import seen_qualities
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, turning_points
@@ -81,6 +83,23 @@ def test_rounded_stamps_of_even_times_are_even() -> None:
     result = pp.fit(pp.Recording(np.round(true, 2), angle_rad=recording.values))
     assert result.noise_rms_rad == pytest.approx(2e-4, rel=0.05)
     assert result["b"].sd == pytest.approx(pp.fit(recording)["b"].sd, rel=0.05)
+
+
+@pytest.mark.parametrize(("rate", "digits"), [(30.0, 3), (1e4, 9)])
+def test_a_fit_names_the_rate_that_inspect_names(rate: float, digits: int) -> None:
+    """Of stamps in milliseconds the median interval is 33 ms, or 30.3 Hz."""
+    true = np.arange(0.0, 12.0, 1.0 / rate)
+    swing = clean(Eq8(5.0, viscous=0.02, restoring="sine"), 0.2, true, 2e-4)
+    recording = pp.Recording(np.round(true, digits), angle_rad=swing.values)
+    assert recording.interval_s == pytest.approx(1.0 / rate, rel=1e-4)
+    assert f", {rate:.0f} Hz, " in str(pp.fit(recording))
+
+
+def test_a_loss_within_its_error_shows_no_q() -> None:
+    fit = pp.fit(clean(Eq8(5.0, viscous=0.02), 0.2, np.arange(0.0, 60.0, 0.02), 2e-4))
+    checks = (Check(0.2, 0.02, 1e-6, 1e-3), Check(0.1, 0.02, 0.02, 1e-3))
+    (seen,) = seen_qualities(replace(fit, decrement_check=checks))
+    assert seen.quality_factor.value == pytest.approx(5.0 / (2.0 * 0.02), rel=1e-3)
 
 
 def test_uneven_times_stay_as_they_are() -> None:

@@ -221,7 +221,8 @@ def _quotable(
     if unseen:
         where = ", ".join(compact(each.amplitude_rad, unit) for each in unseen)
         known = max(each.seen_sd / abs(each.seen) for each in unseen)
-        problems.append(f"{name} at {where}: the {seen_in} show it to {100.0 * known:.0f} % only")
+        shown = f"show it to {100.0 * known:.0f} % only" if known < 1.0 else "do not show it"
+        problems.append(f"{name} at {where}: the {seen_in} {shown}")
     if len(checks) >= 3 and not (off or unseen):
         quotable += [] if math.isnan(result.value("frequency")) else ["Q"]
         if all(each.dominant for each in result.quality_factors):

@@ -114,7 +114,7 @@ def heading(result: FitResult, name: str = "") -> str:
     span = f"{float(np.ptp(points.time_s)):.3g} s"
     if result.method != "amplitudes" and decay is not None:
         rate = 1.0 / decay.interval_s if decay.interval_s > 0.0 else math.nan
-        span = f"{rate:.4g} Hz, {span}"
+        span = f"{float(f'{rate:.4g}'):g} Hz, {span}"
         swings = f"{0.5 * float(points.half_cycle[-1] - points.half_cycle[0]):.0f} swings"
     return f"{name}: {kind}, {span}, {swings} from {' to '.join(ends)}"
 
@@ -257,7 +257,8 @@ def sentence(result: FitResult) -> str:
             said.append(f"{share:.0f} % of the loss there is {LOSSES[loss]}")
     if not said:
         return "nothing of this fit can be quoted."
-    without = " (from the turning points, without a law)" if result.light == "red" else ""
+    of = "amplitudes" if result.method == "amplitudes" else "turning points"
+    without = f" (from the {of}, without a law)" if result.light == "red" else ""
     return f"{'; '.join(said)}{without}."
 
 
@@ -266,8 +267,10 @@ def following(result: FitResult) -> str:
     if result.light_reason.startswith(BEAT):
         return "pendpipe diagnose FILE fits both modes"
     if result.light == "red":
-        return f"{_DIAGNOSE}; --accept prints the law"
-    if result.refuted:
+        law = "--accept prints the law"
+        # The diagnosis is one of all readings.
+        return law if result.method == "amplitudes" else f"{_DIAGNOSE}; {law}"
+    if result.refuted and result.method != "amplitudes":
         return f"{_DIAGNOSE}; pendpipe page FILE makes a sheet to hand out"
     if result.method == "amplitudes":
         lacks = math.isnan(result.period.value)

@@ -30,6 +30,8 @@ LOSSES: Final = {
 """The three losses of Eq. 13 in words."""
 TOLD_APART: Final = 0.15
 """Standard deviation of a loss's share up to which it is told from the others."""
+_SEEN: Final = 2.0
+"""Standard deviations from which a loss is seen, and Q, its reciprocal, has an error."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,7 @@ def seen_qualities(result: FitResult) -> tuple[Quality, ...]:
             {},
         )
         for check in result.decrement_check
-        if check.seen > 0.0
+        if check.seen > _SEEN * check.seen_sd
     )
 
 
