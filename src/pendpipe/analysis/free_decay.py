@@ -583,8 +583,7 @@ def _beating(
     )
     if not np.max(smooth - np.minimum.accumulate(smooth)) > 0.2 * np.max(smooth):
         return None
-    start = float(cycles.turn_time_s[first])
-    stop = _stop(time, Run(slice(0, len(time)), cycles, first, last))
+    start, stop = float(cycles.turn_time_s[first]), float(cycles.turn_time_s[last + 1])
     from pendpipe.effects.two_modes import two_modes
 
     inside = (time >= start) & (time <= stop)
