@@ -24,7 +24,6 @@ from pendpipe.analysis.fit.period import Period
 from pendpipe.analysis.fit.result import PARAMETERS, fast_beside, result_of
 from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.analysis.turning_points import TurningPoints
-from pendpipe.dynamics import Eq8
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
 from pendpipe.recording import Quantity, Recording, sizes_of
@@ -81,15 +80,13 @@ def fit_amplitudes(
     sd = max(scatter, _FINEST * first) * _students(freedom)
     points = replace(points, angle_sd_rad=np.full(len(points), sd))
     envelope = fit_envelope(points, held.envelope)
-    a, b, c = (float(rate) for rate in envelope.value[:3])
-    share = held.share(b)
-    hysteretic = (0.5 if share is None else share) * b
+    a, b, c = envelope.value[:3].tolist()
     spread = turning * period.sd / period.value if period else math.nan
     times = Period(turning, points.start_s, np.diag([spread**2, 0.0]), math.nan, np.empty(0))
     value, matrix, intervals = numbers_of(points, envelope, times, 1.0)
     phase = PARAMETERS.index("phase")
     value[phase] = matrix[phase] = matrix[:, phase] = math.nan
-    law = Eq8(turning if period else fast_beside(a, b, c, first), a, hysteretic, b - hysteretic, c)
+    law = held.law(turning if period else fast_beside(a, b, c, first), (a, b, c))
     null = "phase and noise_rms_rad" if period else "frequency, phase and noise_rms_rad"
     said = [
         f"{null} have no finite value: amplitudes show none",

@@ -28,7 +28,6 @@ from pendpipe.analysis.torque import TOP, clear, elliptic, swing_phase
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics import Eq8
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.physics.decay import amplitude, amplitude_and_gradient
 
@@ -198,7 +197,7 @@ _LATE: Final = 3.0
 
 def envelope_and_period(
     points: TurningPoints, held: Held, restoring: Restoring, *, start: bool = False
-) -> tuple[EnvelopeFit, Period, float | None]:
+) -> tuple[EnvelopeFit, Period]:
     """Fit the amplitudes of turning points, and then their times; as a start without errors."""
     if restoring == "linear" and not start:
         envelope = fit_envelope(points, held.envelope)
@@ -216,7 +215,7 @@ def envelope_and_period(
         held=held.angular_frequency,
         restoring=restoring,
     )
-    return envelope, period, share
+    return envelope, period
 
 
 def fit_points(
@@ -250,12 +249,10 @@ def fit_points(
     fixed = fixed or {}
     points = points if restoring == "linear" else clear(points)
     held = Held(fixed, baseline, points.apparent_frequency_hz)
-    envelope, period, share = envelope_and_period(points, held, restoring)
-    a, b, c = (float(rate) for rate in envelope.value[:3])
+    envelope, period = envelope_and_period(points, held, restoring)
     freedom = max(len(points) - 4.0, 1.0)
     p_value = tail(envelope.chi2_per_dof, freedom, 1e9)
     stretched = envelope.chi2_per_dof if p_value < LEVEL else 1.0
-    hysteretic = (0.5 if share is None else share) * b
     late = (
         "the period changes along the record as Eq. 8's does not (chi^2 of the times is"
         f" {period.chi2_per_dof:.3g} per point): the frequency is a mean"
@@ -264,7 +261,7 @@ def fit_points(
         *numbers_of(points, envelope, period, stretched),
         envelope.held,
         points,
-        Eq8(period.angular_frequency, a, hysteretic, b - hysteretic, c, restoring),
+        held.law(period.angular_frequency, envelope.value[:3].tolist(), restoring),
         goodness=Goodness(
             points.noise_rms_rad, envelope.chi2_per_dof, (p_value,), max(stretched, 1.0)
         ),

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
 from pendpipe.analysis.fit.result import PARTS, Baseline
-from pendpipe.dynamics.eq8 import OMEGA, PLACES, SHARE, share_of
+from pendpipe.dynamics.eq8 import OMEGA, PLACES, SHARE, Eq8, Restoring, share_of
 from pendpipe.errors import InputError, refuse_if
 
 _ENVELOPE: Final = ("a", "b", "c", "amplitude", "offset")
@@ -131,3 +131,10 @@ class Held:
     def share(self, b: float) -> float | None:
         """The hysteretic share of b where the user, or the baseline, tells it."""
         return 0.0 if self.baseline == "viscous" else share_of(self.parts, b)
+
+    def law(self, omega: float, rates: Sequence[float], restoring: Restoring = "linear") -> Eq8:
+        """Eq. 8 with a, b and c; half of b is hysteretic where nothing tells how much."""
+        a, b, c = rates
+        share = self.share(b)
+        hysteretic = (0.5 if share is None else share) * b
+        return Eq8(omega, a, hysteretic, b - hysteretic, c, restoring)

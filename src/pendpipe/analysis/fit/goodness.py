@@ -111,6 +111,7 @@ def judge(
         Noise that can't be less.
     """
     n, freedom = len(residual), max(len(residual) - fitted - lines, 1)
+    least = max(quantisation_rms(step), floor)
     square = float(residual @ residual)
     phase, sums, weights = _binned(time_s, residual, turn_s, half_cycle)
     cycles = (phase[-1] - phase[0]) / (2.0 * math.pi)
@@ -121,18 +122,16 @@ def judge(
     count = len(found.square)
     of_noise = n - size * count
     if of_noise < 8:
-        noise = max(math.sqrt(square / freedom), quantisation_rms(step), floor)
+        noise = max(math.sqrt(square / freedom), least)
         return Goodness(noise, square / freedom / noise**2, (), 1.0)
-    noise = math.sqrt(max(square - float(np.sum(found.square)), 0.0) / of_noise)
-    noise = max(noise, quantisation_rms(step), floor)
+    noise = max(math.sqrt(max(square - float(np.sum(found.square)), 0.0) / of_noise), least)
     rounding = undithered_rms(np.interp(found.phase, half_cycle * math.pi, amplitude), step, noise)
     asked = list(_questions(found, noise, rounding, fitted, lines))
     p_values = tuple(tail(each.chi2 / each.freedom, each.freedom, of_noise) for each in asked)
     ratio = square / freedom / noise**2
     if combined(p_values) >= LEVEL:
         # Where all of the residual is noise, all of it tells how large that is.
-        whole = max(math.sqrt(square / freedom), quantisation_rms(step), floor)
-        return Goodness(whole, ratio, p_values, 1.0)
+        return Goodness(max(math.sqrt(square / freedom), least), ratio, p_values, 1.0)
     # What a, b, c suffer from is what is left at the motion's own frequency.
     own = max((each.chi2 / each.freedom for each in asked if each.name == "motion"), default=1.0)
     return Goodness(noise, ratio, p_values, max(ratio, own, 1.0))

@@ -32,16 +32,11 @@ def predicted(result: FitResult, time_s: FloatArray) -> FloatArray:
     level = np.full(len(time_s), result.value("offset"))
     if result.zero_drift is not None:
         level += result.zero_drift.value * (time_s - 0.5 * (points.start_s + points.stop_s))
-    order = np.argsort(time_s, kind="stable")
-    ordered = time_s[order]
-    before = ordered < turned_s
-    motion = np.empty(len(time_s))
-    early = turned_s - ordered[before]
-    loss = loss_of(result.law, y0)
+    order, motion = np.argsort(time_s, kind="stable"), np.empty(len(time_s))
+    before, after = np.split(order, [np.searchsorted(time_s[order], turned_s)])
+    early, loss = turned_s - time_s[before], loss_of(result.law, y0)
     swing = np.cos(omega * early) - loss / omega * np.sin(omega * early)
     motion[before] = side * y0 * np.exp(loss * early) * swing
-    if not before.all():
-        motion[~before] = sample(result.law, Release(turned_s, side * y0), ordered[~before])
-    found = np.empty(len(time_s))
-    found[order] = motion
-    return np.asarray(found + level)
+    if len(after):
+        motion[after] = sample(result.law, Release(turned_s, side * y0), time_s[after])
+    return np.asarray(motion + level)

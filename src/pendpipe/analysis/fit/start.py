@@ -52,8 +52,9 @@ def start_values(
     where the one before would be so large that there may be none below pi.
     """
     points = points if restoring == "linear" else clear(points)
-    envelope, period, share = envelope_and_period(points, held, restoring, start=True)
-    a, b, c, y0, level = (float(number) for number in envelope.value)
+    envelope, period = envelope_and_period(points, held, restoring, start=True)
+    a, b, c, y0, level = envelope.value.tolist()
+    share = held.share(b)
     # Times uncertain by more than 0.2 rad show no slip.
     late = period.late_rad[period.angular_frequency * points.time_sd_s < 0.2]
     slipped = held.angular_frequency is None and np.max(np.abs(late), initial=0.0) > _SLIP
