@@ -1,12 +1,12 @@
 """Find where model and recording differ, and what physics is missing.
 
 Eq. 8 (or Eq. 3) is fitted to a free decay. Its residual is searched for every effect of the
-catalogue, of the pendulum and of the measurement alike; those that chance does not explain are
-added to the model. The answer goes to standard output, about twelve lines; DIR gets diagnosis.json
-and the figures.
+catalogue, of the pendulum and of the measurement; those that chance does not explain are added to
+the model. About twelve lines go to standard output; --out DIR also gets diagnosis.json and the
+figures.
 
-With --together several FILEs are recordings of one pendulum: physics shared, start and noise each
-its own (docs/several.md).
+With --together the FILEs are recordings of one pendulum: they share the physics, and each has its
+own start and noise (docs/several.md).
 """
 
 from itertools import product

@@ -1,4 +1,4 @@
-"""Examine a campaign's results: what was altered, is unfinished, or is in the way.
+"""Examine a campaign's results: altered and unfinished files, locks and leftovers.
 
 Nothing is changed. Each line names a file or folder, what is wrong with it, and what is safe
 to do. The exit status is 0, unless ``--fail-on findings`` asks for 3.

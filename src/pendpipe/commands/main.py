@@ -23,24 +23,24 @@ from pendpipe.process import one_thread
 from pendpipe.version import __version__
 
 COMMANDS: Final = {
-    "inspect": "what a recording holds: format, channels, rate, gaps, clipping",
-    "convert": "any supported recording to the plain CSV form or to WinDaq (.wdh)",
+    "inspect": "describe a recording: format, channels, rate, gaps, clipping",
+    "convert": "convert a recording to the plain CSV form or to WinDaq (.wdh)",
     "acquire": "record from a DATAQ instrument, real or simulated",
-    "calibrate": "volts against angles to V/rad, with a linearity test",
-    "simulate": "a recording from a described pendulum and measurement chain",
-    "turning-points": "the turning points of one recording",
-    "fit": "a, b, c and the rest of one recording",
-    "diagnose": "what physics was left out: located, named, modelled",
-    "page": "one HTML page about one recording",
+    "calibrate": "find V/rad from volts against angles, with a linearity test",
+    "simulate": "simulate the recording of a described pendulum and measurement chain",
+    "turning-points": "find the turning points of a recording",
+    "fit": "find period, Q and the losses a, b, c of free decays",
+    "diagnose": "find which physics is missing: located, named, modelled",
+    "page": "write an HTML page about recordings",
     "init": "begin a campaign of your own recordings in a folder",
-    "campaign": "run a campaign: every recording of a table, by Snakemake",
-    "figures": "the figures 3 to 10 of a campaign",
-    "report": "one self-contained page about a campaign",
-    "doctor": "what is wrong with a campaign's results, and how to repair it safely",
+    "campaign": "run a campaign, every recording of a table, by Snakemake",
+    "figures": "draw figures 3 to 10 of a campaign",
+    "report": "write one self-contained page about a campaign",
+    "doctor": "find damaged results of a campaign, and say what is safe to do",
     "config": "check a configuration, or print its schema",
-    "effects": "the catalogue of what may have been left out",
-    "completion": "the completion script of a shell",
-    "stage": "one stage of a chunk of a campaign's records, as a job of the workflow",
+    "effects": "print the catalogue of effects",
+    "completion": "print the completion script of a shell",
+    "stage": "run one stage of a chunk of a campaign's records, as a job of the workflow",
 }
 """The commands with the line that ``--help`` shows for each."""
 SMALL: Final = frozenset(
@@ -48,10 +48,10 @@ SMALL: Final = frozenset(
 )
 """Those in one file, `pendpipe.commands.small`."""
 STAGES: Final = {
-    "separate": "the hysteretic and the viscous part of a campaign's losses",
-    "compare": "a campaign's losses beside Eq. 16",
-    "records": "one table of a campaign's records, as Parquet and CSV",
-    "diagnose-campaign": "what all records of a campaign together say is missing",
+    "separate": "separate hysteretic from viscous loss in a campaign",
+    "compare": "compare a campaign's losses with Eq. 16",
+    "records": "write one table of a campaign's records, as Parquet and CSV",
+    "diagnose-campaign": "diagnose all records of a campaign together",
 }
 """Stages of a campaign that are commands themselves."""
 

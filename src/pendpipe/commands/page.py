@@ -1,7 +1,7 @@
 """Write a page about a recording: a sheet to print with its fit, and the rest below a fold.
 
-The page is a single HTML file that needs no network. Several FILEs get a sheet each, and a table of
-all that links to them.
+The page is a single HTML file that needs no network. Several FILEs get a sheet each, and a table
+that links to them.
 """
 
 from dataclasses import replace

@@ -246,9 +246,9 @@ def configuration_manual() -> str:
 def init(arguments: Arguments) -> None:
     """Begin a campaign of your own recordings in a folder.
 
-    DIR gets config/config.yaml and config/records.tsv, the table of the records: a row for each
-    FILE, which stays where it is. Without any it gets two recordings as examples. `pendpipe
-    campaign` then runs at once. No file is ever replaced.
+    DIR gets config/config.yaml and config/records.tsv, the table of the records, with one row for
+    each FILE, which stays where it is. Without FILEs it gets two example recordings. Then run
+    `pendpipe campaign` in DIR. No file is ever replaced.
     """
     from pendpipe.files import write_whole
 
@@ -327,12 +327,12 @@ def _rows(folder: Path, own: list[Path]) -> list[str]:
 def campaign(arguments: Arguments) -> int:
     """Run a campaign: every recording of a table through all stages, by Snakemake.
 
-    It runs in the folder with config/config.yaml, which pendpipe init writes. What is done and has
-    not changed is not done again. All options of Snakemake can follow:
+    Run it in the folder with config/config.yaml, which pendpipe init writes. Only what is new or
+    has changed is done. All options of Snakemake can follow:
 
-    pendpipe campaign -n                        what would run
-    pendpipe campaign --record air-01           that record's own stages
-    pendpipe campaign -- --forcerun fit         the fits again, and what follows from them
+    pendpipe campaign -n                        shows what would run
+    pendpipe campaign --record air-01           runs that record's own stages
+    pendpipe campaign -- --forcerun fit         repeats the fits and what depends on them
     """
     from pendpipe.configuration.load import load_campaign
 
