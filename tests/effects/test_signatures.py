@@ -1,6 +1,7 @@
 """Signatures of losses, torques and readings, against closed forms."""
 
 import math
+from collections.abc import Callable
 
 import mpmath
 import numpy as np
@@ -49,30 +50,29 @@ def g(exponent: float) -> float:
     )
 
 
-@pytest.mark.parametrize("exponent", [0.5, 1.5, 2.5, 4.0])
-@pytest.mark.parametrize("energy_form", [0.0, 1.0])
-def test_a_power_law_lowers_the_amplitude_as_that_power(
-    exponent: float, energy_form: float
-) -> None:
+def by_power(exponent: float, form: float) -> tuple[object, ...]:
     """dy/dt = -f (w y/v_1)^n g_n/w in either form."""
     size = 0.02 / (OMEGA * 0.2 / 0.1) ** exponent
-    for amplitude, rate in fall_rates("power-law-damping", (size, exponent, energy_form), 0.2):
-        expected = size * (OMEGA * amplitude / 0.1) ** exponent * g(exponent) / OMEGA
-        assert rate == pytest.approx(expected, rel=0.01)
+    rate = size * g(exponent) / OMEGA * (OMEGA / 0.1) ** exponent
+    return "power-law-damping", (size, exponent, form), 0.2, lambda y: rate * y**exponent
 
 
-@pytest.mark.parametrize("form", [0.0, 0.4, 1.0])
-def test_cubic_damping_has_one_envelope(form: float) -> None:
-    """dy/dt = -d y^3/8, v^3 or x^2 v."""
-    for amplitude, rate in fall_rates("cubic-damping", (0.5, form), 0.2):
-        assert rate == pytest.approx(0.5 * amplitude**3 / 8.0, rel=0.01)
-
-
-def test_coulomb_friction_and_quadratic_drag_are_those_of_eq_13() -> None:
-    for amplitude, rate in fall_rates("coulomb-friction", (1e-3,), 0.2):
-        assert rate == pytest.approx(1e-3, rel=0.01), amplitude
-    for amplitude, rate in fall_rates("quadratic-drag", (0.05,), 0.2):
-        assert rate == pytest.approx(0.05 * amplitude**2, rel=0.01)
+@pytest.mark.parametrize(
+    ("identifier", "values", "start", "rate"),
+    [
+        *(by_power(exponent, form) for exponent in (0.5, 1.5, 2.5, 4.0) for form in (0.0, 1.0)),
+        # v^3 or x^2 v: one envelope.
+        *(("cubic-damping", (0.5, form), 0.2, lambda y: 0.5 * y**3 / 8.0) for form in (0, 0.4, 1)),
+        ("coulomb-friction", (1e-3,), 0.2, lambda _: 1e-3),
+        ("quadratic-drag", (0.05,), 0.2, lambda y: 0.05 * y**2),
+        ("vortex-shedding", (0.01, 0.2, 0.5), 0.3, lambda y: 0.01 * max(y - 0.2, 0.0)),
+    ],
+)
+def test_a_loss_lowers_the_amplitude_as_its_law_says(
+    identifier: str, values: tuple[float, ...], start: float, rate: Callable[[float], float]
+) -> None:
+    for amplitude, found in fall_rates(identifier, values, start):
+        assert found == pytest.approx(rate(amplitude), rel=0.01, abs=1e-7), amplitude
 
 
 def test_coulomb_friction_and_quadratic_drag_are_the_baselines_own() -> None:
@@ -121,12 +121,8 @@ def test_presliding_loses_in_a_cycle_what_its_loop_encloses() -> None:
     assert window.decay * window.amplitude == pytest.approx(OMEGA * scaled, rel=0.02)
 
 
-def test_vortices_are_shed_above_an_amplitude_only() -> None:
-    """dy/dt = -k (y - y_c) above y_c, nothing below."""
-    k, y_c = 0.01, 0.2
-    for amplitude, rate in fall_rates("vortex-shedding", (k, y_c, 0.5), 0.3):
-        assert rate == pytest.approx(k * max(amplitude - y_c, 0.0), rel=0.01, abs=1e-7)
-    below = reading("vortex-shedding", (k, 0.2, 0.5), baseline(start=0.15, b=0.01), TIME)
+def test_no_vortices_are_shed_below_their_amplitude() -> None:
+    below = reading("vortex-shedding", (0.01, 0.2, 0.5), baseline(start=0.15, b=0.01), TIME)
     np.testing.assert_allclose(below, plain(baseline(start=0.15, b=0.01), TIME), 0.0, 1e-9)
 
 
