@@ -166,6 +166,11 @@ def load(path: Path) -> Campaign:
     return load_campaign(read_configuration(path), path)
 
 
+def name_of(file: str) -> str:
+    """Name a recording in an answer: its file, without the folders."""
+    return "standard input" if file == "-" else Path(file).name
+
+
 def tell(line: str) -> None:
     """Print a line to standard error; results go to standard output."""
     print(line, file=sys.stderr)

@@ -20,6 +20,7 @@ from pendpipe.arguments import (
     FILES,
     Arguments,
     command,
+    name_of,
     print_answer,
     print_json,
     read_motion,
@@ -129,8 +130,7 @@ def _diagnose(arguments: Arguments, fixed: dict[str, float]) -> int:
         if isinstance(error, DamagedError) or not Path(arguments.file).is_file():
             raise
         return _not_analysable(arguments, within_results(error, arguments.refused), provenance)
-    name = "standard input" if arguments.file == "-" else Path(arguments.file).name
-    return _report(arguments, outcome, name)
+    return _report(arguments, outcome, name_of(arguments.file))
 
 
 def _report(arguments: Arguments, outcome: Diagnosis, name: str) -> int:

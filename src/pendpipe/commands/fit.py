@@ -21,7 +21,7 @@ from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.analysis.fit.printed import gravity_line, lines
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.turning_points import is_turning_points, read_turning_points
-from pendpipe.arguments import FILES, Arguments, command, print_answer, read_motion, tell
+from pendpipe.arguments import FILES, Arguments, command, name_of, print_answer, read_motion, tell
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import over
 from pendpipe.files import is_stream, read_json, write_json
@@ -170,8 +170,7 @@ def _scale_percent(arguments: Arguments) -> float | None:
 
 def _text(arguments: Arguments, result: FitResult) -> str:
     """The answer in words."""
-    name = "standard input" if arguments.file == "-" else Path(arguments.file).name
-    printed = lines(result, name=name, law=arguments.accept)
+    printed = lines(result, name=name_of(arguments.file), law=arguments.accept)
     length, gravity = arguments.length_m, arguments.gravity
     if length or gravity:
         printed.insert(-2, gravity_line(result, length=length, gravity=gravity))

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pendpipe import api
-from pendpipe.arguments import FILES, Arguments, command, read_motion, tell
+from pendpipe.arguments import FILES, Arguments, command, name_of, read_motion, tell
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.options import OUTPUT, flags
 from pendpipe.process import cores, in_order
@@ -54,7 +54,7 @@ def run(arguments: Arguments) -> int:
     if len(arguments.files) > 1:
         return _class(arguments)
     file = arguments.files[0]
-    name = "standard input" if file == "-" else Path(file).name
+    name = name_of(file)
     out = out or Path(name).with_suffix(".html")
     check_output(out)
     sheet = _sheet(arguments, file)
@@ -71,7 +71,7 @@ def _sheet(arguments: Arguments, file: str) -> Sheet:
 
     notes: list[str] = []
     arguments.file = file
-    name = "standard input" if file == "-" else Path(file).name
+    name = name_of(file)
     recording, provenance = read_motion(arguments, quiet=True, say=notes.append)
     result = replace(api.fit(recording, name=file), provenance=provenance, name=name)
     outcome = None
@@ -82,7 +82,6 @@ def _sheet(arguments: Arguments, file: str) -> Sheet:
 
 
 def _of_file(arguments: Arguments, file: str) -> Sheet:
-
     try:
         return _sheet(arguments, file)
     except InputError as problem:
