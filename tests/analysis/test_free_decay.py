@@ -3,6 +3,7 @@
 import contextlib
 from collections.abc import Iterable
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import pendpipe
 from pendpipe.analysis.free_decay import (
     FreeDecay,
     Run,
+    _falls,
     _running_median,
     best_runs,
     find_free_decay,
@@ -712,3 +714,12 @@ def test_a_run_before_a_rest_fades_and_before_a_knock_does_not(pause: float, fad
     half[19] *= pause
     found = {run.first: run.fades for run in best_runs(half_cycles(swing, half), EVERYTHING)}
     assert found[0] == fades
+
+
+@pytest.mark.parametrize(("last", "falls"), [(0.8, True), (0.92, False)])
+def test_of_three_half_cycles_the_first_and_the_last_tell_the_fall(
+    last: float, falls: bool
+) -> None:
+    """It must exceed three tenths of the least swing, here 0.15; means of two would halve it."""
+    swing = np.linspace(1.0, last, 3)
+    assert _falls(SimpleNamespace(swing=swing), 0.5) is falls  # type: ignore[arg-type]
