@@ -86,7 +86,7 @@ def plane_band_hz(span: Span) -> float:
     spectral=True,
     example=(1e-3, 2e-3, 4.3, 3.0),
     discriminating_test=(
-        "a second sensor on the stand, or another point of the rod; another release"
+        "put a second sensor on the stand or on another point of the rod; release it again"
     ),
     tone=lambda frequency_hz, decay_time_s: (
         None if math.isinf(decay_time_s) else (frequency_hz, decay_time_s)
@@ -138,7 +138,7 @@ def _detunings(span: Span) -> list[tuple[float, ...]]:
     ),
     sizes=2,
     example=(1e-3, 5e-4, 0.02),
-    discriminating_test="a second sensor across the first, or a longer record: beats must repeat",
+    discriminating_test="add a second sensor across the first, or record longer: beats must repeat",
     shapes=_detunings,
 )
 def plane_coupling(
@@ -234,7 +234,7 @@ BROADBAND_DRIVE: Final[Effect] = without_template(
     kind="dynamics",
     equation=r"\ddot x \mathrel{+}= \xi(t), \quad S_\xi(f) = S_a",
     parameters=(Parameter("acceleration_density", "(rad/s^2)^2/Hz", 0.0, 1e6),),
-    discriminating_test="record it at rest, and two pendulums at once: the walk does not repeat",
+    discriminating_test="record it at rest, and two at once: the random walk does not repeat",
 )
 
 
@@ -247,7 +247,7 @@ BROADBAND_DRIVE: Final[Effect] = without_template(
     parameters=(Parameter("rate", "1/s", -1.0, 1.0), RELAXATION),
     example=(1e-5, 30.0),
     discriminating_test=(
-        "release it again with the same amplitude: the frequency must have moved on"
+        "release it again with the same amplitude: the frequency must have drifted"
     ),
     prior_penalty=unusual_drift,
 )
@@ -265,7 +265,7 @@ def frequency_drift(motion: Motion, pendulum: Pendulum, rate: float, tau: float)
     equation=r"\ddot x \mathrel{+}= -2 \dot\gamma\, \tau (1 - e^{-t/\tau})\, \dot x",
     parameters=(Parameter("rate", "1/s^2", -10.0, 10.0), RELAXATION),
     example=(1e-4, 25.0),
-    discriminating_test="release it again with the same amplitude: the damping must have moved on",
+    discriminating_test="release it again with the same amplitude: the damping must have drifted",
 )
 def damping_drift(motion: Motion, pendulum: Pendulum, rate: float, tau: float) -> FloatArray:
     """A viscous damping that changes by rate tau (1 - e^(-t/tau)): what warms, or creeps.
@@ -302,7 +302,7 @@ def _crept_at_the_end(values: FloatArray, duration_s: float) -> float:
         Parameter("exponential", "1", 0.0, 1.0, 0.0),
     ),
     example=(1e-3, 10.0, 0.5),
-    discriminating_test="a second sensor or a level on the stand: a sensor's drift leaves it still",
+    discriminating_test="put a second sensor on the stand: it stays still if the first drifts",
     displacement=_crept_at_the_end,
     shapes=lambda span: [
         *rows(span.duration_s * np.array([0.03, 0.3, 3.0]), (0.0,)),
@@ -350,7 +350,7 @@ def equilibrium_step(jump: float, instant_s: float) -> Kick:
     parameters=(Parameter("s", "1", -5.0, 5.0), INSTANT),
     tried=72,
     example=(0.01, 21.03),
-    discriminating_test="repeat the record, watched: what touched it?",
+    discriminating_test="repeat the recording and watch: what touches it?",
 )
 def amplitude_step(jump: float, instant_s: float) -> Kick:
     """The amplitude changes at once by a factor e^s, the phase unchanged."""
@@ -367,7 +367,7 @@ def amplitude_step(jump: float, instant_s: float) -> Kick:
     tried=24,
     refined=False,
     example=(1e-4, 21.03),
-    discriminating_test="record on: before and after the jump the frequency must stand still",
+    discriminating_test="record longer: the frequency must be constant but for the jump",
 )
 def frequency_step(
     motion: Motion, pendulum: Pendulum, change: float, instant_s: float
@@ -387,9 +387,7 @@ def frequency_step(
     tried=24,
     refined=False,
     example=(0.3, 21.03),
-    discriminating_test=(
-        "repeat from the same amplitude: a power of the amplitude comes back, a rub not"
-    ),
+    discriminating_test="release it again alike: a law of the amplitude recurs, a rub does not",
 )
 def damping_step(motion: Motion, pendulum: Pendulum, change: float, instant_s: float) -> FloatArray:
     """All losses of the baseline change by a factor 1 + eps at an instant: a rub begins."""
@@ -406,7 +404,7 @@ def damping_step(motion: Motion, pendulum: Pendulum, change: float, instant_s: f
     tried=40,
     turn=0.25 * math.pi,
     example=(5e-3, 21.03),
-    discriminating_test="repeat the record: a knock does not come back at the same time",
+    discriminating_test="repeat the recording: a knock does not recur at the same time",
 )
 def impulse(jump: float, instant_s: float) -> Kick:
     """A knock: the velocity jumps, the angle does not."""
@@ -425,7 +423,7 @@ FADES: Final = 0.12
     parameters=(Parameter("gamma", "1/s", -10.0, 10.0), Parameter("tau", "s", 1e-2, 1e5)),
     local=True,
     example=(0.01, 5.0),
-    discriminating_test="leave the first swings out: the rest must agree without it",
+    discriminating_test="leave out the first swings: the rest must need no transient",
     # What fades later is a drift.
     bounds=lambda duration_s=math.inf: [
         (-10.0, 10.0),

@@ -31,7 +31,7 @@ from pendpipe.effects.effect import (
     prior=6.0,
     example=(1e-4,),
     discriminating_test=(
-        "let it swing to the end: it must stop, off the equilibrium, and not fade away"
+        "let it swing to the end: it must stop, off the equilibrium, instead of fading away"
     ),
 )
 def coulomb_friction(motion: Motion, pendulum: Pendulum, c: float) -> FloatArray:
@@ -104,7 +104,7 @@ SPEED: Final = 0.1
     ),
     example=(1e-3, 1.5, 0.3),
     discriminating_test=(
-        "release it with other amplitudes at once after another: time and amplitude part"
+        "release it with several amplitudes in quick succession: this separates time and amplitude"
     ),
     # Off those of Eq. 8 (0, 1, 2) and of the cubic law.
     shapes=lambda _: rows((0.5, 1.5, 2.5, 4.0), (0.0,)),
@@ -168,7 +168,7 @@ def cubic_damping(motion: Motion, pendulum: Pendulum, size: float, position: flo
     ),
     example=(1e-3, 0.1),
     discriminating_test=(
-        "lubricate or clean the pivot: the loss at small amplitude must change alone"
+        "lubricate or clean the pivot: only the loss at small amplitude must change"
     ),
     # Fractions of the peak velocities within the record.
     shapes=lambda span: rows(
@@ -300,7 +300,7 @@ def history_force(motion: Motion, pendulum: Pendulum, size: float) -> FloatArray
     ),
     example=(0.01, 0.1, 0.6),
     discriminating_test=(
-        "change the fluid's viscosity: the kink in the damping must move, in amplitude"
+        "change the fluid's viscosity: the amplitude of the kink in the damping must change"
     ),
     # Amplitudes within the record, and a short and a long burst.
     shapes=lambda span: rows(

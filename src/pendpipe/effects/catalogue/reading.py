@@ -110,7 +110,7 @@ def sensor_backlash(sampled: Sampled, pendulum: Pendulum, play: float) -> FloatA
     parameters=(Parameter("rate", "rad/s", -10.0, 10.0), RELAXATION),
     example=(1e-5, 25.0),
     discriminating_test=(
-        "a second sensor, or the sensor turned round: creep of the equilibrium turns too"
+        "use a second sensor, or turn the sensor round: creep of the equilibrium turns too"
     ),
 )
 def offset_drift(sampled: Sampled, pendulum: Pendulum, rate: float, tau: float) -> FloatArray:
@@ -143,7 +143,7 @@ def gain_drift(sampled: Sampled, pendulum: Pendulum, rate: float, tau: float) ->
     equation=r"y = x + u\, e^{-t/\tau}",
     parameters=(Parameter("u", "rad", -10.0, 10.0), Parameter("tau", "s", 1e-2, 1e6)),
     example=(1e-3, 5.0),
-    discriminating_test="tilt the sensor and hold it: behind a capacitor the reading goes back",
+    discriminating_test="tilt the sensor and hold it: with AC coupling the reading returns",
     displacement=lambda values, duration_s: float(
         abs(values[0] * math.expm1(-duration_s / values[1]))
     ),
@@ -216,7 +216,7 @@ COARSE_QUANTISATION: Final[Effect] = without_template(
     name="coarse quantisation",
     equation=r"y = q\, \operatorname{round}(x/q)",
     parameters=(Parameter("step", "rad", 0.0, math.inf),),
-    discriminating_test="narrow the range, or add noise of a step's size",
+    discriminating_test="narrow the range, or add noise of the size of a step",
 )
 COUNT_SLIPS: Final[Effect] = without_template(
     __name__,
@@ -415,7 +415,7 @@ TRACKING_NOISE: Final[Effect] = without_template(
         Parameter("kappa", "rad", -100.0, 100.0, 1.0),
         Parameter("rms", "1", 0.0, 1.0),
     ),
-    discriminating_test="track another mark on the bob, or the same mark once more",
+    discriminating_test="track another mark on the bob, or the same mark again",
 )
 COLOURED_NOISE: Final[Effect] = without_template(
     __name__,

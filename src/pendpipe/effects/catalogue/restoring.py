@@ -83,7 +83,7 @@ CIRCULAR_ERROR_IN: Final[dict[str, Effect]] = {
     parameters=(Parameter("k3", "1/rad^2", -100.0, 100.0),),
     example=(0.1,),
     discriminating_test=(
-        "release it again with half the amplitude: the frequency must follow its square"
+        "release it again with half the amplitude: the change of frequency must follow its square"
     ),
 )
 def cubic_stiffness(motion: Motion, pendulum: Pendulum, k3: float) -> FloatArray:
