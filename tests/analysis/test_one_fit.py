@@ -177,11 +177,11 @@ def test_what_noise_does_not_explain_is_seen(name: str, frequency: float, size: 
 
 
 def test_a_rate_that_is_known_to_sixty_deviations_is_told() -> None:
-    """No warning that a can't be told from b."""
+    """No warning that a can't be separated from b."""
     law = Eq8(ONE_HERTZ, quadratic=0.2, viscous=0.01, restoring="sine")
     result = pp.fit(clean(law, 0.3, np.arange(0.0, 100.0, 0.02), 1e-4))
     assert result["a"].value > 60.0 * result["a"].sd
-    assert not any("can't be told" in warning for warning in result.warnings)
+    assert not any("can't be separated" in warning for warning in result.warnings)
 
 
 @pytest.mark.parametrize("count", [5000, 50_000])
