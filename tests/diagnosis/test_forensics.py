@@ -13,9 +13,10 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import gather
 from pendpipe.diagnosis.faults import _applied, correct
 from pendpipe.diagnosis.forensics.evidence import Evidence
-from pendpipe.diagnosis.forensics.glitches import find_in_misfit, smallest_p_value
+from pendpipe.diagnosis.forensics.glitches import _described, find_in_misfit, smallest_p_value
 from pendpipe.diagnosis.forensics.lost_samples import LostSamples, find_lost_samples, loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
+from pendpipe.diagnosis.forensics.tails import Tail
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.result import Confirmation, Finding
@@ -351,6 +352,20 @@ def test_glitches_need_no_model(clean: FloatArray) -> None:
         found_at = [] if finding is None else np.flatnonzero(finding.mask).tolist()
         assert found_at == expected
         assert finding is None or finding.p_value < 1e-3
+
+
+def test_the_largest_glitch_is_the_largest_beside_the_right_readings(clean: FloatArray) -> None:
+    """Of neighbours the first to be found looks large until the others are left out."""
+    right = fitted(AIR, clean + drawn_white(generator(), AIR.count))
+    mask, error, at_first = (np.zeros(AIR.count, kind) for kind in (bool, float, float))
+    mask[[420, 1501]] = True
+    error[mask], at_first[mask] = (5.0 * NOISE, 60.0 * NOISE), (50.0, 20.0)
+    evidence = Evidence(right.data, right.fit, right.noise, right.samples)
+    residual = right.data.residual(right.fit.at.reading) + error
+    tail = Tail(*np.array([[1e3], [1.0], [1.0]]))
+    found = _described(evidence, residual, at_first, mask, 0.0, tail).parameters
+    assert found["largest"].value == pytest.approx(60.0 * NOISE, rel=0.1)
+    assert found["largest"].value > found["rms"].value
 
 
 def test_lost_samples_that_no_motion_could_follow_are_not_corrected(

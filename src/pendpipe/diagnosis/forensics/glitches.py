@@ -223,7 +223,7 @@ def _described(
 ) -> Finding:
     data, local = evidence.data, evidence.local(residual, leave_out=mask)
     reading, when, rms = local.left[mask], data.time_s[mask], local.rms
-    largest, number = int(np.argmax(np.abs(sizes[mask]))), int(np.count_nonzero(mask))
+    largest, number = int(np.argmax(np.abs(reading))), int(np.count_nonzero(mask))
     own = math.sqrt(float(np.mean(reading**2)))
     error = max(own / math.sqrt(2.0 * number), rms / math.sqrt(number))
     parameters = {
