@@ -82,6 +82,18 @@ def test_a_jump_of_ten_times_the_noise_is_no_red_noise_and_has_no_rival() -> Non
     assert effect.probability > 0.9
 
 
+def test_without_one_of_two_jumps_the_other_stays_where_it_is() -> None:
+    """Its size, too, fits the readings again only where nothing else takes its place."""
+    found = diagnosed("two steps").search
+    one, other = (step.winner.lead.effect for step in found.steps)
+    fit = weighing._others_in_place(found, one)
+    here, there = dict(found.fit.model.places()), dict(fit.model.places())
+    assert one not in there
+    assert np.array_equal(fit.value[there[other]], found.fit.value[here[other]])
+    alone = jumped().search
+    assert weighing._others_in_place(alone, alone.steps[0].winner.lead.effect) is None
+
+
 @pytest.mark.parametrize("place", range(1, 4))
 def test_a_rival_is_compared_by_its_gain_with_the_final_noise(
     place: int,

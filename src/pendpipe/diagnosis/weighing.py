@@ -145,7 +145,7 @@ def effect_named(found: Hypothesis, step: Step, weighed: Weighed) -> FoundEffect
         with_instants(
             effect_parameters(found.fit, effect, found.data.unit),
             effect,
-            without,
+            _others_in_place(found, effect) or without,
             found.noise,
             found.fit.error_scale,
         ),
@@ -161,6 +161,20 @@ def effect_named(found: Hypothesis, step: Step, weighed: Weighed) -> FoundEffect
         locate(without, found.fit, found.data, effect),
         curve_values(found.fit, effect, found.data.unit) if isinstance(effect, Curve) else None,
     )
+
+
+def _others_in_place(found: Hypothesis, effect: Effect) -> Fit | None:
+    """Return the fit without a sudden effect where others stay at their instants.
+
+    None where there are none: refitted, one of several jumps would take the place of another.
+    """
+    model, value = found.fit.model.dropping(effect, found.fit.value)
+    places = [place for other, place in model.places() if other.local]
+    if not (effect.local and places):
+        return None
+    held = [*found.held, *(k for place in places for k in range(place.start, place.stop))]
+    fit = best_fit(model, found.data, found.noise, [value], held=held)
+    return fit and refine(model, found.data, found.noise, fit.value, held=found.held, rounds=0)
 
 
 def _best_of_each(rivals: Sequence[Rival]) -> list[Rival]:
