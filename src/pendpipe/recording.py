@@ -33,6 +33,31 @@ GOOD, SUSPECT, MISSING = 0, 1, 2
 """The values of ``quality``: a good sample, a suspect one, a row that marks a gap."""
 
 
+def is_uniform(time_s: FloatArray) -> bool:
+    """Say whether the samples are evenly spaced, gaps apart.
+
+    99 % of the intervals lie within 15 % of their median (a clock printed with too few
+    digits alternates by 10 %).
+    """
+    steps = np.diff(time_s)
+    middle = float(np.median(steps)) if len(steps) > 1 else 0.0
+    if not middle > 0:
+        return len(steps) < 2
+    return float(np.mean(np.abs(steps - middle) <= 0.15 * middle)) >= 0.99 or (
+        # A handful of gaps in a short recording is no unevenness.
+        bool(np.all(np.abs(steps / middle - np.rint(steps / middle)) < 0.1))
+        and float(np.mean(steps < 1.5 * middle)) > 0.8
+    )
+
+
+def sample_rate(time_s: FloatArray) -> float:
+    """Samples a second, gaps left out; of uneven samples the reciprocal median interval."""
+    steps = np.diff(time_s)
+    middle = float(np.median(steps)) if len(steps) else 0.0
+    usual = steps[np.abs(steps - middle) <= 0.5 * middle] if is_uniform(time_s) else middle
+    return 1.0 / float(np.mean(usual)) if middle > 0 else float("nan")
+
+
 @dataclass(frozen=True, init=False, repr=False)
 class Recording:
     """Samples of one channel against time.
@@ -192,8 +217,6 @@ class Recording:
     @cached_property
     def interval_s(self) -> float:
         """The usual time between samples, as `inspect` has it: gaps are left out."""
-        from pendpipe.formats.table import sample_rate
-
         return 1.0 / sample_rate(self.time_s)
 
     def number(self, key: str, place: str | Path = "recording") -> float | None:

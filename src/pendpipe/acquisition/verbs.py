@@ -30,7 +30,7 @@ def acquire(
     ] = 30.0,
     clock_scale: Annotated[
         float, Option("simulated seconds per real second", "FACTOR", POSITIVE)
-    ] = 1.0,
+    ] = 1000.0,
     volts_per_radian: Annotated[float | None, Option(SENSOR, "V")] = None,
     channel: int = 1,
     signal: "Signal | None" = None,
@@ -67,7 +67,7 @@ def acquire(
 
     Examples
     --------
-    >>> acquire("simulated:di2108", duration_s=20, clock_scale=100)
+    >>> acquire("simulated:di2108", duration_s=20)
     Recording(1200 samples of volts, 0 to 19.9833 s)
     """
     from pendpipe.acquisition.recorder import acquire_simulated, example_signal, record

@@ -83,12 +83,15 @@ from pendpipe.options import (
     }
     | flags_of(verbs.acquire)
     | {
+        # In Python a simulated device need not be waited for; here it is looked at.
+        "--clock-scale": flags_of(verbs.acquire)["--clock-scale"]
+        | {"default": 1.0, "help": "simulated seconds per real second (1)"},
         "--seed": {
             "type": NATURAL,
             "metavar": "N",
             "default": 0,
             "help": "seed of the simulated noise (0)",
-        }
+        },
     }
     | under(
         "as a stage of a campaign",

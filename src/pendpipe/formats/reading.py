@@ -36,9 +36,7 @@ from pendpipe.formats.table import (
     Table,
     clipped_samples,
     find_gaps,
-    is_uniform,
     most_unpacked,
-    sample_rate,
     without_marks,
 )
 from pendpipe.formats.times import TimeBase, refuse_text, time_base
@@ -52,7 +50,9 @@ from pendpipe.recording import (
     check,
     converter_step,
     find_step,
+    is_uniform,
     read_plain,
+    sample_rate,
     sizes_of,
 )
 

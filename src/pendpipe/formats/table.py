@@ -17,6 +17,7 @@ from scipy.special import ellipk
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import refuse_if
 from pendpipe.formats.words import Role
+from pendpipe.recording import is_uniform
 
 _ABSURD: Final = 1e100
 """Beyond this nothing was measured; squares of it are no numbers."""
@@ -242,31 +243,6 @@ class Gap:
 
     after_sample: int
     missing_s: float
-
-
-def is_uniform(time_s: FloatArray) -> bool:
-    """Say whether the samples are evenly spaced, gaps apart.
-
-    99 % of the intervals lie within 15 % of their median (a clock printed with too few
-    digits alternates by 10 %).
-    """
-    steps = np.diff(time_s)
-    middle = float(np.median(steps)) if len(steps) > 1 else 0.0
-    if not middle > 0:
-        return len(steps) < 2
-    return float(np.mean(np.abs(steps - middle) <= 0.15 * middle)) >= 0.99 or (
-        # A handful of gaps in a short recording is no unevenness.
-        bool(np.all(np.abs(steps / middle - np.rint(steps / middle)) < 0.1))
-        and float(np.mean(steps < 1.5 * middle)) > 0.8
-    )
-
-
-def sample_rate(time_s: FloatArray) -> float:
-    """Samples a second, gaps left out; of uneven samples the reciprocal median interval."""
-    steps = np.diff(time_s)
-    middle = float(np.median(steps)) if len(steps) else 0.0
-    usual = steps[np.abs(steps - middle) <= 0.5 * middle] if is_uniform(time_s) else middle
-    return 1.0 / float(np.mean(usual)) if middle > 0 else float("nan")
 
 
 def find_gaps(time_s: FloatArray) -> list[Gap]:

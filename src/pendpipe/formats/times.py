@@ -12,8 +12,9 @@ from pendpipe.errors import InputError, refuse_if
 from pendpipe.formats.columns import Choice
 from pendpipe.formats.grammar import MOST_DAMAGED
 from pendpipe.formats.lists import counts_samples, one_way
-from pendpipe.formats.table import Column, ReadOptions, Table, is_uniform, periods
+from pendpipe.formats.table import Column, ReadOptions, Table, periods
 from pendpipe.formats.words import Unit, plain, unit_of
+from pendpipe.recording import is_uniform
 
 _EPOCH: Final = 3e8
 """Seconds beyond which a clock counts from a date (1979 in Unix time), not a start."""
