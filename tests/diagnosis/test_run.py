@@ -546,6 +546,21 @@ def test_right_predictions_are_not_blamed_for_missing_physics() -> None:
     assert sum(odds for name, odds in suspected.items() if name.startswith("parameter")) < 0.1
 
 
+def test_q_beside_a_zero_that_creeps_is_that_of_the_decay() -> None:
+    """Its turning points are off by the creep; Q = omega/(2 b), at any amplitude."""
+    b, omega, time_s = 0.0334, 3.7, np.arange(1500) / 25.0
+    angle = 0.3 * np.exp(-b * time_s) * np.cos(omega * time_s)
+    creeping = angle + 0.25 * (1.0 - np.exp(-time_s / 20.0))
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(time_s))
+    found = diagnose_recording(Recording(time_s, creeping + noise, "angle_rad"), restoring="linear")
+    shown = [each for each in found.summary.consequence if each.quantity == "Q"]
+    assert len(shown) == 3
+    for each in shown:
+        assert each.with_missing.sd < 0.01 * each.with_missing.value
+        assert abs(each.with_missing.value - 0.5 * omega / b) < 3.0 * each.with_missing.sd
+    assert "independent of any law" not in found.summary.quote
+
+
 # The last cycles are judged by the scatter of all spans of cycles before them.
 
 

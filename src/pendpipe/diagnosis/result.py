@@ -38,7 +38,10 @@ _DENSITIES: Final = ("log_density_before", "log_density_after", "gain", "gain_sd
 
 @dataclass(frozen=True)
 class FittedModel:
-    """A model's parameters, and how well it describes the readings."""
+    """A model's parameters, and how well it describes the readings.
+
+    `quality_factors` are Q by amplitude, where the model leaves nothing but noise.
+    """
 
     parameters: Mapping[str, Estimate]
     residual_rms_rad: float
@@ -46,6 +49,7 @@ class FittedModel:
     noise_rms_rad: float = 0.0
     fit_p_value: float | None = None
     """Of the one test of fit, where the model is the one that ``fit`` prints."""
+    quality_factors: Mapping[float, Estimate] = field(default_factory=dict)
 
     @classmethod
     def of_fit(cls, fit: FitResult) -> FittedModel:

@@ -38,7 +38,7 @@ from pendpipe.diagnosis.result import (
 )
 from pendpipe.diagnosis.search import baseline_fitted, run_search
 from pendpipe.diagnosis.summary import COLOURED_NOISE, LEVEL, statement
-from pendpipe.diagnosis.values import parameters_of
+from pendpipe.diagnosis.values import parameters_of, quality_factors_of
 from pendpipe.diagnosis.weighing import (
     Weighed,
     effect_named,
@@ -269,8 +269,13 @@ def _models(
         # What it leaves of other readings, or beside a zero that drifts, compares with nothing.
         before = printed if of_all else replace(before, parameters=printed.parameters)
     law = law_of(found, weighed)
-    same = _adds_nothing(found) and found.fit.error_scale == 1.0
-    return before, before if same else _fitted_model(found.fit, found, law), law
+    if _adds_nothing(found) and found.fit.error_scale == 1.0:
+        return before, before, law
+    after = _fitted_model(found.fit, found, law)
+    if fit and not found.remainder.systematic:
+        amplitudes = [each.amplitude_rad for each in fit.quality_factors]
+        after = replace(after, quality_factors=quality_factors_of(found.fit, amplitudes))
+    return before, after, law
 
 
 def _adds_nothing(found: Hypothesis) -> bool:

@@ -383,7 +383,10 @@ def name_of(identifier: str) -> str:
 
 
 def _changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
-    """Compare the numbers of both models, and Q with that of the turning points."""
+    """Compare the numbers of both models, and Q with that of the better one.
+
+    Where that leaves more than noise, Q is what the turning points show.
+    """
     before, after = diagnosis.baseline.parameters, diagnosis.improved.parameters
     found = []
     if "frequency" in before and "frequency" in after:
@@ -402,19 +405,27 @@ def _changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
     ]
     fit = diagnosis.fit
     if fit is not None and fit.light != "red":
-        seen = {each.amplitude_rad: each.quality_factor for each in seen_qualities(fit)}
+        better = _better_qualities(diagnosis)
         found += [
             Change(
                 "Q",
                 each.quality_factor,
-                seen[each.amplitude_rad],
+                better[each.amplitude_rad],
                 each.amplitude_rad,
                 _unit(diagnosis),
             )
             for each in fit.quality_factors
-            if each.amplitude_rad in seen
+            if each.amplitude_rad in better
         ]
     return tuple(found)
+
+
+def _better_qualities(diagnosis: Diagnosis) -> Mapping[float, Estimate]:
+    """Return Q by amplitude: the better model's, or else the turning points'."""
+    seen = seen_qualities(diagnosis.fit) if diagnosis.fit else ()
+    return diagnosis.improved.quality_factors or {
+        each.amplitude_rad: each.quality_factor for each in seen
+    }
 
 
 def _matters(diagnosis: Diagnosis, changes: Sequence[Change], unit: str) -> str:
@@ -493,27 +504,21 @@ def _decide_by(found: Sequence[FoundEffect]) -> str:
 
 
 def _quote(diagnosis: Diagnosis, changes: Sequence[Change]) -> str:
-    """What can be quoted: Q of the turning points, T0 of the better model, a, b, c that stay."""
-    fit, said = diagnosis.fit, []
-    unit = _unit(diagnosis)
+    """What can be quoted: T0 and Q of the better model, a, b, c that stay."""
+    said, unit = list[str](), _unit(diagnosis)
     period = next((each for each in changes if each.quantity == "period"), None)
     if period is not None:
         better = period.with_missing
         said.append(f"T0 {with_error(better.value, better.sd, 's', short=True)}")
-    if fit is not None:
-        seen = [
-            each
-            for each in seen_qualities(fit)
-            if each.quality_factor.sd < 0.1 * each.quality_factor.value
-        ]
-        if seen:
-            ends = seen if len(seen) < 3 else [seen[0], seen[-1]]
-            values = ", ".join(
-                f"{with_error(e.quality_factor.value, e.quality_factor.sd, short=True)} at"
-                f" {short_size(e.amplitude_rad, unit)}"
-                for e in ends
-            )
-            said.append(f"Q {values} (independent of any law)")
+    good = [
+        f"{with_error(q.value, q.sd, short=True)} at {short_size(amplitude, unit)}"
+        for amplitude, q in _better_qualities(diagnosis).items()
+        if q.sd < 0.1 * q.value
+    ]
+    if good:
+        ends = good if len(good) < 3 else [good[0], good[-1]]
+        lawless = "" if diagnosis.improved.quality_factors else " (independent of any law)"
+        said.append(f"Q {', '.join(ends)}{lawless}")
     moved = [each.quantity for each in changes if each.quantity in "abc" and each.moved_sd > _MOVED]
     if moved:
         said.append(f"not {', '.join(moved)}")

@@ -99,6 +99,28 @@ def _with_errors(
     return centre, _errors(jacobian, fit.covariance())
 
 
+def quality_factors_of(fit: Fit, amplitudes: Sequence[float]) -> dict[float, Estimate]:
+    """Return Q of a model's motion by amplitude: pi over what ln y loses in a period about it.
+
+    Left out are amplitudes that it has not, and those at which it gains.
+    """
+    wanted = np.array(amplitudes)
+
+    def quality(value: FloatArray) -> FloatArray:
+        turning = fit.model.evaluate(fit.model.settled(value)).tangent.motion.log_amplitude[:, 0]
+        lost, within = turning[:-2] - turning[2:], np.log(wanted)
+        inside = (turning[-1] <= within) & (within <= turning[0])
+        lost = np.interp(-within, -turning[1:-1], lost)
+        return np.where(inside, math.pi / lost, math.nan)
+
+    found, sds = _with_errors(fit, quality)
+    return {
+        amplitude: Estimate(float(q), float(sd), "")
+        for amplitude, q, sd in zip(amplitudes, found, sds, strict=True)
+        if q > 0.0 and math.isfinite(sd)
+    }
+
+
 def _errors(columns: FloatArray, covariance: FloatArray) -> FloatArray:
     """Return the standard deviations of linear combinations, one a row."""
     variance = np.einsum("ij,jk,ik->i", columns, covariance, columns)
