@@ -279,8 +279,8 @@ def test_divisors_come_near_any_rate(script: Any, rate_hz: float) -> None:
     ("kind", "number", "refused"),
     [
         ("di2108p", "2108P", ""),  # a hyphen more or less is the same model
-        ("di2108", "2108P", "this is a DI-2108P, no DI-2108"),
-        ("di2108", "1100", "this is a DI-1100, no DI-2108"),
+        ("di2108", "2108P", "this is a DI-2108P, not a DI-2108"),
+        ("di2108", "1100", "this is a DI-1100, not a DI-2108"),
     ],
 )
 def test_another_model_is_refused(script: Any, kind: str, number: str, refused: str) -> None:

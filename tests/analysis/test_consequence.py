@@ -202,7 +202,7 @@ def test_q_and_the_period_are_data() -> None:
     assert frame.loc["Q", "value"] == fit["Q"].value
     assert frame.loc["period", "unit"] == "s"
     assert sum(name.startswith("Q(") for name in frame.index) == 3
-    with pytest.raises(pp.InputError, match="no amplitude"):
+    with pytest.raises(pp.InputError, match="not an amplitude"):
         fit.quality_factor(-0.1)
     assert FitResult.from_json(json.loads(json.dumps(content)))["Q"] == fit["Q"]
 

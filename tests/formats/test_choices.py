@@ -30,11 +30,11 @@ from pendpipe.formats.table import (
     follows_sine,
     is_uniform,
     periods,
-    sample_rate,
     swing_of,
 )
 from pendpipe.formats.text import column_of_clock_times
 from pendpipe.formats.words import Role
+from pendpipe.recording import sample_rate
 
 from .cases import ANGLE, DEGREES, RATE, TIME, each, read_as, same, swing, text, with_lines
 

@@ -29,8 +29,13 @@ def acquire(
         Option("how long to wait for an unplugged device, s", "S", flag="--reconnect"),
     ] = 30.0,
     clock_scale: Annotated[
-        float, Option("simulated seconds per real second", "FACTOR", POSITIVE)
-    ] = 1000.0,
+        float | None,
+        Option(
+            "simulated seconds per real second: 1 from the command line, 1000 from Python",
+            "FACTOR",
+            POSITIVE,
+        ),
+    ] = None,
     volts_per_radian: Annotated[float | None, Option(SENSOR, "V")] = None,
     channel: int = 1,
     signal: "Signal | None" = None,
@@ -85,5 +90,5 @@ def acquire(
     where, _, kind = port.partition(":")
     if where == "simulated":
         signal = signal or example_signal()
-        return acquire_simulated(kind, signal, clock_scale=clock_scale, **request)
+        return acquire_simulated(kind, signal, clock_scale=clock_scale or 1000.0, **request)
     return record(port, model, **request)

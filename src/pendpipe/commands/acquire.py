@@ -83,9 +83,6 @@ from pendpipe.options import (
     }
     | flags_of(verbs.acquire)
     | {
-        # In Python a simulated device need not be waited for; here it is looked at.
-        "--clock-scale": flags_of(verbs.acquire)["--clock-scale"]
-        | {"default": 1.0, "help": "simulated seconds per real second (1)"},
         "--seed": {
             "type": NATURAL,
             "metavar": "N",
@@ -271,6 +268,7 @@ def _from_device(arguments: Arguments, raw: Path) -> None:
         "give simulated:di2108",
     )
     options, simulated = given(arguments, verbs.acquire), None
+    options["clock_scale"] = arguments.clock_scale or 1.0
     if device:
         options["volts_per_radian"] = arguments.volts_per_radian or 3.85
         simulated = example_signal(arguments.seed, options["volts_per_radian"])
@@ -296,7 +294,7 @@ def _serve(arguments: Arguments) -> None:
         signal_volts = simulated_volts(read_model(arguments.signal), arguments.signal)
     kind = arguments.serve.removeprefix("simulated:")
     with SimulatedDevice(
-        kind, signal_volts, clock_scale=arguments.clock_scale, link=arguments.link
+        kind, signal_volts, clock_scale=arguments.clock_scale or 1.0, link=arguments.link
     ) as device:
         print(device.port, flush=True)
         with suppress(KeyboardInterrupt):

@@ -336,8 +336,8 @@ class Model:
             return self._from_guesses(law, value, Clock(self.half_cycles, self._nodes))
         omega, begin = float(value[OMEGA]), float(value[TIME])
         needed = (self.time_s[-1] - begin) * omega / math.pi
-        # Before its first turning point a motion goes on for half a cycle, and no further.
-        if not (1.0 <= needed < 2e5 and (begin - self.time_s[0]) * omega < math.pi):
+        # Before its first turning point a motion is carried on by a cycle, and no further.
+        if not (1.0 <= needed < 2e5 and (begin - self.time_s[0]) * omega < 2.0 * math.pi):
             raise NoMotionError("the frequency or the start is out of reach")
         last = self._last.get("motion")
         known = [] if last is None else [last.clock.count]
