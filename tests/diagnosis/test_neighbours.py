@@ -374,3 +374,23 @@ def test_coloured_noise_is_predicted_from_what_is_known() -> None:
     # The mean of a random walk between known readings is a straight line.
     np.testing.assert_allclose(filled[out], straight, atol=0.05 * np.std(walk))
     np.testing.assert_allclose(filled[~out], walk[~out])
+
+
+@pytest.mark.parametrize("sizes", [(14.0, -10.0, 12.0), (12.0, 8.0)])
+def test_several_jumps_of_the_zero_are_found_each_and_are_no_glitches(
+    sizes: tuple[float, ...],
+) -> None:
+    """One of several leaves red noise, and a wandering offset gains more than each of them."""
+    noise_rad, time_s, instants_s = 1e-3, np.arange(2400) / 30.0, (14.3, 33.0, 61.2)
+    angle = 0.35 * np.exp(-0.012 * time_s) * np.cos(4.2 * time_s)
+    for size, instant_s in zip(sizes, instants_s, strict=False):
+        angle += noise_rad * size * (time_s > instant_s)
+    angle += noise_rad * np.random.default_rng(3).standard_normal(len(time_s))
+    found = diagnose_recording(Recording(time_s, angle, "angle_rad"), restoring="linear").missing
+    assert {each.identifier for each in found} == {"offset-step"}
+    jumps = sorted((dict(each.parameters) for each in found), key=lambda own: own["time"].value)
+    for own, size, instant_s in zip(jumps, sizes, instants_s, strict=False):
+        jump, when = next(each for each in own.values() if each.unit == "rad"), own["time"]
+        assert abs(jump.value - noise_rad * size) < 4.0 * jump.sd
+        assert when.value == pytest.approx(instant_s, abs=0.05)
+    assert len(jumps) == len(sizes)

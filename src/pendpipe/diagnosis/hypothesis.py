@@ -33,6 +33,8 @@ from pendpipe.effects.curves import CURVES, Curve
 if TYPE_CHECKING:
     from pendpipe.diagnosis.rivals import Rival
 
+MOST_EFFECTS: Final = 4
+"""That are added: a choice, of time."""
 CHOICE: Final = 7.4
 """Price of a name or curve beside a remaining misfit: it is one of some forty (2 ln 40)."""
 FURTHER: Final = 22.0
@@ -118,8 +120,6 @@ class Hypothesis:
         What the tests of the measurement say that is no fault, a clause each, by test.
     first, now
         The scans of the baseline's residual and of the present one.
-    asked
-        The effects of the last scan.
     without_curve
         The fit without the curve at the end: probabilities of names refer to it. None where there
         is no such curve, or no name beside it.
@@ -138,7 +138,6 @@ class Hypothesis:
     notes: Mapping[str, str] = field(default_factory=dict)
     first: Detection | None = None
     now: Detection | None = None
-    asked: tuple[Effect, ...] = ()
     without_curve: Fit | None = None
 
     def settle(self, fit: Fit, data: Data | None = None, noise: Noise | None = None) -> Hypothesis:
@@ -337,13 +336,15 @@ class Task:
         """Return the names that are asked where a curve would be added."""
         return applicable(self.catalogue, state.fit, self.baseline, state.data.unit, rare=True)
 
+    def asked(self, fit: Fit, unit: str) -> list[Effect]:
+        """Return all that a model may lack: effects of the catalogue, and what is held."""
+        released = [each for each in self.released if each not in fit.model.effects]
+        return [*applicable(self.catalogue, fit, self.baseline, unit), *released]
+
     def scanned(self, state: Hypothesis) -> Hypothesis:
         """Score all that may be missing on a hypothesis's residual (into `now`)."""
-        effects = (
-            *applicable(self.catalogue, state.fit, self.baseline, state.data.unit),
-            *(entry for entry in self.released if entry not in state.fit.model.effects),
-        )
+        effects = self.asked(state.fit, state.data.unit)
         self.progress(f"scanning {len(effects)} effects")
         scanner = prepare(state.fit, state.data, state.noise, effects)
         now = detect(scanner, state.fit, seed=self.seed, known=state.now)
-        return replace(state, now=now, first=state.first or now, asked=effects)
+        return replace(state, now=now, first=state.first or now)

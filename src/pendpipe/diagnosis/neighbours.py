@@ -29,6 +29,7 @@ from pendpipe.diagnosis.detect import (
 from pendpipe.diagnosis.held_out import predicted_worse
 from pendpipe.diagnosis.hypothesis import (
     CHOICE,
+    MOST_EFFECTS,
     Hypothesis,
     Step,
     Task,
@@ -40,6 +41,7 @@ from pendpipe.diagnosis.hypothesis import (
     settled,
     undrawn,
 )
+from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, best_fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of
@@ -58,41 +60,63 @@ from pendpipe.quantities import compact
 
 
 def with_other_noise(state: Hypothesis, task: Task) -> Hypothesis:
-    """Test whether apparent red noise is an effect, and re-estimate the noise if so.
+    """Test whether apparent red noise is an effect, or a few, and re-estimate the noise if so.
 
     No tone is asked: red noise has no line. The best effect for noise that is not red is fitted,
-    and the noise is estimated from what it leaves. This replaces red noise if effect and noise
-    together are more likely by a factor 1/p, where p is this test's part of the significance level:
-    a normalised density exceeds that of the true model by 1/p with a probability of at most p
+    and the noise is estimated from what it leaves; beside it the next, since one of several jumps
+    leaves red noise. This replaces red noise if effects and noise together are more likely by a
+    factor k^2/p, where k is their number and p this test's part of the significance level: a
+    normalised density exceeds that of the true model by 1/p with a probability of at most p
     (Markov).
     """
     chance = state.scan.p_value > task.threshold
     asked = state.noise.coloured and not state.noise.known and (chance or not state.steps)
     if not asked or is_gross(state.fit, state.data):
         return state
-    level, seed = task.level, task.seed
-    share = level * RED_NOISE_SHARE
     task.progress("testing whether the red noise is a drift or a step")
-    effects = [each for each in state.asked if each.kind != "unnamed" and not each.spectral]
-    fit, data, noise = settled(state.fit, state.data, state.noise, state.held, red=False)
-    other = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.scan)
-    if other.p_value > level * CATALOGUE_SHARE:
+    found = _without_red_noise(state, task)
+    if found is None:
         return state
-    rivals = refit_leads(fit, data, noise, other, held=state.held, phase_lost=False, most=3)
-    if not rivals:
-        return state
-    extended, data, noise = settled(rivals[0].fit, data, noise, state.held)
-    gained = state.fit.chi2 + state.noise.cost - extended.chi2 - noise.cost
-    by_chance = math.exp(0.5 * min(_charge(state, rivals) - gained, 0.0))
-    if by_chance > share:
-        return state
+    by_chance, data, noise = found
     fit = refine(state.fit.model, data, noise, state.fit.value, held=state.held)
-    found = detect(prepare(fit, data, noise, effects), fit, seed=seed, known=state.scan)
+    scanner = prepare(fit, data, noise, _not_red(fit, state, task))
+    now = detect(scanner, fit, seed=task.seed, known=state.scan)
     # The same part of the catalogue's share of the level as of this test's share.
     rare = by_chance * CATALOGUE_SHARE / RED_NOISE_SHARE
-    now = replace(found, p_value=max(found.p_value, rare))
+    now = replace(now, p_value=max(now.p_value, rare))
     first = state.first if state.steps else now
     return replace(state, fit=fit, data=data, noise=noise, now=now, first=first)
+
+
+def _not_red(fit: Fit, state: Hypothesis, task: Task) -> list[Effect]:
+    """Return the names that red noise could be, beside those of a fit."""
+    named = task.asked(fit, state.data.unit)
+    return [each for each in named if each.kind != "unnamed" and not each.spectral]
+
+
+def _without_red_noise(state: Hypothesis, task: Task) -> tuple[float, Data, Noise] | None:
+    """Find the effects that red noise is: the p-value, the readings, and the noise beside them."""
+    held, charge, least = state.held, 0.0, task.level * RED_NOISE_SHARE
+    best: tuple[float, Data, Noise] | None = None
+    fit, data, noise = settled(state.fit, state.data, state.noise, held, red=False)
+    for number in range(1, MOST_EFFECTS + 1):
+        scanner = prepare(fit, data, noise, _not_red(fit, state, task))
+        other = detect(scanner, fit, seed=task.seed, known=state.scan)
+        if other.p_value > task.threshold:
+            break
+        rivals = refit_leads(fit, data, noise, other, held=held, phase_lost=False, most=3)
+        if not rivals:
+            break
+        charge += _charge(state, rivals)
+        extended, lattice, left = settled(rivals[0].fit, data, noise, held)
+        gained = state.fit.chi2 + state.noise.cost - extended.chi2 - left.cost
+        by_chance = number**2 * math.exp(0.5 * min(charge - gained, 0.0))
+        if by_chance <= least:
+            least, best = by_chance, (by_chance, lattice, left)
+        if best is not None and not left.coloured:
+            break
+        fit, data, noise = settled(rivals[0].fit, data, noise, held, red=False)
+    return best
 
 
 def _charge(state: Hypothesis, rivals: Sequence[Rival]) -> float:
@@ -146,9 +170,13 @@ def compared(state: Hypothesis, here: Proposed, there: Sequence[Proposed]) -> It
 
 
 def simpler(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
-    """Drop an effect, or exchange all names for a curve, or a curve for rare names."""
-    rare = task.rare(state)
-    there = [*_drops(state), *_curve_for_names(state), *_rare_for_a_curve(state, rare)]
+    """Drop an effect, or exchange all names for a curve, or a curve for rare names or events."""
+    there = [
+        *_drops(state),
+        *_curve_for_names(state),
+        *_rare_for_a_curve(state, task.rare(state)),
+        *_events_for_a_curve(state, task),
+    ]
     return compared(state, Proposed(state.fit, state.steps), there)
 
 
@@ -258,6 +286,36 @@ def _rare_for_a_curve(state: Hypothesis, rare: Sequence[Effect]) -> Iterator[Pro
             steps.append(Step(tuple(names), step.p_value, fit))
             fit = names[0].fit
             yield Proposed(fit, tuple(steps), f"{names[0].name} in place of {step.winner.name}")
+
+
+def _events_for_a_curve(state: Hypothesis, task: Task) -> Iterator[Proposed]:
+    """Put events of one kind in the place of a curve in time, which gains more than each of them.
+
+    The first are the three best of all kinds; each is followed by others of its own.
+    """
+    for step in [step for step in state.steps if step.winner.lead.effect.in_time]:
+        bare = refit_without(state, [step])
+        kept = tuple(other for other in state.steps if other is not step)
+        for first in _events(bare, state, task) if bare else []:
+            best: Rival | None = first
+            fit, steps = bare, kept
+            while fit and best and len(steps) < MOST_EFFECTS:
+                steps = (*steps, Step((best,), step.p_value, fit))
+                fit, words = best.fit, f"{best.name}, {len(steps) - len(kept)} times"
+                yield Proposed(fit, steps, f"{words}, in place of {step.winner.name}")
+                best = next(iter(_events(fit, state, task, first.identifier)), None)
+
+
+def _events(fit: Fit, state: Hypothesis, task: Task, kind: str = "") -> list[Rival]:
+    """Return the three events, or those of a kind, that explain most of what a fit leaves."""
+    named = task.asked(fit, state.data.unit)
+    wanted = [each for each in named if each.local and kind in ("", each.identifier)]
+    found = detect(
+        prepare(fit, state.data, state.noise, wanted), fit, seed=task.seed, known=state.scan
+    )
+    return refit_leads(
+        fit, state.data, state.noise, found, held=state.held, phase_lost=False, most=3
+    )
 
 
 def _with_each(bare: Fit, names: Sequence[Effect], state: Hypothesis) -> list[Fit]:

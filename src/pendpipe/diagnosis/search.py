@@ -9,7 +9,14 @@ import numpy as np
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.faults import correct, examine, random_torque
-from pendpipe.diagnosis.hypothesis import Hypothesis, Step, Task, first_noise, is_gross
+from pendpipe.diagnosis.hypothesis import (
+    MOST_EFFECTS,
+    Hypothesis,
+    Step,
+    Task,
+    first_noise,
+    is_gross,
+)
 from pendpipe.diagnosis.neighbours import (
     Neighbour,
     Proposed,
@@ -30,7 +37,6 @@ from pendpipe.diagnosis.weighing import Weighed, weigh, with_likelier
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects.baseline import C
 
-_MOST_EFFECTS: Final = 4
 LESS_FRICTION: Final = (1.0, 0.9, 0.7, 0.4)
 """Fractions of the Coulomb friction to try if the baseline stops before the last reading."""
 
@@ -101,7 +107,7 @@ def _starts(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
 def _additions(state: Hypothesis, task: Task, *, names_first: bool = False) -> Iterator[Neighbour]:
     """Add the effect that leads, or random kicks; or two names that share a misfit."""
     drawn, chance = _ends_with_curve(state), state.scan.p_value > task.threshold
-    if chance or drawn or len(state.steps) >= _MOST_EFFECTS:
+    if chance or drawn or len(state.steps) >= MOST_EFFECTS:
         return
     step = leading(state, task, names_first=names_first)
     if step is None:

@@ -24,6 +24,7 @@ from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.held_out import held_out
 from pendpipe.diagnosis.hypothesis import (
+    MOST_EFFECTS,
     Hypothesis,
     Step,
     Task,
@@ -68,7 +69,6 @@ _HEAD: Final = 0.25
 """Part of a predicted recording to which its own values (its start) are fitted."""
 _NOT_ZERO_SD: Final = 2.0
 """Standard deviations, with all that widens them, from which a size is not zero."""
-_MOST_EFFECTS: Final = 4
 
 
 @np.errstate(over="ignore", divide="ignore", invalid="ignore")
@@ -354,7 +354,7 @@ def _known_first(state: Hypothesis, task: Task, searches: Sequence[Hypothesis]) 
         state = task.scanned(state)
     order = sorted(named.values(), key=lambda steps: -sum(step.winner.gain for step in steps))
     for steps in order:
-        if not loses_phase(state.fit) or len(state.steps) == _MOST_EFFECTS:
+        if not loses_phase(state.fit) or len(state.steps) == MOST_EFFECTS:
             return state
         model, before = state.fit.model, state.fit
         assert isinstance(model, Stack)
