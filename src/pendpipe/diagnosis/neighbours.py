@@ -226,7 +226,7 @@ def adding(state: Hypothesis, step: Step) -> Neighbour:
     other = replace(state, fit=winner.fit, steps=steps, held=held)
     unit = state.data.unit
     before, after = (compact(_rms(fit, state.data), unit) for fit in (state.fit, winner.fit))
-    words = f"adding {winner.name}: the residual falls from {before} to {after} rms"
+    words = f"adding {winner.name}: residual {before} → {after} rms"
     return Neighbour(other, lower, words)
 
 

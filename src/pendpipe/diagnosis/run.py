@@ -379,10 +379,12 @@ def _fitted_model(fit: Fit, found: Hypothesis, law: Fit | None = None) -> Fitted
     Residual, chi^2 and noise are those of a reading.
     """
     data = found.data
-    residual = data.residual(fit.at.reading)[data.weight > 0.0]
-    left = float(np.sqrt(np.mean(residual**2)))
-    # What is left holds all noise.
-    noise = max(min(found.noise.rms, left), data.step / 12.0**0.5)
+    left, by_baseline = (
+        float(np.sqrt(np.mean(data.residual(each.at.reading)[data.weight > 0.0] ** 2)))
+        for each in (fit, found.baseline)
+    )
+    # What is left holds all noise, whatever the model.
+    noise = max(min(found.noise.rms, left, by_baseline), data.step / 12.0**0.5)
     return FittedModel(
         parameters_of(law or fit, data.unit),
         data.rms_of_reading(left),

@@ -85,7 +85,7 @@ class Shown:
         """The baseline and, where something was found, the extended model, named for legends."""
         named = [(self.baseline_name, self.baseline)]
         if self.extended is not None:
-            found = [effect.identifier for effect in self.diagnosis.missing]
+            found = [effect.name for effect in self.diagnosis.missing]
             more = f" and {len(found) - 1} more" if len(found) > 1 else ""
             named.append((f"with {found[0]}{more}", self.extended))
         return named

@@ -239,9 +239,10 @@ def _waveform(
     if spring is not None and spring.minimum.converged and is_spring:
         spring_forms = forms if first == "linear" else others or fitted(restoring="linear")
         found, words = result(spring_forms, "linear"), for_spring / math.log(10.0)
+        # How far out the noise goes nobody has tested.
+        ratio = f"10^{words:.0f}" if words < 12.0 else "10^12 or more"
         said = (
-            "x fits better than sin x by a likelihood ratio of"
-            f" 10^{words:.0f}: a spring or torsion wheel"
+            f"x fits better than sin x by a likelihood ratio of {ratio}: a spring or torsion wheel"
         )
         return replace(found, torque_odds=for_spring, warnings=(*found.warnings, said))
     found = result(forms if first == "sine" else others or fitted(restoring="sine"), "sine")
