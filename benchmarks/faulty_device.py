@@ -260,9 +260,6 @@ class FaultyDevice(SimulatedDevice):
         self._offset_s = now_s - self._first_start_s
         super()._begin()
 
-    def _rest_s(self) -> float:
-        return super()._rest_s() if self._stream else 0.005
-
     def _suffer(self) -> None:
         """Enter and leave the conditions that faults bring about."""
         condition, self._path.condition = self._path.condition, ""
