@@ -327,7 +327,7 @@ def test_a_model_goes_on_smoothly_where_its_own_cycles_begin_late() -> None:
 def test_the_figure_of_the_frequency_draws_readings_and_both_models(content: Shown) -> None:
     (axes,) = diagnosis.draw_frequency(content).axes
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["Eq. 8", "with cubic-stiffness", "readings"]
+    assert labels == ["Eq. 8", "with cubic restoring torque", "readings"]
     flat, bent = (line.get_ydata() for line in axes.lines[1:3])
     points = axes.containers[0][0].get_ydata()
     assert np.ptp(flat) < 0.05 * np.ptp(bent)
