@@ -296,13 +296,16 @@ def _events_for_a_curve(state: Hypothesis, task: Task) -> Iterator[Proposed]:
     for step in [step for step in state.steps if step.winner.lead.effect.in_time]:
         bare = refit_without(state, [step])
         kept = tuple(other for other in state.steps if other is not step)
+        enough = Scale.of(state.fit, state.data, state.noise).within(step.winner.charge)
         for first in _events(bare, state, task) if bare else []:
             best: Rival | None = first
             fit, steps = bare, kept
             while fit and best and len(steps) < MOST_EFFECTS:
-                steps = (*steps, Step((best,), step.p_value, fit))
+                steps, gain = (*steps, Step((best,), step.p_value, fit)), fit.chi2 - best.fit.chi2
                 fit, words = best.fit, f"{best.name}, {len(steps) - len(kept)} times"
                 yield Proposed(fit, steps, f"{words}, in place of {step.winner.name}")
+                if fit.chi2 - (MOST_EFFECTS - len(steps)) * gain > enough:
+                    break  # the others would have to gain more than this one
                 best = next(iter(_events(fit, state, task, first.identifier)), None)
 
 
