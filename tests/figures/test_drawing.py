@@ -324,6 +324,19 @@ def test_a_model_goes_on_smoothly_where_its_own_cycles_begin_late() -> None:
     assert np.max(np.abs(np.diff(loss, 2))) < 0.01 * np.mean(loss)
 
 
+def test_the_envelope_follows_a_zero_that_drifts() -> None:
+    time_s = np.arange(1500) / 25.0
+    creep = 0.25 * (1.0 - np.exp(-time_s / 20.0))
+    swing = 0.3 * np.exp(-0.0334 * time_s)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(time_s))
+    recording = Recording(time_s, swing * np.cos(3.7 * time_s) + creep + noise, "angle_rad")
+    upper = diagnosis.draw_decay(shown(diagnose(recording, restoring="linear"))).axes[0]
+    inside = (time_s > 5.0) & (time_s < 55.0)
+    for line, expected in zip(upper.lines[-2:], (creep + swing, creep - swing), strict=True):
+        drawn = np.interp(time_s, *line.get_data())
+        assert drawn[inside] == pytest.approx(1e3 * expected[inside], abs=5.0)  # in mrad
+
+
 def test_the_figure_of_the_frequency_draws_readings_and_both_models(content: Shown) -> None:
     (axes,) = diagnosis.draw_frequency(content).axes
     labels = [text.get_text() for text in axes.get_legend().get_texts()]

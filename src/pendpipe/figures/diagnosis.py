@@ -16,6 +16,7 @@ from matplotlib.colors import AsinhNorm, LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedFormatter
 from scipy.interpolate import make_interp_spline
+from scipy.ndimage import uniform_filter1d
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.cycles import Cycles, Spans, between, cycles, span_ends
@@ -153,11 +154,14 @@ def draw_decay(content: Shown) -> Figure:
     dots: dict[str, Any] = {"marker": "o", "markersize": 2.0}
     pixels: dict[str, Any] = {"rasterized": len(data) > _MANY}
     some = slice(None, None, math.ceil(len(data) / _MANY))
+    cycle = max(round(content.baseline.at.span.period_s / data.interval_s), 1)
     decay = [curve(time, factor * values, GREY, width=0.4, label="readings", **pixels)]
     end = [curve(time[last], factor * values[last], GREY, "", **dots)]
     rest = [level(0.0, width=0.8)]
     for (name, fit), colour, residual in zip(content.models, COLOURS, residuals, strict=False):
-        middle = float(np.median(fit.at.reading - fit.at.sampled.angle))
+        # What the reading has besides the swing, in the mean of a cycle: the zero, as it drifts.
+        beside = fit.at.reading - fit.at.sampled.angle
+        middle = uniform_filter1d(beside, min(cycle, len(beside)), mode="nearest")[some]
         amplitude = fit.at.sampled.amplitude[some]
         decay += [
             curve(time[some], factor * (middle + amplitude), colour, width=1.2, label=name),
