@@ -113,6 +113,7 @@ def test_the_likeliest_of_a_class_says_what_decides(
     [
         ("frequency-drift", 0.1, ("drifting clock (rate 1.66(11) × 10⁻⁴ s⁻¹)",), ""),
         ("frequency-drift", 0.6, ("drifting frequency",), ""),
+        ("stribeck-friction", 0.5, ("drifting clock (rate 1.66(11) × 10⁻⁴ s⁻¹)",), ""),
         ("unnamed-restoring", 0.6, (), "described by a restoring torque of unknown form"),
     ],
 )
@@ -122,7 +123,7 @@ def test_numbers_are_those_of_what_is_named(
     """Where a rival leads the class, the parameters of the effect that was fitted say nothing."""
     fitted = replace(
         named("clock-drift", rate=Estimate(1.66e-4, 1.1e-5, "1/s")),
-        probability=0.9 - p if p < 0.5 else 0.3,
+        probability={0.1: 0.8, 0.5: 0.5, 0.6: 0.3}[p],
         indistinguishable=((rival, p),),
     )
     summary = diagnosis(fitted).summary

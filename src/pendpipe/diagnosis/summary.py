@@ -318,7 +318,8 @@ def class_of(effect: FoundEffect) -> list[tuple[float, str]]:
     """Return the members of an effect's class with their names, the most probable first."""
     rivals = [(p, name_of(identifier)) for identifier, p in effect.indistinguishable]
     own = effect.name if effect.kind != "unnamed" else name_of(effect.identifier)
-    return sorted([(effect.probability, own), *rivals], reverse=True)
+    # The sort is stable: of the equally probable the effect itself is first, as in `_leader`.
+    return sorted([(effect.probability, own), *rivals], key=lambda member: -member[0])
 
 
 def _leader(effect: FoundEffect) -> tuple[float, str]:
