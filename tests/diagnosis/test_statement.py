@@ -113,7 +113,7 @@ def test_the_likeliest_of_a_class_says_what_decides(
     [
         ("frequency-drift", 0.1, ("drifting clock (rate 1.66(11) × 10⁻⁴ s⁻¹)",), ""),
         ("frequency-drift", 0.6, ("drifting frequency",), ""),
-        ("stribeck-friction", 0.5, ("drifting clock (rate 1.66(11) × 10⁻⁴ s⁻¹)",), ""),
+        ("frequency-drift", 0.5, ("drifting clock (rate 1.66(11) × 10⁻⁴ s⁻¹)",), ""),
         ("unnamed-restoring", 0.6, (), "described by a restoring torque of unknown form"),
     ],
 )
