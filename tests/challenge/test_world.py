@@ -121,6 +121,17 @@ def test_what_an_effect_was_sized_for_is_what_a_fit_loses(effect: str) -> None:
     assert 2 * left.cost == pytest.approx(400.0, rel=0.25)
 
 
+@pytest.mark.parametrize("wanted", [25.0, 400.0])
+@pytest.mark.parametrize("effect", ["slow-pen", "sensor-backlash", "cogging"])
+def test_a_cause_that_sets_in_at_a_threshold_has_the_evidence_that_is_wanted(
+    effect: str, wanted: float
+) -> None:
+    there = scene(step=1e-4)
+    cause = sized(np.random.default_rng(4), there, [], law_of(effect), wanted, 4.0)
+    assert cause is not None
+    assert Bench(there, [cause]).evidence == pytest.approx([wanted], rel=0.15)
+
+
 def test_a_motion_that_runs_away_is_worth_nothing() -> None:
     fed = Cause("negative damping", lambda world, size: world.add("gamma", -100.0 * size), 1.0)
     with pytest.raises(FloatingPointError, match="runs away"):

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -210,6 +211,8 @@ class Item:
 TRIES: Final = 30
 CLOSE: Final = 0.15
 """Relative distance from the wanted Delta chi^2 that is near enough."""
+SIZINGS: Final = 16
+"""Sizes tried for one cause."""
 
 
 def make_item(recipe: Recipe, rng: Rng, noise: Noise | None = None) -> Item:
@@ -256,11 +259,23 @@ def _try(recipe: Recipe, rng: Rng, ease: float, noise: Noise | None) -> Item | N
         oracle = Oracle(bench, listed(scene), rng)
         if family == "outside":
             # Sized by what no listed effect takes up.
-            missed = max(oracle.left_by_catalogue()[0], 1e-3)
-            grown = (recipe["delta_chi2"][0] * ease / missed) ** 0.5
-            size = causes[0].size * min(grown, laws[0].most / abs(causes[0].size))
-            bench = Bench(scene, [causes[0]._replace(size=size)])
-            oracle = Oracle(bench, listed(scene), rng)
+            (cause,), seed = causes, int(rng.integers(2**32))
+
+            @cache
+            def at(size: float) -> Oracle:
+                sized = cause._replace(size=float(np.copysign(size, cause.size)))
+                there = Bench(scene, [sized])
+                return Oracle(there, listed(scene), np.random.default_rng(seed))
+
+            size, _ = size_worth(
+                recipe["delta_chi2"][0] * ease,
+                lambda size: at(size).left_by_catalogue()[0],
+                abs(cause.size),
+                laws[0].most,
+                close=2 * CLOSE,
+            )
+            oracle = at(size)
+            bench = oracle.bench
             left = dict(
                 zip(("left_by_catalogue", "best_mimic"), oracle.left_by_catalogue(), strict=True)
             )
@@ -329,17 +344,42 @@ def sized(
 ) -> Cause | None:
     """A cause of the wanted evidence; None where the scene can't show it."""
     sign = float(rng.choice([-1, 1])) if law.signed else 1.0
-    cause = Cause(law.effect, law.draw(rng, scene), sign * law.size)
-    for _ in range(8):
-        bench = Bench(scene, [*causes, cause])
-        worth = worth_of(law, bench, -1)
-        if not np.isfinite(worth) or worth <= 0:
+    cause = Cause(law.effect, law.draw(rng, scene), sign)
+
+    def worth(size: float) -> float:
+        return worth_of(law, Bench(scene, [*causes, cause._replace(size=sign * size)]), -1)
+
+    if law.sizeless:
+        size, found = law.size, worth(law.size)
+    else:
+        size, found = size_worth(wanted, worth, law.size, law.most, 0.25 if law.chance else 0.5)
+        if not abs(found / wanted - 1) < CLOSE:
             return None
-        if law.sizeless or abs(worth / wanted - 1) < CLOSE:
-            return cause if worth >= least else None
-        size = abs(cause.size) * (wanted / worth) ** (0.25 if law.chance else 0.5)
-        cause = cause._replace(size=float(sign * min(size, law.most)))
-    return None
+    return cause._replace(size=sign * size) if found >= least else None
+
+
+def size_worth(
+    wanted: float,
+    worth: Callable[[float], float],
+    size: float,
+    most: float,
+    power: float = 0.5,
+    close: float = CLOSE,
+) -> tuple[float, float]:
+    """The size whose evidence is wanted, or the nearest that was found; and its evidence.
+
+    Evidence goes as size^(1/power), but for what sets in at a threshold; what is not there, or
+    runs away, is left by bisection.
+    """
+    low, high = 0.0, most
+    for _ in range(SIZINGS):
+        found = worth(size)
+        if abs(found / wanted - 1) < close or (found < wanted and size == most):
+            break
+        low, high = (size, high) if found < wanted else (low, size)
+        ahead = min(size * (wanted / found) ** power, most) if 0 < found < np.inf else most
+        size = ahead if low < ahead < high or ahead == high == most else (low + high) / 2
+    return size, found
 
 
 def worth_of(law: Law, bench: Bench, number: int) -> float:
