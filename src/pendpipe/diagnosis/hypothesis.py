@@ -18,7 +18,7 @@ from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Detection, detect, prepar
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import Noise, white_noise
 from pendpipe.diagnosis.noise_estimate import estimate_noise
-from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR, Fit, refine
+from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR, Fit, best_fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import INCOMPLETE, Remainder, remainder_of
 from pendpipe.diagnosis.result import Finding
@@ -167,6 +167,28 @@ class Hypothesis:
     def named(self) -> Fit:
         """The fit with the named effects only."""
         return self.without_curve or self.fit
+
+    def without(self, *steps: Step) -> Fit | None:
+        """Return the model fitted again without some effects; a parameter is held again.
+
+        None where it has no such motion: they are needed.
+        """
+        key = tuple(map(id, steps))
+        if key not in self._without:
+            model, value, held = self.fit.model, self.fit.value.copy(), list(self.held)
+            for effect in (step.winner.lead.effect for step in steps):
+                model, value = model.dropping(effect, value)
+                if isinstance(effect, ReleasedParameter) and effect.index is not None:
+                    held.append(effect.index)
+                    value[effect.index] = self.beginning.value[effect.index]
+            bare = np.concatenate([self.baseline.value, value[self.baseline.model.size :]])
+            starts = [value, bare, *(step.before.value for step in steps)]
+            self._without[key] = best_fit(model, self.data, self.noise, starts, held=held)
+        return self._without[key]
+
+    @cached_property
+    def _without(self) -> dict[tuple[int, ...], Fit | None]:
+        return {}
 
     @cached_property
     def remainder(self) -> Remainder:

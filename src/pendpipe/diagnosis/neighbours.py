@@ -249,7 +249,7 @@ def _drops(state: Hypothesis) -> Iterator[Proposed]:
         effect = step.winner.lead.effect
         if isinstance(effect, ReleasedParameter):
             continue
-        without = refit_without(state, [step])
+        without = state.without(step)
         if without is not None:
             others = tuple(other for other in state.steps if other is not step)
             yield Proposed(without, others, f"{effect.name} is no longer needed")
@@ -260,7 +260,7 @@ def _curve_for_names(state: Hypothesis) -> Iterator[Proposed]:
     names = [step for step in state.steps if is_further(step)]
     if len(names) < 2 or any(step.winner.drawn for step in state.steps):
         return
-    bare = refit_without(state, names)
+    bare = state.without(*names)
     fits = _with_curves(bare, state) if bare else []
     if bare is None or not fits:
         return
@@ -275,7 +275,7 @@ def _curve_for_names(state: Hypothesis) -> Iterator[Proposed]:
 def _rare_for_a_curve(state: Hypothesis, rare: Sequence[Effect]) -> Iterator[Proposed]:
     """Put a rare name, or two, in the place of a curve: a camera is oblique, and has a shutter."""
     for step in [step for step in state.steps if step.winner.drawn]:
-        fit = refit_without(state, [step])
+        fit = state.without(step)
         steps = [other for other in state.steps if other is not step]
         for _ in range(_MOST_RARE):
             fits = _with_each(fit, rare, state) if fit else []
@@ -294,7 +294,7 @@ def _events_for_a_curve(state: Hypothesis, task: Task) -> Iterator[Proposed]:
     The first are the three best of all kinds; each is followed by others of its own.
     """
     for step in [step for step in state.steps if step.winner.lead.effect.in_time]:
-        bare = refit_without(state, [step])
+        bare = state.without(step)
         kept = tuple(other for other in state.steps if other is not step)
         enough = Scale.of(state.fit, state.data, state.noise).within(step.winner.charge)
         for first in _events(bare, state, task) if bare else []:
@@ -330,18 +330,6 @@ def _with_each(bare: Fit, names: Sequence[Effect], state: Hypothesis) -> list[Fi
         if each.identifier not in present
     ]
     return [fit for pair in starts if (fit := _with(bare, *pair, state))]
-
-
-def refit_without(state: Hypothesis, steps: Sequence[Step]) -> Fit | None:
-    """Refit the model without some effects, from the present values and from the baseline's.
-
-    None where it has no such motion: they are needed.
-    """
-    model, value = state.fit.model, state.fit.value
-    for step in steps:
-        model, value = model.dropping(step.winner.lead.effect, value)
-    bare = np.concatenate([state.baseline.value, value[state.baseline.model.size :]])
-    return best_fit(model, state.data, state.noise, [value, bare], held=state.held)
 
 
 def describing(state: Hypothesis, task: Task) -> Iterator[Neighbour]:

@@ -24,7 +24,6 @@ from pendpipe.diagnosis.neighbours import (
     compared,
     describing,
     leading,
-    refit_without,
     shares_a_misfit,
     simpler,
     with_other_noise,
@@ -160,7 +159,7 @@ def _judged(state: Hypothesis) -> Hypothesis:
     """Return it with errors, and with the fit of its names where a curve stands beside them."""
     named = None
     if _ends_with_curve(state) and len(state.steps) > 1:
-        named = refit_without(state, state.steps[-1:])
+        named = state.without(state.steps[-1])
         named = named and with_errors(named, state.data, state.noise)
     fit = with_errors(state.fit, state.data, state.noise)
     return replace(state, fit=fit, baseline=_baseline_alone(state), without_curve=named)

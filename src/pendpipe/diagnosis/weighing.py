@@ -1,7 +1,7 @@
 """Final probabilities of each effect and its rivals; the most probable leads."""
 
 import math
-from collections.abc import Container, Sequence
+from collections.abc import Collection, Container, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Final, NamedTuple
@@ -104,17 +104,14 @@ def law_of(found: Hypothesis, weighed: Sequence[Weighed]) -> Fit:
 
     A curve without a name, or a doubtful name, would take from the values of a, b and c.
     """
-    model, value = found.fit.model, found.fit.value
-    for step, each in zip(found.steps, weighed, strict=True):
-        if step.winner.drawn or float(np.sum(each.weights[:-1])) < 0.5:
-            model, value = model.dropping(step.winner.lead.effect, value)
-    if model is found.fit.model:
+    doubtful = [
+        step
+        for step, each in zip(found.steps, weighed, strict=True)
+        if step.winner.drawn or float(np.sum(each.weights[:-1])) < 0.5
+    ]
+    if not doubtful:
         return found.fit
-    bare = np.concatenate([found.baseline.value, value[found.baseline.model.size :]])
-    starts = [value, bare]
-    if len(found.named.value) == len(value):
-        starts.append(found.named.value)
-    fit = best_fit(model, found.data, found.noise, starts, held=found.held) or found.fit
+    fit = found.without(*doubtful) or found.fit
     return with_errors(fit, found.data, found.noise)
 
 
@@ -253,14 +250,7 @@ def _charge_for_several(found: Hypothesis) -> float:
 def _rivalry(found: Hypothesis, step: Step) -> tuple[Fit, Sequence[Rival]]:
     """Return the fit without one effect, and the rivals that could replace it."""
     effect = step.winner.lead.effect
-    held = list(found.held)
-    model, value = found.fit.model.dropping(effect, found.fit.value)
-    if isinstance(effect, ReleasedParameter) and effect.index is not None:
-        held.append(effect.index)
-        value[effect.index] = found.beginning.value[effect.index]
-    bare = np.concatenate([found.baseline.value, value[found.baseline.model.size :]])
-    starts = [value, bare, step.before.value]
-    without = best_fit(model, found.data, found.noise, starts, held=held) or step.before
+    without = found.without(step) or step.before
     gain = without.chi2 - found.fit.chi2
     same = abs(gain - step.winner.gain) < _SAME_GAIN * gain
     if len(found.steps) == 1 and same and not is_gross(without, found.data):
@@ -279,17 +269,16 @@ def _rivalry(found: Hypothesis, step: Step) -> tuple[Fit, Sequence[Rival]]:
         own = rival.lead.effect.key == effect.key
         if not (own or rival.lead.effect.expected) and rival.evidence < hopeless:
             continue
-        fit = found.fit if own else refitted(without, found, held, rival, useful)
+        fit = found.fit if own else refitted(without, found, rival, useful)
         if fit is not None:
             fits.append((rival, fit))
     return without, [rival.again(fit, without.chi2, scale) for rival, fit in fits]
 
 
-def refitted(
-    without: Fit, found: Hypothesis, held: Sequence[int], rival: Rival, useful: float
-) -> Fit | None:
+def refitted(without: Fit, found: Hypothesis, rival: Rival, useful: float) -> Fit | None:
     """Refit a rival in the final model, from its earlier result, as far as it is useful."""
     effect = rival.lead.effect
+    held: Collection[int] = set(range(without.model.size)).difference(without.free)
     if isinstance(effect, ReleasedParameter):
         held = effect.without(held)
     if _is_of(rival.fit, without, effect, found):
@@ -349,7 +338,7 @@ def _exchanged(found: Hypothesis, number: int, mate: Rival, weighed: Weighed) ->
         held.add(own.index)
     if isinstance(effect, ReleasedParameter):
         held = set(effect.without(held))
-    fit = refitted(weighed.without, found, sorted(held), mate, math.inf)
+    fit = refitted(weighed.without, found, mate, math.inf)
     if fit is None:
         return None
     rest = [rival for rival in step.rivals if rival.lead.effect.key != effect.key]
