@@ -14,7 +14,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import (
     CATALOGUE_SHARE,
@@ -42,16 +41,18 @@ from pendpipe.diagnosis.hypothesis import (
     undrawn,
 )
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit, best_fit, refine
+from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.rivals import (
     NO_SCAN,
     Rival,
     Scale,
+    believable,
     off_harmonics,
     ranked,
     refit_leads,
+    side_by_side,
 )
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
@@ -321,17 +322,6 @@ def _events(fit: Fit, state: Hypothesis, task: Task, kind: str = "") -> list[Riv
     )
 
 
-def _with_each(bare: Fit, names: Sequence[Effect], state: Hypothesis) -> list[Fit]:
-    """Fit each of some names beside the effects of a model that has it not."""
-    present = {effect.identifier for effect in bare.model.effects}
-    starts = [
-        (each, np.full(each.count, float(each.parameter_free)))
-        for each in names
-        if each.identifier not in present
-    ]
-    return [fit for pair in starts if (fit := _with(bare, *pair, state))]
-
-
 def describing(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
     """Describe what is left by the best curve, or a rare name.
 
@@ -385,11 +375,13 @@ def _with_curves(bare: Fit, state: Hypothesis, *, in_time: bool = False) -> list
     curves = undrawn((*CURVES, *FOLLOW_UP_CURVES), bare)
     drawn = [curve for curve in curves if in_time >= curve.in_time]
     resolved = build_bank(bare, state.noise, drawn).candidates
-    starts = [(each.effect, np.zeros(each.effect.count)) for each in resolved]
-    return [fit for pair in starts if (fit := _with(bare, *pair, state))]
+    return _with_each(bare, [each.effect for each in resolved], state)
 
 
-def _with(bare: Fit, effect: Effect, own: FloatArray, state: Hypothesis) -> Fit | None:
-    model, start = bare.model.adding(effect), np.concatenate([bare.value, own])
-    fit = best_fit(model, state.data, state.noise, [start], held=state.held)
-    return fit if fit and effect.believable(fit.value[len(bare.value) :]) else None
+def _with_each(bare: Fit, effects: Sequence[Effect], state: Hypothesis) -> list[Fit]:
+    """Fit each of some effects that have no shape beside those of a model that lacks it."""
+    present = {effect.key for effect in bare.model.effects}
+    leads = [Lead(each, (), 0.0, 0.0) for each in effects if each.key not in present]
+    lost = loses_phase(bare)
+    fits = side_by_side(bare, state.data, state.noise, leads, state.held, phase_lost=lost)
+    return [fit for lead, fit in fits if fit and believable(bare, fit, lead.effect)]
