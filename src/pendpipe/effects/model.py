@@ -305,13 +305,13 @@ class Model:
             before = sample_motion(motion, np.array([kick.time_s]))
             # It takes effect before the instant, so that what follows is smooth there.
             whole = max(int(before.phase[0] // math.pi) - 1, 0)
-            for _ in range(2):
+            # What the kick still lacks after the first is known once its half cycle is followed.
+            for until_s in (kick.time_s, self._until_s):
                 log, late = kick_sizes(before, [kick], sample_motion(motion, before.time_s))
                 by_log[whole:] += log[0]
                 by_time[whole:] += late[0]
-                motion = follow(
-                    law, omega, start, begin, motion, (by_log, by_time), until_s=self._until_s
-                )
+                reset = (by_log, by_time)
+                motion = follow(law, omega, start, begin, motion, reset, until_s=until_s)
             pieces.append((kick.time_s, motion))
         return pieces
 
