@@ -122,7 +122,7 @@ def blocks_of(fit: Fit, noise: Noise) -> tuple[Fit, Noise]:
         cosine=cosine.reshape(-1)[order],
     )
     model, value = fit.model, fit.value
-    at = fit.at.thinned(every, rows.reshape(-1), lambda motion: model.acceleration(motion, value))
+    at = fit.at.thinned(every, rows.reshape(-1), model.law(value))
     compared = replace(fit.evaluation, at=at, residual=own.numbers_of(fit.residual), noise=own)
     return replace(fit, evaluation=compared), own
 

@@ -232,7 +232,7 @@ def rates(law: Law, motion: Motion, largest: float = _LARGEST) -> Rates:
     """
     omega = motion.angular_frequency
     pull = np.asarray(motion.upwards * law(motion) / (omega * omega * motion.amplitude))
-    g = np.nan_to_num(np.clip(pull, -largest, largest))
+    g = np.clip(np.where(np.isnan(pull), 0.0, pull), -largest, largest)
     g = np.where(g * motion.clock.cosine > _STEEPEST, np.copysign(_STEEPEST, g), g)
     free = 1.0 - g * motion.clock.cosine
     return Rates(-g * motion.clock.sine / free, 1.0 / (omega * free), pull)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any, Final, Literal, Self
 
@@ -264,15 +264,21 @@ class Model:
             self.fold,
         )
 
-    def acceleration(self, motion: Motion, value: FloatArray) -> FloatArray:
-        """Return x'' + omega^2 x of the baseline and of all effects."""
+    def law(self, value: FloatArray) -> Law:
+        """Return x'' + omega^2 x of the baseline and of all effects, as a function of a motion."""
         pendulum = self.pendulum(value)
-        return self._added(
-            pendulum.acceleration(motion),
-            value,
-            # Another form is in the pendulum already.
-            lambda effect, own: None if effect.form else effect.acceleration(motion, pendulum, own),
-        )
+        # Another form is in the pendulum already.
+        added = [(effect, value[place]) for effect, place in self.places() if not effect.form]
+
+        def acceleration(motion: Motion) -> FloatArray:
+            total = pendulum.acceleration(motion)
+            for effect, own in added:
+                extra = effect.acceleration(motion, pendulum, own)
+                if extra is not None:
+                    total = total + extra
+            return total
+
+        return acceleration
 
     def _added(
         self,
@@ -296,7 +302,7 @@ class Model:
             If it stops, or runs away, before the last reading.
         """
         omega, start, begin = float(value[OMEGA]), float(value[START]), float(value[TIME])
-        law: Law = partial(self.acceleration, value=value)
+        law = self.law(value)
         motion = self._smooth(law, value)
         self._last["motion"] = motion
         pieces = [(-math.inf, motion)]
@@ -371,7 +377,7 @@ class Model:
             motion.time_s
         ):
             raise NoMotionError("the readings' clock is out of reach")
-        tangent = Tangent(partial(self.acceleration, value=value), motion)
+        tangent = Tangent(self.law(value), motion)
         span, seen = self.span(value, sampled), self.as_seen(sampled, value)
         return Evaluated(self.read(seen, value), seen, tangent, span)
 
@@ -379,7 +385,7 @@ class Model:
         """What is read of the sampled motion: the angle, or its rate."""
         if self.seen == "angle":
             return sampled
-        extra = sampled.at_nodes(self.acceleration(sampled.motion, value))
+        extra = sampled.at_nodes(self.law(value)(sampled.motion))
         return sampled.as_rate(extra - float(value[OMEGA]) ** 2 * sampled.angle)
 
     def taken_at(self, value: FloatArray) -> FloatArray:
@@ -395,9 +401,9 @@ class Model:
         reading = np.asarray(value[OFFSET] + left * sampled.angle)
         if self.fold > 1:
             # A mean of neighbours is x + k x''; x'' = -omega^2 x + f, and -k omega^2 x is above.
-            bent = self.acceleration(sampled.motion, value)
+            law = self.law(value)
+            bent = law(sampled.motion)
             if self.seen == "rate":
-                law: Law = partial(self.acceleration, value=value)
                 pace = rates(law, sampled.motion).pace
                 bent = sampled.motion.clock.derivative(bent) / pace
             reading = reading + (1.0 - left) / float(value[OMEGA]) ** 2 * sampled.at_nodes(bent)
@@ -501,7 +507,7 @@ def _by_loss(model: Model, value: FloatArray, at: Evaluated, index: int) -> Floa
     moved = value.copy()
     moved[index] += max(1e-3 * abs(float(value[index])), 1e-6)
     motion = at.tangent.motion
-    change = model.acceleration(motion, moved) - model.acceleration(motion, value)
+    change = model.law(moved)(motion) - model.law(value)(motion)
     return np.asarray(change / (moved[index] - value[index]))
 
 
@@ -512,7 +518,7 @@ def _by_omega(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
     other = Motion(
         motion.clock, float(moved[OMEGA]), motion.log_amplitude, motion.time_s, motion.upwards
     )
-    new = rates(lambda m: model.acceleration(m, moved), other)
+    new = rates(model.law(moved), other)
     old = at.tangent.rates
     loss, pace = (new.loss - old.loss) / step, (new.pace - old.pace) / step
     change = at.sampled.change(*at.tangent.of_rates(loss, pace))
