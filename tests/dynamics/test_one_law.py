@@ -382,7 +382,7 @@ def test_a_pendulum_that_stops_before_the_last_reading_is_refused() -> None:
         follow(pendulum.acceleration, OMEGA_RAD_S, 0.15, 0.0, undamped(clock, 0.15), until_s=until)
 
 
-@pytest.mark.parametrize("amplitude", [0.3, 0.75, 1.5, 2.3])
+@pytest.mark.parametrize("amplitude", [0.3, 0.75, 1.15, 1.5, 1.9, 2.3, 2.55])
 def test_sin_x_is_read_between_the_nodes_as_exactly_as_it_is_solved(amplitude: float) -> None:
     """Against twice the nodes and more, where its half cycles differ most from a cosine's."""
     time_s = np.arange(0.0, 30.0, 0.013)

@@ -172,7 +172,10 @@ def _before_the_stop(data: Data, model: Model, value: FloatArray) -> tuple[Data,
             model = model.at_times(data.time_s)
 
 
-_NODES: Final = ((0.4, 14), (0.8, 16), (1.6, 20), (2.4, 28))
+_NODES: Final = (
+    *((0.4, 14), (0.8, 16), (1.2, 18), (1.6, 20)),
+    *((2.0, 24), (2.4, 32), (2.6, 36), (2.8, 44)),
+)
 """Nodes up to an amplitude, with which sin x is solved to 3e-7 of the motion."""
 
 
@@ -183,4 +186,4 @@ def order_for(amplitude: float, unit: str) -> int:
     """
     if unit not in ("rad", "rad/s"):
         return _NODES[0][1]
-    return next((nodes for up_to, nodes in _NODES if amplitude < up_to), 48)
+    return next((nodes for up_to, nodes in _NODES if amplitude < up_to), 60)
