@@ -376,7 +376,7 @@ def test_coloured_noise_is_predicted_from_what_is_known() -> None:
     np.testing.assert_allclose(filled[~out], walk[~out])
 
 
-@pytest.mark.parametrize("sizes", [(14.0, -10.0, 12.0), (12.0, 8.0)])
+@pytest.mark.parametrize("sizes", [(14.0, -10.0, 12.0), (12.0, 8.0), (120.0, 80.0)])
 def test_several_jumps_of_the_zero_are_found_each_and_are_no_glitches(
     sizes: tuple[float, ...],
 ) -> None:

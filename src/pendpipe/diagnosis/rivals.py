@@ -491,14 +491,12 @@ def believable(base: Fit, fit: Fit, effect: Effect) -> bool:
     """Whether the displacements that an effect adds are smaller than the motion itself.
 
     A second tone that is as large as the motion and has nearly its frequency describes a change
-    of phase, not a second mode.
+    of phase, not a second mode. A jump may have any size.
     """
-    first = len(base.value) + effect.parameter_free
-    own = fit.value[first:]
-    if not effect.believable(own):
-        return False
+    own = fit.value[len(base.value) + effect.parameter_free :]
     span = base.at.span
-    return effect.displacement(own, span.duration_s) < _LARGEST_DISPLACEMENT * span.first_amplitude
+    moved = 0.0 if effect.local else effect.displacement(own, span.duration_s)
+    return effect.believable(own) and moved < _LARGEST_DISPLACEMENT * span.first_amplitude
 
 
 def _limit(
