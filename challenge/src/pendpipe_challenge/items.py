@@ -263,9 +263,9 @@ def _try(recipe: Recipe, rng: Rng, ease: float, noise: Noise | None) -> Item | N
 
             @cache
             def at(size: float) -> Oracle:
-                sized = cause._replace(size=float(np.copysign(size, cause.size)))
-                there = Bench(scene, [sized])
-                return Oracle(there, listed(scene), np.random.default_rng(seed))
+                there = cause._replace(size=float(np.copysign(size, cause.size)))
+                bench = Bench(scene, [there])
+                return Oracle(bench, listed(scene), np.random.default_rng(seed))
 
             size, _ = size_worth(
                 recipe["delta_chi2"][0] * ease,
@@ -366,19 +366,21 @@ def size_worth(
     power: float = 0.5,
     close: float = CLOSE,
 ) -> tuple[float, float]:
-    """The size whose evidence is wanted, or the nearest that was found; and its evidence.
+    """The size that has the wanted evidence, or the last that was tried; and its evidence.
 
-    Evidence goes as size^(1/power), but for what sets in at a threshold; what is not there, or
-    runs away, is left by bisection.
+    Evidence grows as size^(1/power). Where that leads out of the bracket, as for a cause that
+    sets in at a threshold, the bracket is halved.
     """
-    low, high = 0.0, most
+    low, high, ahead = 0.0, most, size
     for _ in range(SIZINGS):
+        size = ahead
         found = worth(size)
         if abs(found / wanted - 1) < close or (found < wanted and size == most):
             break
         low, high = (size, high) if found < wanted else (low, size)
         ahead = min(size * (wanted / found) ** power, most) if 0 < found < np.inf else most
-        size = ahead if low < ahead < high or ahead == high == most else (low + high) / 2
+        if not (low < ahead < high or ahead == high == most):
+            ahead = (low + high) / 2
     return size, found
 
 

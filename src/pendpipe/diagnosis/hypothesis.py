@@ -169,8 +169,9 @@ class Hypothesis:
         return self.without_curve or self.fit
 
     def without(self, *steps: Step) -> Fit | None:
-        """Return the model fitted again without some effects; a parameter is held again.
+        """Fit the model again without the effects of some of its steps, once for all who ask.
 
+        A parameter that a step released is held again.
         None where it has no such motion: they are needed.
         """
         key = tuple(map(id, steps))

@@ -379,7 +379,7 @@ def _with_curves(bare: Fit, state: Hypothesis, *, in_time: bool = False) -> list
 
 
 def _with_each(bare: Fit, effects: Sequence[Effect], state: Hypothesis) -> list[Fit]:
-    """Fit each of some effects that have no shape beside those of a model that lacks it."""
+    """Fit each effect beside those of a model; effects without a shape, and not twice the same."""
     present = {effect.key for effect in bare.model.effects}
     leads = [Lead(each, (), 0.0, 0.0) for each in effects if each.key not in present]
     lost = loses_phase(bare)

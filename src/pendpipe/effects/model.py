@@ -267,16 +267,13 @@ class Model:
     def law(self, value: FloatArray) -> Law:
         """Return x'' + omega^2 x of the baseline and of all effects, as a function of a motion."""
         pendulum = self.pendulum(value)
-        # Another form is in the pendulum already.
-        added = [(effect, value[place]) for effect, place in self.places() if not effect.form]
 
         def acceleration(motion: Motion) -> FloatArray:
-            total = pendulum.acceleration(motion)
-            for effect, own in added:
-                extra = effect.acceleration(motion, pendulum, own)
-                if extra is not None:
-                    total = total + extra
-            return total
+            def of(effect: Effect, own: FloatArray) -> FloatArray | None:
+                # Another form is in the pendulum already.
+                return None if effect.form else effect.acceleration(motion, pendulum, own)
+
+            return self._added(pendulum.acceleration(motion), value, of)
 
         return acceleration
 
@@ -311,7 +308,7 @@ class Model:
             before = sample_motion(motion, np.array([kick.time_s]))
             # It takes effect before the instant, so that what follows is smooth there.
             whole = max(int(before.phase[0] // math.pi) - 1, 0)
-            # What the kick still lacks after the first is known once its half cycle is followed.
+            # Followed to the kick's half cycle, the motion shows what the kick still lacks.
             for until_s in (kick.time_s, self._until_s):
                 log, late = kick_sizes(before, [kick], sample_motion(motion, before.time_s))
                 by_log[whole:] += log[0]
