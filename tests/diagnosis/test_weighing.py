@@ -33,7 +33,7 @@ from pendpipe.diagnosis.rivals import Rival, Scale, class_width, evidence, proba
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.weighing import Weighed, fault_named, law_of, weigh, with_likelier
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import B
+from pendpipe.effects.baseline import OMEGA, B
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import CURVES
 from pendpipe.effects.model import Model
@@ -313,6 +313,37 @@ def test_a_name_as_likely_as_its_rivals_stays(name: str, taken: str) -> None:
     step, own, mates, _ = led(diagnosed(name), taken)
     assert step.winner.identifier == taken
     assert 1.5 * own >= max(mates.values())
+
+
+def test_the_class_of_a_likelier_name_is_that_of_the_last_model() -> None:
+    """Its rivals were refitted beside 1.4 times the noise, which is worth half of a gain."""
+    found = having_taken(scanned("circular-error"), "cubic-stiffness")
+    (step,) = found.steps
+    earlier = [
+        replace(each, worth=each.worth / 2, evidence=each.evidence / 2) for each in step.rivals
+    ]
+    weighed = [
+        exchanged(replace(found, steps=(replace(step, rivals=rivals),)))[1][0]
+        for rivals in (step.rivals, tuple(earlier))
+    ]
+    same, again = ({mate.identifier for mate in each.mates} for each in weighed)
+    assert "cubic-stiffness" in again
+    assert again == same
+    np.testing.assert_allclose(weighed[1].weights, weighed[0].weights, atol=1e-3)
+
+
+def test_a_period_is_known_no_better_than_by_the_names_that_share_the_probability() -> None:
+    """A drifting clock and a drifting frequency leave the same noise and not the same T0."""
+    outcome = diagnosed("frequency-drift")
+    found = outcome.search
+    (weighed,) = [weigh(found, step) for step in found.steps]
+    values = np.array([found.fit.value[OMEGA], *(mate.fit.value[OMEGA] for mate in weighed.mates)])
+    weights = weighed.weights[:-1] / weighed.weights[:-1].sum()
+    spread = np.sqrt(weights @ (values - weights @ values) ** 2) / (2.0 * np.pi)
+    alone = np.sqrt(found.fit.covariance()[OMEGA, OMEGA]) / (2.0 * np.pi)
+    assert spread > 3.0 * alone
+    quoted = outcome.improved.parameters["frequency"]
+    assert quoted.sd > spread
 
 
 def test_a_wrong_parameter_replaces_missing_physics() -> None:

@@ -44,6 +44,7 @@ from pendpipe.diagnosis.weighing import (
     effect_named,
     fault_named,
     law_of,
+    with_other_descriptions,
 )
 from pendpipe.dynamics.any_law import NoMotionError, sample_pieces
 from pendpipe.dynamics.eq8 import Restoring
@@ -268,7 +269,7 @@ def _models(
         of_all = fit.method == "waveform" and not fit.cuts and fit.zero_drift is None
         # What it leaves of other readings, or beside a zero that drifts, compares with nothing.
         before = printed if of_all else replace(before, parameters=printed.parameters)
-    law = law_of(found, weighed)
+    law = with_other_descriptions(law_of(found, weighed), found, weighed)
     if _adds_nothing(found) and found.fit.error_scale == 1.0:
         return before, before, law
     after = _fitted_model(found.fit, found, law)

@@ -61,12 +61,15 @@ class Weighed(NamedTuple):
         The effects that the recording cannot distinguish from it, the best of each identifier.
     weights
         Probabilities of the effect, of its mates, and of none of them.
+    rivals
+        All that were refitted beside the other effects, of one class or not.
     """
 
     without: Fit
     gain: float
     mates: tuple[Rival, ...]
     weights: FloatArray
+    rivals: tuple[Rival, ...]
 
 
 def weigh(found: Hypothesis, step: Step) -> Weighed:
@@ -88,7 +91,7 @@ def weigh(found: Hypothesis, step: Step) -> Weighed:
     # What every pendulum has, and a line off the harmonics, no misfit can be mistaken for.
     if not (effect.expected or off_harmonics(found.fit, effect)):
         weights = weights * _explained(found, effect, gain)
-    return Weighed(without, gain, tuple(mates), weights)
+    return Weighed(without, gain, tuple(mates), weights, tuple(rivals))
 
 
 def beside(found: Hypothesis, effect: Effect) -> Hypothesis:
@@ -133,7 +136,7 @@ def effect_named(found: Hypothesis, step: Step, weighed: Weighed) -> FoundEffect
     """Return one effect with its final values, probability and location."""
     effect = step.winner.lead.effect
     found = beside(found, effect)
-    without, gain, mates, weights = weighed
+    without, gain, mates, weights, _ = weighed
     return FoundEffect(
         effect.identifier,
         effect.name,
@@ -341,7 +344,8 @@ def _exchanged(found: Hypothesis, number: int, mate: Rival, weighed: Weighed) ->
     fit = refitted(weighed.without, found, mate, math.inf)
     if fit is None:
         return None
-    rest = [rival for rival in step.rivals if rival.lead.effect.key != effect.key]
+    # All of one model and noise: those of an earlier model would be far behind this one.
+    rest = [rival for rival in weighed.rivals if rival.lead.effect.key != effect.key]
     steps = list(found.steps)
     steps[number] = replace(step, rivals=(mate, *rest), before=weighed.without)
     if number + 1 < len(steps):
