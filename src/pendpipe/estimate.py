@@ -1,9 +1,9 @@
 """A number with its uncertainty, as it stands in every result file."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isfinite, nan, pi
+from math import erf, inf, isfinite, nan, pi, sqrt
 from typing import Any, Final, Self
 
 Z95: Final = 1.959963984540054
@@ -119,6 +119,64 @@ def over(number: float, estimate: Estimate, unit: str = "") -> Estimate:
     low, high = estimate.bounds95
     ends = number / high if isfinite(high) else 0.0, number / low if low > 0.0 else inf
     return Estimate(value, value * estimate.sd / estimate.value, unit, ends)
+
+
+def averaged(estimates: Sequence[Estimate], probabilities: Sequence[float]) -> Estimate:
+    """Average one quantity over descriptions that share the probability.
+
+    Value ``sum p_i v_i``, variance ``sum p_i [sd_i^2 + (v_i - value)^2]``: the mean variance plus
+    the spread between the descriptions. The interval is that of the mixture: each description
+    stands for a normal distribution whose two halves reach to the ends of its own interval, so
+    that what is confined by a bound stays within it.
+
+    Parameters
+    ----------
+    estimates
+        The quantity by each description, in one unit.
+    probabilities
+        Theirs; they need not add up to 1.
+
+    Examples
+    --------
+    >>> averaged([Estimate(1.0, 0.1, "s"), Estimate(2.0, 0.1, "s")], [0.6, 0.6])
+    Estimate(value=1.5, sd=0.50990..., unit='s', interval95=(0.835..., 2.164...), at_bound=False)
+    """
+    if len(estimates) == 1:
+        return estimates[0]
+    total = sum(probabilities)
+    parts = [(p / total, each) for p, each in zip(probabilities, estimates, strict=True)]
+    value = sum(p * each.value for p, each in parts)
+    variance = sum(p * (each.sd**2 + (each.value - value) ** 2) for p, each in parts)
+    ends = _quantile(parts, 0.025), _quantile(parts, 0.975)
+    at_bound = all(each.at_bound for each in estimates)
+    return Estimate(value, sqrt(variance), estimates[0].unit, ends, at_bound)
+
+
+_HALVINGS: Final = 52
+"""Of an interval until its ends are one number: the binary digits of a float."""
+
+
+def _quantile(parts: Sequence[tuple[float, Estimate]], probability: float) -> float:
+    """Return where a mixture's distribution reaches a probability, by bisection."""
+
+    def below(place: float) -> float:
+        total = 0.0
+        for p, each in parts:
+            end = each.bounds95[place > each.value]
+            reach = abs(end - each.value) / Z95
+            off = (place - each.value) / max(reach, 1e-300)
+            total += 0.5 * p * (1.0 + erf(off / sqrt(2.0)))
+        return total
+
+    # Beyond the ends of all intervals there is less than 2.5 %.
+    low = min(each.bounds95[0] for _, each in parts)
+    high = max(each.bounds95[1] for _, each in parts)
+    if not (isfinite(low) and isfinite(high)):
+        return low if probability < 0.5 else high
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if below(middle) < probability else (low, middle)
+    return 0.5 * (low + high)
 
 
 def measured(text: str) -> Estimate:
