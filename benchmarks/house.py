@@ -7,13 +7,20 @@ A commit stands beside what is here; ``--tests`` runs both suites and times them
 Strings that stand alone (docstrings) are no statements. A file's importers are the other files of
 the two packages that name it. A definition is unused if its name stands nowhere else in code,
 templates and configuration, and no registry holds it. Lines stand twice if six or more in a row
-have the shape of others.
+have the shape of others. A named number (upper case, at the top of a file) has a word of origin if
+a docstring follows it, or a comment stands on its line or above it. Bare numbers are those in
+comparisons, but for 0, 1, -1, 2, 0.5 and 10.
+
+``budgets.tsv`` holds the statements that each folder may have: who needs more raises its row in the
+same commit and says why. ``concepts.tsv`` names the definitions that do the same thing, each its
+own way; whoever joins two strikes one out.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import csv
 import io
 import os
 import re
@@ -23,7 +30,7 @@ import tarfile
 import tempfile
 import tokenize
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 from statistics import median
@@ -51,13 +58,35 @@ REGISTRIES: Final = re.compile(
 )
 LAYOUT: Final = {getattr(tokenize, k) for k in ("COMMENT", "NL", "NEWLINE", "INDENT", "DEDENT")}
 Function = ast.FunctionDef | ast.AsyncFunctionDef
+PLAIN_NUMBERS: Final = (0, 1, 2, -1, 0.5, 10)
+"""Numbers that a comparison needs no reason for."""
+SECOND: Final = {
+    "fit": "pp.fit('examples/rod-pendulum.csv')",
+    "diagnosis": "pp.diagnose('examples/string-pendulum.csv')",
+}
+ENTERED: Final = f"""
+import sys
+import pendpipe as pp
+{SECOND["fit"]}; {SECOND["diagnosis"]}
+seen = set()
+def note(frame, event, argument):
+    code = frame.f_code
+    if event == "call" and "pendpipe" in code.co_filename and code.co_name[0] != "<":
+        seen.add((code.co_filename, getattr(code, "co_qualname", code.co_name)))
+sys.setprofile(note)
+%s
+sys.setprofile(None)
+print(len({{file for file, _ in seen}}), len(seen), sep=", ")
+"""
+"""The first run compiles, and loads what is loaded once."""
 
 
 def files_of(tree: Path) -> dict[str, list[Path]]:
     """Python files by part; in old commits the challenge lies within the library."""
-    within = tree / "src/pendpipe/challenge"
+    within, generated = tree / "src/pendpipe/challenge", tree / "src/pendpipe/_version.py"
+    library = sorted({*(tree / "src").rglob("*.py")} - {generated})
     return {
-        "library": [p for p in sorted((tree / "src").rglob("*.py")) if within not in p.parents],
+        "library": [path for path in library if within not in path.parents],
         "challenge": sorted([*within.rglob("*.py"), *(tree / "challenge/src").rglob("*.py")]),
         "tests": sorted((tree / "tests").rglob("*.py")),
         "benchmarks": sorted((tree / "benchmarks").rglob("*.py")),
@@ -89,6 +118,8 @@ def importers(trees: dict[Path, ast.Module]) -> dict[str, set[str]]:
             elif isinstance(node, ast.ImportFrom) and (home := node.module):
                 below = [f"{home}.{alias.name}" for alias in node.names]
                 wanted = [name if name in names else home for name in below]
+            elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module"):
+                wanted = [a.value for a in node.args if isinstance(a, ast.Constant)]
             for name in names.intersection(wanted):
                 found[name].add(module_name(path))
     return found
@@ -102,10 +133,10 @@ def tops(trees: dict[Path, ast.Module]) -> dict[Path, ast.Module]:
     }
 
 
-def circles(trees: dict[Path, ast.Module]) -> int:
-    """Folders that import each other, in functions too, and files at their tops."""
+def circles(*graphs: tuple[dict[str, set[str]], int]) -> int:
+    """Groups of modules, or of folders at a depth, that import each other."""
     number = 0
-    for by, depth in ((importers(trees), 2), (importers(tops(trees)), 9)):
+    for by, depth in graphs:
         arrows = {
             (".".join(a.split(".")[:depth]), ".".join(b.split(".")[:depth]))
             for b, users in by.items()
@@ -201,6 +232,63 @@ def shape_of(rows: list[list[tokenize.TokenInfo]]) -> tuple[object, ...]:
     return tuple(shape)
 
 
+def is_number(node: ast.AST) -> bool:
+    """Whether a node is a number as it stands."""
+    return isinstance(node, ast.Constant) and type(node.value) in (int, float)
+
+
+def bare(nodes: list[ast.AST]) -> int:
+    """Numbers that stand in comparisons without a name."""
+    sides = [s for n in nodes if isinstance(n, ast.Compare) for s in (n.left, *n.comparators)]
+    return sum(is_number(s) and getattr(s, "value", 0) not in PLAIN_NUMBERS for s in sides)
+
+
+def silent(path: Path, tree: ast.Module) -> int:
+    """Named numbers at the top of a file that no word of origin follows or precedes."""
+    lines, number = path.read_text("utf-8").splitlines(), 0
+    for node, after in zip(tree.body, [*tree.body[1:], None], strict=True):
+        if not isinstance(node, ast.Assign | ast.AnnAssign) or node.value is None:
+            continue
+        targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+        named = len(targets) == 1 and isinstance(targets[0], ast.Name) and targets[0].id.isupper()
+        about = [lines[node.lineno - 2], lines[node.lineno - 1], lines[(node.end_lineno or 1) - 1]]
+        told = is_text(after) or any("#" in line for line in about)
+        number += named and not told and any(map(is_number, ast.walk(node.value)))
+    return number
+
+
+def statements(nodes: Iterable[ast.AST]) -> int:
+    """How many statements, docstrings aside."""
+    return sum(isinstance(node, ast.stmt) and not is_text(node) for node in nodes)
+
+
+def rows(name: str) -> list[dict[str, str]]:
+    """A table of this folder."""
+    with (ROOT / "benchmarks" / name).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file, delimiter="\t", quoting=csv.QUOTE_NONE))
+
+
+def by_folder(tree: Path) -> Counter[str]:
+    """Statements of each folder that has a budget, its own folders included from the third on."""
+    found: Counter[str] = Counter()
+    for path in (path for paths in files_of(tree).values() for path in paths):
+        parts = path.relative_to(tree).parent.parts
+        nodes = ast.walk(ast.parse(path.read_text("utf-8")))
+        found["/".join(parts[: 3 if parts[0] == "src" else 2])] += statements(nodes)
+    return found
+
+
+def ways(tree: Path, definitions: str) -> list[str]:
+    """Which of the definitions, ``file:name``, stand in a tree; a file may stand for itself."""
+    found = []
+    for each in definitions.split():
+        file, _, name = each.partition(":")
+        text = (tree / file).read_text("utf-8") if (tree / file).exists() else ""
+        if re.search(rf"^ *(def|class) {name}\b" if name else ".", text, re.MULTILINE):
+            found.append(each)
+    return found
+
+
 def measure(tree: Path) -> tuple[dict[str, dict[str, Any]], list[str]]:
     """All counts of a tree, by part and measure, and the definitions that nobody uses."""
     parts = files_of(tree)
@@ -214,21 +302,23 @@ def measure(tree: Path) -> tuple[dict[str, dict[str, Any]], list[str]]:
         nodes = [node for path in paths for node in ast.walk(trees[path])]
         functions = [node for node in nodes if isinstance(node, Function)]
         long = [f for f in functions if f.end_lineno and f.end_lineno - f.lineno >= 60]
-        alone = [p for p in paths if p in packages and len(by[module_name(p)]) == 1]
+        own = {path: trees[path] for path in paths if path in packages}
+        among = importers(own)
+        alone = [path for path in own if len(by[module_name(path)]) == 1]
         table[part] = {
             "files": len(paths),
-            "statements": sum(isinstance(n, ast.stmt) and not is_text(n) for n in nodes),
+            "statements": statements(nodes),
             "lines": sum(len(text.splitlines()) for text in texts),
-            "files above 400 statements": sum(
-                sum(isinstance(n, ast.stmt) and not is_text(n) for n in ast.walk(trees[p])) > 400
-                for p in paths
-            ),
+            "files above 400 statements": sum(statements(ast.walk(trees[p])) > 400 for p in paths),
             "functions over 60 lines": len(long),
             "files with exactly one importer": len(alone),
             "definitions nobody uses": sum(tree / n.partition(":")[0] in paths for n in dead),
             "lines that stand twice": duplicates(paths),
-            "floors of the diagnosis": floors({p: trees[p] for p in paths if p in packages}),
-            "circles of imports": circles({p: trees[p] for p in paths if p in packages}),
+            "floors of the diagnosis": floors(own),
+            "circles of imports": circles((among, 2), (importers(tops(own)), 9)),
+            "circles with types, and imports in functions": circles((among, 9)),
+            "named numbers without a word of origin": sum(silent(p, trees[p]) for p in paths),
+            "bare numbers in comparisons": bare(nodes),
         }
     return table, dead
 
@@ -250,6 +340,10 @@ def costs(tree: Path, *, tests: bool) -> dict[str, str]:
         "CPU of `import pendpipe`": start("-c", "import pendpipe"),
         "CPU of `pendpipe --version`": start("-m", "pendpipe.cli", "--version"),
     }
+    for what, again in SECOND.items():
+        call = [sys.executable, "-c", ENTERED % again]
+        run = subprocess.run(call, cwd=tree, env=environment, capture_output=True, text=True)
+        found[f"files, functions entered by a second {what}"] = run.stdout.strip() or "none"
     if tests:
         call = [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "worksteal"]
         paths = os.pathsep.join(str(tree / part) for part in ("src", "challenge/src", "."))
@@ -286,6 +380,11 @@ def main() -> None:
             trees = {arguments.commit: copy_of(arguments.commit, Path(folder)), **trees}
         found = {name: measure(tree) for name, tree in trees.items()}
         prices = {name: costs(tree, tests=arguments.tests) for name, tree in trees.items()}
+        sizes = {name: by_folder(tree) for name, tree in trees.items()}
+        several = [
+            (row["concept"], [len(ways(tree, row["definitions"])) for tree in trees.values()])
+            for row in rows("concepts.tsv")
+        ]
     parts = list(found["here"][0])
     heads = [f"{part}, {name}" for part in parts for name in trees]
     print(head("", *heads))
@@ -294,6 +393,13 @@ def main() -> None:
     print("", head("", *trees), sep="\n")
     for what in prices["here"]:
         print(table_row(what, [prices[name][what] for name in trees]))
+    print("", head("ways to the same thing", *trees), sep="\n")
+    for concept, numbers in several:
+        print(table_row(concept, numbers))
+    print("", head("statements of", "f501561d", "budget", *trees), sep="\n")
+    for row in rows("budgets.tsv"):
+        here = [sizes[name][row["folder"]] for name in trees]
+        print(table_row(row["folder"], [row["f501561d"], row["budget"], *here]))
     if arguments.list:
         print("\nNobody uses:", *found["here"][1], sep="\n- ")
 
