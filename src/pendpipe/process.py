@@ -4,7 +4,9 @@ import os
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import chdir
 from itertools import islice
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
@@ -31,6 +33,19 @@ def one_thread() -> None:
     """
     for variable, number in ONE_THREAD.items():
         os.environ.setdefault(variable, number)
+
+
+def leave_the_folder_out() -> None:
+    """Let the working folder run and configure nothing in our programs.
+
+    Python puts it on the path of what is begun by ``-m`` or ``-c``, so a job of Snakemake or a
+    worker would import a `signal.py` that lies there; matplotlib reads a `matplotlibrc` there
+    when it is imported.
+    """
+    os.environ["PYTHONSAFEPATH"] = "1"
+    if os.path.lexists("matplotlibrc"):
+        with chdir(Path(__file__).parent):
+            import matplotlib as mpl  # noqa: F401
 
 
 def keep_memory() -> None:

@@ -55,9 +55,16 @@ def test_every_figure_is_there_as_svg_and_png_however_many_processes_draw(
 
 
 def test_the_same_data_give_the_same_bytes(example: Any, tmp_path: Path) -> None:
-    first, second = (
-        save(draw_fig09(example.content), tmp_path / folder / "fig09") for folder in ("a", "b")
-    )
+    """Whatever a ``matplotlibrc`` asks for; there is no LaTeX here, and it would be called."""
+    first = save(draw_fig09(example.content), tmp_path / "a/fig09")
+    asked = {
+        "text.usetex": True,
+        "axes.titlesize": 40.0,
+        "lines.marker": "s",
+        "savefig.pad_inches": 9,
+    }
+    with mpl.rc_context(asked):
+        second = save(draw_fig09(example.content), tmp_path / "b/fig09")
     for one, other in zip(first, second, strict=True):
         assert one.read_bytes() == other.read_bytes()
 

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from pendpipe.cli import main
+from pendpipe.configuration.jobs import prepare_environment
 from pendpipe.configuration.load import read_records
 from pendpipe.project import SNAKEFILE
 from pendpipe.stages.chunks import batch_for, split
@@ -51,7 +52,53 @@ def begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "mine"
 
 
+def set_traps(folder: Path) -> Path:
+    """Lay what a folder must not run or configure; what does says so in the file returned."""
+    sprung = folder / "sprung"
+    for module in ("signal", "csv", "random", "calendar", "snakemake_logger_plugin_other"):
+        code = (
+            f"with open({str(sprung)!r}, 'a') as out: out.write('{module}, ')\nraise SystemExit(9)"
+        )
+        (folder / f"{module}.py").write_text(code, encoding="utf-8")
+    # As Snakemake evaluates it.
+    trap = f"open({str(sprung)!r}, 'a').write('profile, ')"
+    for name in ("default", "slurm"):
+        (folder / name).mkdir()
+        profile = f"executor: nowhere\ndefault-resources:\n- mem_mb={trap}\n"
+        (folder / name / "config.yaml").write_text(profile, encoding="utf-8")
+    (folder / "matplotlibrc").write_bytes(b"text.usetex: True\n# \xff\n")
+    return sprung
+
+
+def test_a_dry_run_runs_nothing_of_its_folder(begun: Path) -> None:
+    sprung = set_traps(begun)
+    done = call(begun, "pendpipe", "campaign", "-n")
+    assert not sprung.exists(), sprung.read_text()
+    assert jobs(done)["fit"] == 1
+
+
+def test_jobs_of_snakemake_run_nothing_of_their_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those that Snakemake begins by ``python -m snakemake``, whoever called it."""
+    for variable in ("PYTHONSAFEPATH", "PATH"):
+        monkeypatch.setenv(variable, "")
+    sprung = set_traps(tmp_path)
+    prepare_environment()
+    done = call(tmp_path, "calendar")
+    assert not sprung.exists()
+    assert done.returncode == 0
+
+
+def test_a_folder_that_the_user_names_is_a_profile(begun: Path) -> None:
+    """Ours goes by its name, whatever lies in the working folder."""
+    set_traps(begun)
+    done = call(begun, "pendpipe", "campaign", "-n", "--profile", "./default")
+    assert "nowhere" in done.stdout + done.stderr
+
+
 def test_a_campaign_that_was_begun_runs_to_its_report(begun: Path) -> None:
+    sprung = set_traps(begun)
     records = begun / "config/records.tsv"
     with records.open("a", encoding="utf-8") as table:
         table.write("lost\trecordings/rod-pendulun.csv\n")
@@ -65,6 +112,7 @@ def test_a_campaign_that_was_begun_runs_to_its_report(begun: Path) -> None:
     assert "fit: 1 done" in lines
     assert "1 of 3 records were refused" in lines[-1]
     assert not jobs(call(begun, "pendpipe", "campaign", "-n"))
+    assert not sprung.exists(), sprung.read_text()
     alone = call(begun, "pendpipe", "campaign", "-n", "--record", "rod", "--", "--forcerun", "fit")
     assert jobs(alone) == dict.fromkeys(RECORDS_STAGES, 1) | {"all": 1, "total": 5}
 

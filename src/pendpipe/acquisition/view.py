@@ -35,7 +35,7 @@ _SHORTEST_STRETCH_S: Final = 5.0
 def shown(raw: Path) -> Iterator[None]:
     """Show a recording that is being made; its page's address goes to standard error."""
     viewer = subprocess.Popen(
-        [sys.executable, "-m", "pendpipe.acquisition.view", str(raw)],
+        [sys.executable, "-P", "-m", "pendpipe.acquisition.view", str(raw)],
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         start_new_session=True,  # Ctrl-C is the recorder's

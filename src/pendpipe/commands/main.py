@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from typing import Any, Final, NoReturn
 
 from pendpipe.errors import NO_ROOM, InputError
-from pendpipe.process import one_thread
+from pendpipe.process import leave_the_folder_out, one_thread
 from pendpipe.version import __version__
 
 COMMANDS: Final = {
@@ -174,6 +174,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a console without Greek letters
     one_thread()
+    if argv is None:  # called by another program, what that has set stays
+        leave_the_folder_out()
     try:
         arguments = parse(sys.argv[1:] if argv is None else argv)
         status = _run(arguments)

@@ -23,7 +23,7 @@ from pendpipe.arguments import (
     print_answer,
     tell_written,
 )
-from pendpipe.errors import InputError, refuse_if
+from pendpipe.errors import refuse_if
 from pendpipe.options import ALTERNATIVES, INPUT, OUTPUT, flags, flags_of, given
 from pendpipe.project import CONFIGURATION, PROJECT, SNAKEFILE
 from pendpipe.reading import inspect as describe, read
@@ -346,7 +346,7 @@ def campaign(arguments: Arguments) -> int:
     campaign = load_campaign(_merged(given), given)
     for name in arguments.record:
         campaign.record(name)
-    command = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE)]
+    command = [sys.executable, "-P", "-m", "snakemake", "--snakefile", str(SNAKEFILE)]
     command += ["--workflow-profile", str(_profile(arguments.profile))]
     command += ["--cores", str(arguments.cores or "all")]
     command += ["--dry-run"] if arguments.dry_run else []
@@ -377,13 +377,16 @@ def _merged(given: Path) -> dict[str, Any]:
 
 
 def _profile(name: str) -> Path:
-    for folder in (Path(name), PROJECT / "profiles" / name):
-        if (folder / "config.yaml").is_file():
-            return folder
-    known = ", ".join(sorted(path.name for path in (PROJECT / "profiles").iterdir()))
-    raise InputError(
-        f"--profile {name}", "there is no such profile", f"known are {known}; or name a folder"
+    """Find a profile: ours by its name, else a folder of the user's."""
+    known = {path.name: path for path in sorted((PROJECT / "profiles").iterdir())}
+    folder = known.get(name, Path(name).absolute())
+    refuse_if(
+        not (folder / "config.yaml").is_file(),
+        f"--profile {name}",
+        "there is no such profile",
+        f"known are {', '.join(known)}; or name a folder, ./default say",
     )
+    return folder
 
 
 @command({"shell": {"choices": ("bash", "zsh", "tcsh"), "help": "the shell to print it for"}})

@@ -8,11 +8,11 @@ from typing import Any
 from pendpipe import files
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.manifest import Manifest, read_manifest, source_sha256
-from pendpipe.process import one_thread
+from pendpipe.process import leave_the_folder_out, one_thread
 
 
 def prepare_environment() -> None:
-    """Let the jobs find `pendpipe`, and leave threads to Snakemake.
+    """Let the jobs find `pendpipe`, nothing in the campaign's folder, and one thread each.
 
     The command stands beside the Python that runs Snakemake, whether its environment is
     activated or not; Snakemake runs the jobs side by side, so each keeps to one thread.
@@ -20,6 +20,7 @@ def prepare_environment() -> None:
     folder = str(Path(sys.executable).parent)
     os.environ["PATH"] = os.pathsep.join([folder, os.environ.get("PATH", "")])
     one_thread()
+    leave_the_folder_out()
 
 
 def digest(content: Any) -> str:

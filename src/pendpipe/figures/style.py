@@ -25,12 +25,17 @@ from pendpipe.files import replaced
 
 SHEET: Final = Path(__file__).with_name("pendpipe.mplstyle")
 """Sizes, letters, lines and colours of all figures."""
-_LOOK: Final = mpl.rc_params_from_file(SHEET, use_default_template=False)
+_SHEET: Final = mpl.rc_params_from_file(SHEET, use_default_template=False)
+_LOOK: Final = {
+    **{key: value for key, value in mpl.rcParamsDefault.items() if key != "backend"},
+    **_SHEET,
+}
+"""All of it: a ``matplotlibrc`` of the machine or of the folder changes no figure."""
 styled = mpl.rc_context(_LOOK)
 """Gives a drawing function the common look, and leaves matplotlib's settings as they were."""
-WIDTH_IN: Final = float(_LOOK["figure.figsize"][0])
+WIDTH_IN: Final = float(_SHEET["figure.figsize"][0])
 """One size for all: letters stay legible at a column's width and on a phone."""
-BLUE, GREEN, INK, GREY, PALE, VERMILION = _LOOK["axes.prop_cycle"].by_key()["color"][:6]
+BLUE, GREEN, INK, GREY, PALE, VERMILION = _SHEET["axes.prop_cycle"].by_key()["color"][:6]
 _FONTS: Final = ["DejaVu Sans", "Verdana", "Arial", "sans-serif"]
 """Of a saved figure: what reads it may not have the first."""
 
@@ -131,6 +136,7 @@ class Panel(NamedTuple):
 class ShownFigure(Figure):
     """A figure that shows itself: in a notebook as a picture, elsewhere in a window."""
 
+    @styled
     def _repr_png_(self) -> bytes:
         """Return the picture for a notebook."""
         out = io.BytesIO()
