@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from scipy.interpolate import make_interp_spline
 
 import pendpipe as pp
 from pendpipe.analysis.calibrate import calibrate
@@ -18,6 +20,7 @@ from pendpipe.analysis.fit.quality import TOLD_APART
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.arrays import FloatArray
 from pendpipe.cli import main
+from pendpipe.dynamics import Eq8, Release, sample, turning_points
 from pendpipe.errors import InputError
 from pendpipe.physics import Fluid, Rod, Sphere
 
@@ -126,11 +129,44 @@ def test_what_stands_in_fit_json_comes_back(b: float) -> None:
     assert again.period == fit.period
 
 
-def test_damping_time_half_life_and_decrement_are_q_in_other_words() -> None:
+def test_the_times_of_a_viscous_decay_are_those_of_its_loss() -> None:
     found = fitted(viscous(TIME)).damping()
     assert found["damping_time_s"].value == pytest.approx(1.0 / LOSS, rel=2e-3)
     assert found["half_life_s"].value == pytest.approx(math.log(2.0) / LOSS, rel=2e-3)
     assert found["logarithmic_decrement"].value == pytest.approx(LOSS * PERIOD, rel=2e-3)
+
+
+KNOWN = {
+    "drag": (Eq8(OMEGA, quadratic=0.05, restoring="sine"), 1.0),
+    "drag by v|v|": (Eq8(OMEGA, quadratic=0.05, restoring="sine", drag="speed"), 2.0),
+    "viscous": (Eq8(OMEGA, viscous=0.02, restoring="sine"), 1.5),
+    "hysteretic, Q of 15": (Eq8(OMEGA, hysteretic=0.2), 0.3),
+    "dry, Q of 20 at first": (Eq8(OMEGA, coulomb=0.045), 0.3),
+    "all": (Eq8(OMEGA, 0.02, 0.005, 0.005, 0.002, "sine"), 0.6),
+}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_the_amplitude_falls_to_a_half_and_to_1_e_when_the_fit_says(name: str) -> None:
+    """Of six known decays the turning points themselves, without noise, tell when."""
+    law, first = KNOWN[name]
+    time = np.arange(0.0, 100.0, 0.02)
+    noise = 1e-4 * np.random.default_rng(3).standard_normal(len(time))
+    fit = pp.fit(pp.Recording(time, angle_rad=sample(law, Release(-0.1, first), time) + noise))
+    found = fit.damping()
+    own = turning_points(law, Release(-0.1, first), until_s=600.0)
+    when = make_interp_spline(-np.log(np.abs(own.angle_rad)), own.time_s, k=3)
+    start = found["amplitude_rad"].value
+    for quantity, part in {"half_life_s": 0.5, "damping_time_s": math.exp(-1.0)}.items():
+        lasts = float(when(-math.log(part * start)) - when(-math.log(start)))
+        assert abs(found[quantity].value - lasts) < 3.0 * found[quantity].sd
+        assert found[quantity].sd < 0.02 * lasts
+
+
+def test_a_time_beyond_the_recording_is_called_extrapolated() -> None:
+    """Halved after 30 s, and down to 1/e after 40 s."""
+    for until, said in ((1000, "s, both extrapolated"), (1700, "s (extrapolated)"), (3100, "s")):
+        assert re.search(rf"[0-9)] {re.escape(said)}; log", str(fitted(viscous(TIME[:until]))))
 
 
 def test_what_the_clock_leaves_out_is_said_or_enters_the_error() -> None:

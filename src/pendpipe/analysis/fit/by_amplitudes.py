@@ -18,10 +18,11 @@ from pendpipe.analysis.fit.by_points import (
     fit_envelope,
     numbers_of,
 )
+from pendpipe.analysis.fit.damping import fast_beside
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness
 from pendpipe.analysis.fit.period import Period
-from pendpipe.analysis.fit.result import PARAMETERS, fast_beside, result_of
+from pendpipe.analysis.fit.result import PARAMETERS, result_of
 from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.errors import NotAnalysableError, refuse_if

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendpipe.analysis.fit.consequence import unsure
+from pendpipe.analysis.fit.damping import FALLS, is_extrapolated
 from pendpipe.analysis.fit.quality import LOSSES, Quality, period_of_frequency
 from pendpipe.analysis.torque import TOP
 from pendpipe.analysis.turning_points import BEAT
@@ -180,15 +181,20 @@ def _widened(factor: float) -> str:
 
 
 def damping(result: FitResult) -> str:
-    """Print damping time, half-life and logarithmic decrement at the largest amplitude shown."""
+    """Print the times in which the largest amplitude shown falls, and the decrement there."""
     numbers, unit = result.damping(), result.parameters["amplitude"].unit
-    tau, half, decrement = (
-        numbers[name] for name in ("damping_time_s", "half_life_s", "logarithmic_decrement")
-    )
-    where = short_size(numbers["amplitude_rad"].value, unit)
-    said = f"to 1/e in {_number(tau)} s, to 1/2 in {_number(half)} s"
+    first = numbers["amplitude_rad"].value
+    falls, beyond = [], [is_extrapolated(result, part * first) for part in FALLS.values()]
+    for name, to in (("half_life_s", "1/2"), ("damping_time_s", "1/e")):
+        time_s = numbers[name]
+        falls.append(
+            f"to {to} in {_number(time_s)} s" if math.isfinite(time_s.value) else f"never to {to}"
+        )
+    told = ", both extrapolated" if all(beyond) else " (extrapolated)" if any(beyond) else ""
+    decrement = numbers["logarithmic_decrement"]
     swing = math.isfinite(decrement.value)
-    return f"{said}{f', decrement {_number(decrement)} a swing' if swing else ''}, at {where}"
+    per = f"; log. decrement {_number(decrement)} per period" if swing else ""
+    return f"from {short_size(first, unit)} {', '.join(falls)}{told}{per}"
 
 
 def energy(result: FitResult) -> str:
@@ -250,7 +256,8 @@ def sentence(result: FitResult) -> str:
     if known:
         q = known[0]
         timeless = math.isnan(q.period_s)
-        number, name = (q.half_life_s, "half-life") if timeless else (q.quality_factor, "Q")
+        half = result.damping()["half_life_s"] if timeless else q.quality_factor
+        number, name = (half, "half-life") if timeless else (half, "Q")
         said.append(f"{name} = {number} at {compact(q.amplitude_rad, unit)}")
         if "losses" in result.quotable and (loss := q.dominant):
             share = 100.0 * q.losses[loss].value

@@ -62,11 +62,6 @@ class Quality:
         return _times(self.damping_time_s, math.pi / self.period_s, "")
 
     @property
-    def half_life_s(self) -> Estimate:
-        """Time in which the amplitude would fall to a half at this loss, s: ``ln 2 tau``."""
-        return _times(self.damping_time_s, math.log(2.0), "s")
-
-    @property
     def dominant(self) -> str | None:
         """The loss that takes most, ``"a"``, ``"b"`` or ``"c"``; None where it is not told."""
         if not self.losses or not all(each.sd < TOLD_APART for each in self.losses.values()):
@@ -218,26 +213,6 @@ def period_of(result: FitResult, amplitude: float) -> float:
     except ValueError:
         return 1.0 / result.value("frequency")
     return float(cycle.time_s[2])
-
-
-def damping_of(result: FitResult) -> dict[str, Estimate]:
-    """Return other measures of the loss at the largest amplitude of `qualities`.
-
-    ``damping_time_s``, 1 over the loss: the amplitude falls to 1/e in it; ``half_life_s``, ln 2
-    times that; ``logarithmic_decrement``, pi/Q, of a period. All at ``amplitude_rad``, where the
-    loss depends on it.
-    """
-    found = result.quality_factors
-    if not found:
-        return {}
-    large, tau = found[0], found[0].damping_time_s
-    decrement = large.period_s / tau.value
-    return {
-        "amplitude_rad": Estimate(large.amplitude_rad, 0.0, result.parameters["amplitude"].unit),
-        "damping_time_s": tau,
-        "half_life_s": large.half_life_s,
-        "logarithmic_decrement": Estimate(decrement, decrement * tau.sd / tau.value, ""),
-    }
 
 
 def _times(estimate: Estimate, factor: float, unit: str) -> Estimate:

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 
 from pendpipe.analysis.fit.consequence import Widening, judged, scaled
+from pendpipe.analysis.fit.damping import damping_of, fast_beside
 from pendpipe.analysis.fit.decrement import Check, Light, check_decrement
 from pendpipe.analysis.fit.goodness import LEVEL, Goodness, combined
 from pendpipe.analysis.fit.least_squares import CHI2_95
 from pendpipe.analysis.fit.printed import html, lines
 from pendpipe.analysis.fit.quality import (
-    damping_of,
     qualities,
     quality_at,
     released_quality,
@@ -70,11 +70,6 @@ def units(unit: str) -> dict[str, str]:
         "phase": "rad",
         "offset": unit,
     }
-
-
-def fast_beside(a: float, b: float, c: float, amplitude: float) -> float:
-    """Return an angular frequency to which Eq. 13 holds, where amplitudes show none."""
-    return 1e4 * max(a * amplitude + b + c / amplitude, 1e-300)
 
 
 def drawer_of(drawn_by: Callable[[], Any] | None) -> Any:
