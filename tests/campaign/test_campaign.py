@@ -9,6 +9,7 @@ from pendpipe import physics
 from pendpipe.campaign.design import height_sd, terms_of
 from pendpipe.campaign.diagnose import (
     campaign_diagnosis,
+    farthest,
     global_p_value,
     held_out,
     local_scores,
@@ -218,6 +219,27 @@ def test_a_record_with_too_large_a_loss_is_pulled_up(sigmas: float) -> None:
     assert int(np.argmax(np.abs(pulls))) == number
     assert pulls[number] * sigmas > 0.0
     assert abs(pulls[number]) > 2.0
+
+
+def test_no_record_is_farther_than_chi2_falls_without_it() -> None:
+    """Half more loss in water drives the fit to the balance of water-low-1, which is no worse."""
+    found = data(DESIGN, seed=1)
+    values = found.values.copy()
+    values[DESIGN.wet > 0.0, 1] *= 1.5
+    stuck = found._replace(values=values)
+    fit = joint_fit(DESIGN, stuck)
+    _, pulls = held_out(fit)
+    assert np.all(pulls**2 < fit.chi2)
+    assert farthest(fit) is None
+
+
+def test_a_size_on_its_bound_follows_no_record() -> None:
+    """Less loss than the bearing can have lost pulls no record by what grease would need."""
+    found = data(DESIGN, named("uniform-drag-excess"), (-0.1,), seed=1)
+    grease, none = (joint_fit(DESIGN, found, named(*added)) for added in (("grease-drag",), ()))
+    assert not grease.free[-1]
+    for with_it, without_it in zip(held_out(grease), held_out(none), strict=True):
+        assert with_it == pytest.approx(without_it, abs=1e-4)
 
 
 def test_a_class_of_two_is_told_apart_by_another_fluid_and_not_by_repeats() -> None:

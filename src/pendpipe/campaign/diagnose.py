@@ -174,13 +174,13 @@ def search(
     whole = answer = _search(base or joint_fit(design, data), level)
     left_out: list[Far] = []
     while answer.missing and len(answer.baseline.design.runs) > MOST_LEFT_OUT:
-        suspect = _farthest(answer.improved) or _farthest(answer.baseline)
+        unexplained = farthest(answer.improved)
+        suspect = unexplained or farthest(answer.baseline)
         if suspect is None:
             break
-        keep = np.array([run.record != suspect.record for run in answer.baseline.design.runs])
-        fewer = joint_fit(*only(answer.baseline.design, answer.baseline.data, keep))
+        fewer = _without(answer.baseline, suspect.record)
         better = answer.improved.chi2 - fewer.chi2
-        if _farthest(answer.improved) is None and better < CLASS_CHI2:
+        if unexplained is None and better < CLASS_CHI2:
             answer = replace(answer, suspect=suspect if better > -CLASS_CHI2 else None)
             break
         if len(left_out) == MOST_LEFT_OUT:
@@ -194,12 +194,32 @@ def search(
     )
 
 
-def _farthest(fit: JointFit) -> Far | None:
-    """The record that differs most from what all others predict, if it is far."""
+def farthest(fit: JointFit) -> Far | None:
+    """The record that differs most from what all others predict, if it is far.
+
+    The model without it is fitted, so that by its sigma chi^2 does fall: the linear model of
+    `held_out` says the same but where a pendulum is near its balance.
+    """
     _, pulls = held_out(fit)
-    number = int(np.argmax(np.abs(pulls)))
-    far = Far(fit.design.runs[number].record, float(pulls[number]))
-    return far if abs(far.sigma) > FAR_SIGMA else None
+    for number in np.argsort(-np.abs(pulls)):
+        if abs(pulls[number]) <= FAR_SIGMA:
+            break
+        record = fit.design.runs[number].record
+        sigma = float(_sigma(fit.chi2 - _without(fit, record, fit.added).chi2))
+        if sigma > FAR_SIGMA:
+            return Far(record, math.copysign(sigma, pulls[number]))
+    return None
+
+
+def _without(fit: JointFit, record: str, added: Sequence[Candidate] = ()) -> JointFit:
+    """The model fitted to all records but one."""
+    keep = np.array([run.record != record for run in fit.design.runs])
+    return joint_fit(*only(fit.design, fit.data, keep), added)
+
+
+def _sigma(fall: FloatArray | float) -> FloatArray:
+    """The sigma of a fall of chi^2 by frequency and b, two degrees of freedom."""
+    return np.asarray(-ndtri_exp(-0.5 * np.maximum(fall, 0.0) - math.log(2.0)))
 
 
 def _search(baseline: JointFit, level: float) -> CampaignSearch:
@@ -277,19 +297,26 @@ def held_out(fit: JointFit) -> tuple[FloatArray, FloatArray]:
     A pull is the sigma of frequency and b together, with the sign of b's excess.
 
     For a model that is linear about its optimum the fit without a record follows from the fit
-    with it: of whitened residuals r_i with hat matrix H_i, the prediction's are
-    ``(1 - H_i)^-1 r_i`` with covariance ``(1 - H_i)^-1``.
+    with it. Let the orthonormal columns of N span the residuals that no free unknown can follow,
+    and ``z = N^T r`` be the part of the whitened residuals r that lies there. With the record's
+    rows ``N_i = U S V^T`` the prediction has the covariance ``(U S^2 U^T)^-1``, and without the
+    record chi^2 falls by ``|V^T z|^2``, which is the square that the pull is made of: no rounding
+    and no unfinished fit makes it larger than chi^2.
     """
     whitening = fit.data.whitening
     records, rows, _ = whitening.shape
-    off = fit.residuals[: records * rows].reshape(records, rows)
-    root = (fit.jacobian[: records * rows] @ fit.root).reshape(records, rows, -1)
-    left = (1.0 + 1e-12) * np.eye(rows) - root @ root.mT
-    size = np.einsum("ri,ri->r", off, np.linalg.solve(left, off[..., None])[..., 0])
-    volume = np.linalg.slogdet(left)[1] + np.linalg.slogdet(whitening @ whitening.mT)[1]
-    densities = 0.5 * (volume - size - rows * math.log(2.0 * math.pi))
-    sigma = -ndtri_exp(-0.5 * size - math.log(2.0))  # of chi^2 with two degrees of freedom
-    return densities, -np.copysign(sigma, off[:, -1])
+    basis, sizes, _ = np.linalg.svd(fit.jacobian[:, fit.free])
+    rounding = np.finfo(np.float64).eps * float(sizes.max())
+    unfollowed = basis[:, np.count_nonzero(sizes > rounding) :]
+    own = unfollowed[: records * rows].reshape(records, rows, -1)
+    rest = unfollowed.T @ fit.residuals
+    _, left, directions = np.linalg.svd(own, full_matrices=False)
+    predicted = left > rounding  # nothing is said of what no other record knows
+    fall = np.sum((predicted * (directions @ rest)) ** 2, axis=-1)
+    volume = 2.0 * np.sum(np.log(left, where=predicted, out=np.zeros_like(left)), axis=-1)
+    volume += np.linalg.slogdet(whitening @ whitening.mT)[1]
+    densities = 0.5 * (volume - fall - rows * math.log(2.0 * math.pi))
+    return densities, -np.copysign(_sigma(fall), (own @ rest)[:, -1])
 
 
 _CLAMPED_ANEW_M: Final = 1e-9

@@ -131,6 +131,12 @@ class JointFit:
         """Data less what is free: a prior weighs as much as its unknown."""
         return len(self.residuals) - len(self.unknowns)
 
+    @property
+    def free(self) -> BoolArray:
+        """Which unknowns are fitted, shape (unknowns,): all but the sizes on their bounds."""
+        low, high = _limits(self.design, self.added)
+        return np.asarray((self.unknowns > low) & (self.unknowns < high))
+
     @cached_property
     def root(self) -> FloatArray:
         """A square root of the covariance, from the Jacobian itself: no variance is negative."""
@@ -210,7 +216,7 @@ def joint_fit(
     first = np.zeros(count + len(added))
     if start is not None:
         first[: len(start)] = start[: len(first)]
-    low, high = np.array([(-np.inf, np.inf)] * count + [one.bounds for one in added]).T
+    low, high = _limits(design, added)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         free = np.ones(len(first), dtype=np.bool_)
         for weight in _APPROACH if start is None else ():
@@ -223,6 +229,13 @@ def joint_fit(
         at = np.clip(at, low, high)
         rows = _residuals(design, data, added, at), _derivatives(design, data, added, at)
     return JointFit(design, data, added, at, *rows)
+
+
+def _limits(design: Design, added: Sequence[Candidate]) -> tuple[FloatArray, FloatArray]:
+    """Least and largest values of the unknowns, of which the effects' sizes alone are bound."""
+    nuisances = [(-np.inf, np.inf)] * len(design.nuisances)
+    low, high = np.array([*nuisances, *(one.bounds for one in added)]).T
+    return low, high
 
 
 def chi2_near(
