@@ -17,7 +17,7 @@ GROUPS = {
     "speed": ("speed",),
     "judge": (
         *("consistency", "null_families --number 15", "known_physics", "campaign_challenge"),
-        *("apparatus", "acquisition faults"),
+        *("apparatus", "numbers", "acquisition faults"),
     ),
     "robustness": ("acquisition flips", "kills", "hostile", "fuzz"),
 }

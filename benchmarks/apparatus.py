@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import tempfile
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from statistics import median
 from typing import Any, Final
@@ -27,6 +28,8 @@ from pendpipe_challenge.score import Solved, asked, read_item, table
 
 PARTS: Final = {"null": 0.2, "single": 0.45, "combination": 0.15, "outside": 0.2}
 """Of a set, by what is hidden in an item beside sin x."""
+SHARES: Final = {"encoder": 1 / 3, "camera": 1 / 3, "converter": 0.23, "wheel": 0.31 / 3}
+"""Of a set, by the apparatus."""
 EVIDENCE: Final = (100.0, 1e5)
 NOISES: Final = ("white", "memory", "red", "changing", "heavy-tails", "smoothed")
 """Families of `benchmarks.null_families` that some nulls have."""
@@ -34,15 +37,18 @@ KEPT: Final = ("id", "presumed", "probability", "indistinguishable_from")
 """Of each effect of a diagnosis."""
 
 
-def draw(name: str, number: int) -> Item:
+def draw(
+    name: str,
+    number: int,
+    parts: Mapping[str, float] = PARTS,
+    shares: Mapping[str, float] = SHARES,
+) -> Item:
     """The item of a set and a number, always the same."""
     rng = np.random.default_rng([crc32(name.encode()), number])
     # The parts stand evenly over the numbers; all the rest is drawn.
     place = (number * 0.6180339887498949) % 1.0
-    family = list(PARTS)[int(np.searchsorted(np.cumsum(list(PARTS.values())), place, "right"))]
-    apparatus = str(
-        rng.choice(["encoder", "camera", "converter", "wheel"], p=[1 / 3, 1 / 3, 0.23, 0.31 / 3])
-    )
+    family = list(parts)[int(np.searchsorted(np.cumsum(list(parts.values())), place, "right"))]
+    apparatus = str(rng.choice(list(shares), p=list(shares.values())))
     recipe = {"family": family, "apparatus": apparatus, "least": EVIDENCE[0]}
     recipe["delta_chi2"] = [log_uniform(rng, *EVIDENCE) for _ in range(2)]
     if family != "null" or apparatus == "encoder" or rng.uniform() < 0.3:

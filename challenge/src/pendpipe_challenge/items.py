@@ -193,11 +193,14 @@ class Item:
     truth
         ``family``, ``apparatus``, ``baseline``, ``effects``, ``present`` and ``allowed`` (names
         that are true whatever was hidden), ``nuisances``, ``oracle`` (None where it was not asked).
+    bench
+        Where it was recorded.
     """
 
     columns: dict[str, Array]
     header: dict[str, str]
     truth: dict[str, Any]
+    bench: Bench | None = None
 
     @property
     def text(self) -> str:
@@ -287,7 +290,7 @@ def _try(recipe: Recipe, rng: Rng, ease: float, noise: Noise | None) -> Item | N
     if noise is not None:
         truth["allowed"] = sorted({*truth["allowed"], "coloured-noise"})
     if not laboratory:
-        return Item(columns, {}, truth)
+        return Item(columns, {}, truth, bench)
     if left:
         truth["effects"][0] |= left
     if not any(law.chance for law in laws):
@@ -295,7 +298,7 @@ def _try(recipe: Recipe, rng: Rng, ease: float, noise: Noise | None) -> Item | N
     full = scene.step * VOLTS_PER_RADIAN * 2.0 ** (scene.bits - 1)
     stated = {"volts_per_radian": VOLTS_PER_RADIAN, "bits": scene.bits, "range_volts": full}
     volts = {"time_s": columns["time_s"], "volts": VOLTS_PER_RADIAN * columns["angle_rad"]}
-    return Item(volts, {key: f"{value:.9g}" for key, value in stated.items()}, truth)
+    return Item(volts, {key: f"{value:.9g}" for key, value in stated.items()}, truth, bench)
 
 
 def _hide(

@@ -274,6 +274,14 @@ class Bench:
     scene, causes
         The truth.
 
+    Attributes
+    ----------
+    changes
+        What each parameter of the baseline is varied by.
+    tangent
+        What these and then each cause's size, by its own, change of the readings, (readings,
+        parameters); an offset of the reading and of the times go before.
+
     Raises
     ------
     FloatingPointError
@@ -291,8 +299,11 @@ class Bench:
             "coulomb": 0.005 * loss * scene.fastest,
         }
         names = list(steps)[: 4 if scene.baseline == "eq8" else 2]
-        changes = [lambda world, name=name: world.add(name, steps[name]) for name in names]
-        moved = [scene.reading(causes, each)[0] - self.there for each in (*changes, self._higher)]
+        self.changes: list[Callable[[World], None]] = [
+            *(lambda world, name=name: world.add(name, steps[name]) for name in names),  # type: ignore[misc]
+            self._higher,
+        ]
+        moved = [scene.reading(causes, each)[0] - self.there for each in self.changes]
         columns = [np.ones_like(self.there), self.seen.v, *moved]
         tangent = scene.whitened(np.column_stack(columns), self.seen.v)
         norms = np.linalg.norm(tangent, axis=0)
@@ -300,11 +311,20 @@ class Bench:
             raise FloatingPointError("the motion runs away, or there is none")
         u, sizes, _ = np.linalg.svd(tangent / norms, full_matrices=False)
         self.basis = u[:, sizes > 1e-7 * sizes[0]]
-        shares = []
-        for number, cause in enumerate(causes):
-            less = cause._replace(size=(1 - SHARE) * cause.size)
-            shares.append(self.change([*causes[:number], less, *causes[number + 1 :]]) / -SHARE)
-        self.columns = np.column_stack(shares) if shares else np.empty((len(self.there), 0))
+        shares = [
+            scene.whitened(
+                (scene.reading(self.less(number))[0] - self.there)[:, None] / -SHARE, self.seen.v
+            )
+            for number in range(len(causes))
+        ]
+        self.tangent = np.hstack([tangent, *shares])
+        self.columns = self.off(self.tangent[:, tangent.shape[1] :])
+
+    def less(self, number: int) -> list[Cause]:
+        """The causes, one of them smaller by `SHARE`."""
+        causes = list(self.causes)
+        causes[number] = causes[number]._replace(size=(1 - SHARE) * causes[number].size)
+        return causes
 
     def _higher(self, world: World) -> None:
         """Release the pendulum a little higher."""
