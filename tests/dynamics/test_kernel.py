@@ -13,7 +13,7 @@ import pytest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, machine_code
-from pendpipe.dynamics.kernel import Kernel, Matrix, folders, kernel, shipped
+from pendpipe.dynamics.kernel import Kernel, Matrix, _tell, folders, kernel, shipped
 from pendpipe.dynamics.layout import (
     HEAD,
     MOST_PANELS,
@@ -154,6 +154,62 @@ def test_damaged_code_is_compiled_anew(tmp_path: Path, monkeypatch: pytest.Monke
     assert machine_code.load(path) is None
     assert anew(fill)(np.arange(4.0), np.zeros((3, 4)), 0.0, 0) == 4
     assert machine_code.load(path) is not None
+
+
+def given_away(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a file or folder belong to another user."""
+    if os.geteuid() == 0:
+        os.chown(path, 12345, -1)
+    else:
+        monkeypatch.setattr(os, "geteuid", lambda: 12345)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the mode of a file tells nothing there")
+@pytest.mark.parametrize("upwards", [0, 1, 2], ids=["file", "folder", "a folder above"])
+@pytest.mark.parametrize("mode", [0o777, 0o1777, 0o770, None], ids=str)
+def test_code_that_others_can_write_is_not_run(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    upwards: int,
+    mode: int | None,
+) -> None:
+    """Its digest stands in the same file. Nobody replaces a folder of ours in one like ``/tmp``."""
+    folder = tmp_path / "above/code"
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
+    monkeypatch.setattr("pendpipe.dynamics.kernel.SHIPPED", tmp_path)
+    assert callable(anew(fill).machine_code)
+    path = folder / fill.file_name()
+    place = (path, *path.parents)[upwards]
+    if mode is None:
+        given_away(place, monkeypatch)
+    else:
+        place.chmod(mode)
+        os.chown(place, -1, os.getgid() if os.getgid() else 12345)
+    sound = machine_code.load
+    loaded: list[Path] = []
+    monkeypatch.setattr(machine_code, "load", lambda path: loaded.append(path) or sound(path))
+    _tell.cache_clear()
+    assert anew(fill)(np.arange(4.0), np.zeros((3, 4)), 0.0, 0) == 4
+    said = capsys.readouterr().err
+    if mode == 0o1777 and upwards == 2:
+        assert (path in loaded, said) == (True, "")
+    else:
+        assert path not in loaded
+        assert said.count("\n") == 1
+        assert f"compiled anew: {place} " in said
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the mode of a file tells nothing there")
+def test_a_group_that_is_its_owners_alone_is_no_other(tmp_path: Path) -> None:
+    """Where each user has a group of the same name, files can be written by it by default."""
+    import grp
+    import pwd
+
+    owner, own = pwd.getpwuid(os.geteuid()), grp.getgrgid(os.getegid())
+    tmp_path.chmod(0o770)
+    alone = own.gr_name == owner.pw_name and not {*own.gr_mem} - {owner.pw_name}
+    assert (machine_code.distrusted(tmp_path / "code") == "") == alone
 
 
 def test_shipped_code_runs_on_processors_that_can_and_is_left_alone_by_others(

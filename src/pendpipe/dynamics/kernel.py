@@ -136,7 +136,8 @@ class Kernel:
 
         words = [word for kind in self.kinds for word in kind.words]
         name = self.file_name()
-        for path in (*(folder / name for folder in folders()), *shipped(name).values()):
+        # What is shipped lies among our sources: who can write the one can write the other.
+        for path in (*_trusted(name, there=True), *shipped(name).values()):
             loaded = machine_code.load(path)
             if loaded is not None:
                 break
@@ -153,17 +154,17 @@ class Kernel:
             print(f"compiling, once: {self.__name__} (march: half a minute)", file=sys.stderr)
         library, entry = numba_side.compiled(self)
         own = library.get_pointer_to_function(entry), library
-        for folder in folders():
+        for path in _trusted(name):
             try:
-                machine_code.keep(folder / name, library.get_llvm_str(), entry)
+                machine_code.keep(path, library.get_llvm_str(), entry)
             except OSError:
                 continue
-            for old in folder.glob(f"{self.__name__}-*.bin"):
+            for old in path.parent.glob(f"{self.__name__}-*.bin"):
                 if old.name != name:
                     # The code of other sources.
                     old.unlink(missing_ok=True)
             # What is kept runs now as later: that which Numba made rounds otherwise.
-            return machine_code.load(folder / name) or own
+            return machine_code.load(path) or own
         return own
 
     def ship(self) -> None:
@@ -233,6 +234,26 @@ def folders() -> Iterator[Path]:
             Path(os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME") or home)
             / "pendpipe"
         )
+
+
+def _trusted(name: str, *, there: bool = False) -> Iterator[Path]:
+    """Yield where code of a name may be kept, or is: nobody else can write it there."""
+    from pendpipe.dynamics import machine_code
+
+    for path in (folder / name for folder in folders()):
+        if there and not os.path.lexists(path):
+            continue
+        if why := machine_code.distrusted(path):
+            _tell(why)
+        else:
+            yield path
+
+
+@functools.cache
+def _tell(why: str) -> None:
+    """Say once why code is compiled anew."""
+    remedy = "take that right from them (chmod go-w), or set NUMBA_CACHE_DIR to a folder of yours"
+    print(f"pendpipe: machine code is compiled anew: {why}; {remedy}", file=sys.stderr)
 
 
 def _digest(text: bytes) -> str:

@@ -5,6 +5,7 @@ import ctypes
 import hashlib
 import json
 import os
+import stat
 from pathlib import Path
 from typing import Any
 
@@ -65,10 +66,48 @@ def keep(path: Path, assembly: str, name: str, processor: str = "") -> None:
         "triple": llvm.get_default_triple(),
         "features": processors().get(processor, ()),
     }
-    path.parent.mkdir(parents=True, exist_ok=True)
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     part = path.with_name(f"{path.name}.{os.getpid()}")
     part.write_bytes(json.dumps(head).encode() + b"\n" + code)
     part.replace(path)
+
+
+def distrusted(path: Path) -> str:
+    """Say why code in a file may not be ours: who can write it runs what he likes in our name.
+
+    File, folder and the folders above must belong to the user or to root, and nobody else may
+    write them. A folder above may be sticky, as ``/tmp`` is: there nobody moves what is others'.
+    What is not there is trusted; on Windows, where the mode tells nothing, everything.
+    """
+    folder = path.parent.resolve()
+    for place in (folder / path.name, folder, *folder.parents) if os.name != "nt" else ():
+        try:
+            status = place.lstat()
+        except OSError:
+            continue
+        sticky = place in folder.parents and status.st_mode & stat.S_ISVTX
+        for wrong, why in (
+            (place.name == path.name and not stat.S_ISREG(status.st_mode), "is no plain file"),
+            (status.st_uid not in (0, os.geteuid()), "belongs to another user"),
+            (_others_write(status) and not sticky, "can be written by others"),
+        ):
+            if wrong:
+                return f"{place} {why}"
+    return ""
+
+
+def _others_write(status: os.stat_result) -> bool:
+    """Whether its group or all may write; a group that has its owner's name is his alone."""
+    if not status.st_mode & stat.S_IWGRP or status.st_mode & stat.S_IWOTH:
+        return bool(status.st_mode & stat.S_IWOTH)
+    import grp
+    import pwd
+
+    try:
+        owner, group = pwd.getpwuid(status.st_uid).pw_name, grp.getgrgid(status.st_gid)
+    except KeyError:
+        return True
+    return group.gr_name != owner or not {*group.gr_mem} <= {owner}
 
 
 def load(path: Path) -> tuple[int, Any] | None:

@@ -26,10 +26,9 @@ from pendpipe.files import replaced
 SHEET: Final = Path(__file__).with_name("pendpipe.mplstyle")
 """Sizes, letters, lines and colours of all figures."""
 _SHEET: Final = mpl.rc_params_from_file(SHEET, use_default_template=False)
-_LOOK: Final = {
-    **{key: value for key, value in mpl.rcParamsDefault.items() if key != "backend"},
-    **_SHEET,
-}
+_LOOK: Final[dict[Any, Any]] = {
+    key: value for key, value in mpl.rcParamsDefault.items() if key != "backend"
+} | dict(_SHEET)
 """All of it: a ``matplotlibrc`` of the machine or of the folder changes no figure."""
 styled = mpl.rc_context(_LOOK)
 """Gives a drawing function the common look, and leaves matplotlib's settings as they were."""
