@@ -15,7 +15,9 @@ from scipy.interpolate import make_interp_spline
 import pendpipe as pp
 from pendpipe.analysis.calibrate import calibrate
 from pendpipe.analysis.compare import theory_curve
+from pendpipe.analysis.fit import result
 from pendpipe.analysis.fit.consequence import unsure
+from pendpipe.analysis.fit.decrement import Check
 from pendpipe.analysis.fit.quality import TOLD_APART
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.arrays import FloatArray
@@ -101,6 +103,23 @@ def test_a_loss_is_doubted_only_where_more_than_noise_is_left(
     assert not unseen
 
 
+def test_white_readings_overrule_turning_points_that_contradict_and_say_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What the turning points show stays what it was, error and all."""
+    wrong = Check(0.2, LOSS, 0.8 * LOSS, 0.01 * LOSS), Check(0.1, LOSS, LOSS, 0.01 * LOSS)
+    monkeypatch.setattr(result, "check_decrement", lambda *_: wrong)
+    fit = fitted(viscous(TIME))
+    first, second = fit.decrement_check
+    assert first._replace(overruled="") == wrong[0]
+    assert second == wrong[1]
+    assert "leave only noise" in first.overruled
+    assert first.p_value < 1e-12
+    assert not any((fit.refuted, first.contradicts, first.confirms))
+    assert any("overruled" in said for said in fit.warnings)
+    assert fit.to_dict()["decrement_check"][0]["overruled"] == first.overruled
+
+
 def test_small_and_noisy_swings_of_the_law_itself_are_green() -> None:
     """Sixteen decays whose turning points show Q to 3 to 10 %: chance lights nothing."""
     lights = []
@@ -129,7 +148,7 @@ def test_what_stands_in_fit_json_comes_back(b: float) -> None:
     assert again.period == fit.period
 
 
-def test_the_times_of_a_viscous_decay_are_those_of_its_loss() -> None:
+def test_the_times_of_a_sharedecay_are_those_of_its_loss() -> None:
     found = fitted(viscous(TIME)).damping()
     assert found["damping_time_s"].value == pytest.approx(1.0 / LOSS, rel=2e-3)
     assert found["half_life_s"].value == pytest.approx(math.log(2.0) / LOSS, rel=2e-3)
@@ -220,6 +239,25 @@ def test_six_swings_tell_the_loss_but_not_which() -> None:
         assert abs(each.quality_factor.value - 100.0) < 4.0 * each.quality_factor.sd
         assert max(share.sd for share in each.losses.values()) > TOLD_APART
         assert each.dominant is None
+
+
+@pytest.mark.parametrize("part", [0.04, 0.4])
+def test_a_share_has_its_error_or_its_limit(part: float) -> None:
+    """Viscous loss beside dry friction: however small it is, what is seen is not called unseen."""
+    law = Eq8(OMEGA, viscous=0.03 * part, coulomb=0.2 * 0.03 * (1.0 - part))
+    time = np.arange(0.0, 45.0, 0.02)
+    noise = 1e-4 * np.random.default_rng(3).standard_normal(len(time))
+    fit = pp.fit(pp.Recording(time, displacement_m=sample(law, Release(-0.1, 0.3), time) + noise))
+    large, printed = fit.quality_factors[0], str(fit)
+    share = large.losses["b"]
+    assert share.value > 2.0 * share.sd
+    true = law.viscous / (law.viscous + law.coulomb / large.amplitude_rad)
+    assert share.bounds95[0] <= true <= share.bounds95[1]
+    assert re.search(r"[0-9.]+\([0-9.]+\) % viscous or internal \(b\)", printed)
+    assert re.search(r"drag ~ speed² \(a\) < [0-9.]+ %", printed)
+    assert large.losses["a"].bounds95[0] <= 0.0 < large.losses["a"].bounds95[1] < 0.1
+    entry = fit.to_dict()["quality_factors"][0]
+    assert entry["losses_interval95"]["b"] == list(share.bounds95)
 
 
 def test_q_and_the_period_are_data() -> None:

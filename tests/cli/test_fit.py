@@ -60,7 +60,7 @@ def test_several_recordings_make_one_table_and_a_bad_one_stops_nothing(
     assert ") s " in rows[1]
     assert "rad⁻¹ s⁻¹" in rows[1]
     assert "4.21°" in rows[1]
-    assert "62 % viscous" in rows[1]
+    assert "61.8(3.2) % viscous" in rows[1]
     assert rows[-1] == "2 fitted, 0 red, 1 refused"
     assert "mean" not in captured.out, "1.15 and 2.01 s: of two values none is the class's"
     assert str(bad) in captured.err

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from pendpipe.analysis.fit.printed import SHORT, short_size
+from pendpipe.analysis.fit.printed import SHORT, percent, short_size
 from pendpipe.errors import refuse_if
 from pendpipe.estimate import Estimate, chi_square_p_value
 from pendpipe.files import MADE_BY, is_stream, write_json, write_whole
@@ -206,7 +206,7 @@ def _row(fitted: Fitted, *, wide: bool) -> tuple[str, ...]:
         if large
         else "",
         short_size(large.amplitude_rad, unit) if large else "",
-        f"{100.0 * large.losses[loss].value:.0f} % {SHORT[loss]}" if large and loss else "",
+        f"{percent(large.losses[loss])} {SHORT[loss]}" if large and loss else "",
         *rates,
         remark if len(remark) <= _REMARK else f"{remark[: _REMARK - 1]}…",
     )

@@ -52,6 +52,8 @@ class Check(NamedTuple):
     seen_sd: float
     scatter: float = 1.0
     """Variance of the turning points about a smooth decay, or a steady period, over their own."""
+    overruled: str = ""
+    """Why a contradiction is no reason to doubt the law, where there is one."""
 
     @property
     def excess(self) -> float:
@@ -65,8 +67,8 @@ class Check(NamedTuple):
 
     @property
     def contradicts(self) -> bool:
-        """Whether they differ by more than 5 % and by more than chance explains."""
-        return self.misses(_CERTAIN)
+        """Whether they differ by more than 5 % and by more than chance explains, and it counts."""
+        return not self.overruled and self.misses(_CERTAIN)
 
     @property
     def p_value(self) -> float:
@@ -79,7 +81,7 @@ class Check(NamedTuple):
     @property
     def confirms(self) -> bool:
         """Whether they agree, and so closely that this says something."""
-        return not self.contradicts and self.seen_sd <= _CONFIRMED * abs(self.seen)
+        return not self.misses(_CERTAIN) and self.seen_sd <= _CONFIRMED * abs(self.seen)
 
     def sentence(self, unit: str) -> str:
         """Say it in a clause."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from pendpipe.analysis.fit.consequence import unsure
 from pendpipe.analysis.fit.damping import FALLS, is_extrapolated
-from pendpipe.analysis.fit.quality import LOSSES, Quality, period_of_frequency
+from pendpipe.analysis.fit.quality import LOSSES, SEEN, Quality, period_of_frequency
 from pendpipe.analysis.torque import TOP
 from pendpipe.analysis.turning_points import BEAT
 from pendpipe.dynamics import Eq8, Release, turning_points
@@ -33,8 +33,6 @@ SHORT: Final = {"a": "drag ~ speed²", "b": "viscous or internal", "c": "dry fri
 _CLOCK: Final = 50e-6
 """By what part a laboratory's clock may well be off."""
 _TIMELESS: Final = "not shown by amplitudes: give --period or --frequency, which also gives Q"
-_SLIGHT: Final = 0.05
-"""Share of a loss below which it is not named."""
 _DIAGNOSE: Final = "pendpipe diagnose FILE says what the law lacks"
 
 
@@ -198,20 +196,30 @@ def damping(result: FitResult) -> str:
 
 
 def energy(result: FitResult) -> str:
-    """Say where the energy goes at the largest amplitude shown, as far as the fit tells."""
+    """Say where the energy goes at the largest amplitude shown, as far as the fit tells.
+
+    A loss whose share is not two standard deviations from nothing has its upper limit (95 %).
+    """
     large = result.quality_factors[0]
     where = short_size(large.amplitude_rad, result.parameters["amplitude"].unit)
     if large.dominant is None:
         return f"the decay does not separate drag, viscous loss and dry friction (at {where})"
-    ordered = sorted(large.losses.items(), key=lambda pair: -pair[1].value)
-    named = [
-        f"{100.0 * share.value:.0f} % {SHORT[name]} ({name})"
-        for name, share in ordered
-        if share.value >= _SLIGHT
-    ]
-    absent = [SHORT[name] for name, share in ordered if share.value < _SLIGHT]
-    none = f"; no {' or '.join(absent)} seen" if absent else ""
-    return f"{', '.join(named)}, at {where}{none}"
+    seen, limits = [], []
+    for name, share in sorted(large.losses.items(), key=lambda pair: -pair[1].value):
+        if share.value > SEEN * share.sd and not share.at_bound:
+            seen.append(f"{percent(share)} {SHORT[name]} ({name})")
+        else:
+            limits.append(f"{SHORT[name]} ({name}) < {100.0 * share.bounds95[1]:.2g} %")
+    return f"{', '.join([*seen, *limits])}, at {where}"
+
+
+def percent(share: Estimate) -> str:
+    """Print a share with its error.
+
+    >>> percent(Estimate(0.6217, 0.0334, ""))
+    '62.2(3.3) %'
+    """
+    return f"{with_error(100.0 * share.value, 100.0 * share.sd, short=True)} %"
 
 
 def _law(result: FitResult) -> str:
@@ -260,8 +268,7 @@ def sentence(result: FitResult) -> str:
         number, name = (half, "half-life") if timeless else (half, "Q")
         said.append(f"{name} = {number} at {compact(q.amplitude_rad, unit)}")
         if "losses" in result.quotable and (loss := q.dominant):
-            share = 100.0 * q.losses[loss].value
-            said.append(f"{share:.0f} % of the loss there is {LOSSES[loss]}")
+            said.append(f"{percent(q.losses[loss])} of the loss there is {LOSSES[loss]}")
     if not said:
         return "nothing of this fit can be quoted."
     of = "amplitudes" if result.method == "amplitudes" else "turning points"
@@ -359,4 +366,4 @@ def cause(quality: Quality) -> str:
         return WITHOUT_LAW
     if (name := quality.dominant) is None:
         return "by losses that this fit does not separate"
-    return f"{100.0 * quality.losses[name].value:.0f} % {LOSSES[name]} ({name})"
+    return f"{percent(quality.losses[name])} {LOSSES[name]} ({name})"

@@ -30,7 +30,7 @@ LOSSES: Final = {
 """The three losses of Eq. 13 in words."""
 TOLD_APART: Final = 0.15
 """Standard deviation of a loss's share up to which it is told from the others."""
-_SEEN: Final = 2.0
+SEEN: Final = 2.0
 """Standard deviations from which a loss is seen, and Q, its reciprocal, has an error."""
 
 
@@ -78,6 +78,8 @@ class Quality:
             "period_s": self.period_s,
             "losses": {name: each.value for name, each in self.losses.items()} or None,
             "losses_sd": {name: each.sd for name, each in self.losses.items()} or None,
+            "losses_interval95": {name: [*each.bounds95] for name, each in self.losses.items()}
+            or None,
         }
 
 
@@ -103,7 +105,7 @@ def seen_qualities(result: FitResult) -> tuple[Quality, ...]:
             {},
         )
         for check in result.decrement_check
-        if check.seen > _SEEN * check.seen_sd
+        if check.seen > SEEN * check.seen_sd
     )
 
 
@@ -171,15 +173,26 @@ def quality_by_law(result: FitResult, amplitude: float) -> Quality:
     covariance = _covariance_of_losses(result, amplitude)
     value = 1.0 / loss if loss > 0.0 else math.inf
     shares = {name: each / total if total > 0.0 else math.nan for name, each in losses.items()}
+    by_rate = np.array([amplitude, 1.0, 1.0 / amplitude]) * value
     return Quality(
         amplitude,
         Estimate(value, value * relative_loss_sd(result, amplitude), "s"),
         period,
         {
-            name: Estimate(share, _sd(np.eye(3)[index] - share, covariance), "")
+            name: _share(
+                share, _sd(np.eye(3)[index] - share, covariance), result[name], by_rate[index]
+            )
             for index, (name, share) in enumerate(shares.items())
         },
     )
+
+
+def _share(share: float, sd: float, rate: Estimate, by_rate: float) -> Estimate:
+    """A share with its interval: of a rate at its bound that of the rate."""
+    low, high = Estimate(share, sd, "").bounds95
+    if rate.at_bound:
+        low, high = 0.0, by_rate * rate.bounds95[1]
+    return Estimate(share, sd, "", (max(low, 0.0), min(high, 1.0)), rate.at_bound)
 
 
 def relative_loss_sd(result: FitResult, amplitude: float) -> float:

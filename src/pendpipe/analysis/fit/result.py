@@ -505,11 +505,11 @@ def result_of(
     checks = check_decrement(points, law)
     if len(goodness.p_values) > 1 and goodness.p_value >= LEVEL:
         # Turning points that contradict a law whose residual is white are off themselves.
+        white = f"all readings leave only noise (p = {goodness.p_value:.2g})"
         checks = tuple(
-            each._replace(seen_sd=abs(each.fitted - each.seen)) if each.contradicts else each
-            for each in checks
+            each._replace(overruled=white if each.contradicts else "") for each in checks
         )
-    p_values = (*goodness.p_values, *(check.p_value for check in checks))
+    p_values = (*goodness.p_values, *(each.p_value for each in checks if not each.overruled))
     rest |= {name: Estimate(fixed[name], 0.0, "") for name in PARTS if name in fixed}
     result = FitResult(
         parameters=parameters,
@@ -538,7 +538,12 @@ def _warnings(result: FitResult, stretched: float) -> list[str]:
     mixed = matrix[0, 1] < -_MIXED * a.sd * b.sd if a.sd > 0.0 and b.sd > 0.0 else False
     slow = result.chi2_per_dof <= 0.9 * stretched
     seen = "the half cycles scatter, in the square," if slow else "chi^2 of the readings is"
+    unit = result.parameters["amplitude"].unit
     warnings = (
+        *(
+            (bool(check.overruled), f"{check.sentence(unit)}: overruled, since {check.overruled}")
+            for check in result.decrement_check
+        ),
         *(
             (estimate.at_bound, f"{name} lies at its bound 0; its interval is one-sided")
             for name, estimate in result.parameters.items()
