@@ -208,11 +208,11 @@ def zeros(path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "write", "said", "most_bytes"),
     [
-        # 2.3 million cells, each of which says that it stands for 64.
+        # A million cells, each of which says that it stands for 64.
         (
             "a.ods",
             lambda path: path.write_bytes(
-                opendocument(f"<table:table-row>{1000 * CELL}</table:table-row>" * 2300)
+                opendocument(f"<table:table-row>{1000 * CELL}</table:table-row>" * 1000)
             ),
             "it has more than 600000 cells",
             100e6,
@@ -401,3 +401,76 @@ def test_no_file_is_claimed_by_two_dialects(sample: Path) -> None:
     head = sample.with_suffix("").read_bytes()[:HEAD]
     mine = [dialect.name for dialect in dialects.dialects()[0] if dialect.is_mine(head)]
     assert len(mine) == (sample.parent.name != "plain_table")
+
+
+# --- what lies outside of a file, or is hidden in it ----------------------------------------------
+def outside(kind: str) -> Callable[[Path, Path], object]:
+    """Write an HDF5 file whose angles are those of another file, by one of HDF5's ways."""
+
+    def write(path: Path, other: Path) -> None:
+        with h5py.File(path, "w") as file:
+            file["time_s"] = TIME
+            if kind == "storage":
+                size = ANGLE.shape, "f8"
+                file.create_dataset("angle_rad", *size, external=[(str(other), 0, ANGLE.nbytes)])
+            elif kind == "link":
+                file["angle_rad"] = h5py.ExternalLink(str(other), "secret")
+            else:
+                layout = h5py.VirtualLayout(ANGLE.shape, "f8")
+                layout[:] = h5py.VirtualSource(str(other), "secret", ANGLE.shape)
+                file.create_virtual_dataset("run/angle_rad", layout)
+
+    return write
+
+
+@pytest.mark.parametrize("kind", ["storage", "link", "virtual set"])
+def test_arrays_of_other_files_are_not_read(tmp_path: Path, kind: str) -> None:
+    other = tmp_path / "other"
+    with h5py.File(other, "w") as file:
+        file["secret"] = ANGLE
+    outside(kind)(tmp_path / "a.h5", other)
+    with pytest.raises(InputError, match="data sets of other files belong to it"):
+        read(tmp_path / "a.h5")
+
+
+def test_a_pipe_as_the_storage_of_an_array_does_not_hang(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    outside("storage")(tmp_path / "a.h5", tmp_path / "pipe")
+    with pytest.raises(InputError, match="data sets of other files belong to it"):
+        read(tmp_path / "a.h5")
+
+
+def hidden(path: str = "xl/worksheets/sheet1.xml", prefix: str = "", xml: str = "") -> bytes:
+    """Make a workbook of too many cells, which openpyxl would read whatever its path and prefix."""
+    space = f"xmlns{':' * bool(prefix)}{prefix}"
+    p = prefix and f"{prefix}:"
+    cells = f'<{p}c r="A1"><{p}v>1</{p}v></{p}c>' * 100
+    sheet = (xml or f"<{p}worksheet {space}='x'>") + f"<{p}row>{cells}</{p}row>" * 20
+    with zipfile.ZipFile(held := io.BytesIO(), "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("xl/workbook.xml", "<workbook/>")
+        archive.writestr(path, sheet.encode("utf-16" if "utf-16" in xml else "utf-8"))
+    return held.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (lambda: hidden(prefix="s"), "more than 1000 cells"),
+        (lambda: hidden("xl/other/anything"), "more than 1000 cells"),
+        (lambda: hidden(xml="<?xml version='1.0' encoding='utf-16'?><a>"), "not UTF-8"),
+        (lambda: hidden(xml="  <!DOCTYPE a [<!ENTITY b 'c'>]>"), "declares entities"),
+        (lambda: zipped(**{f"a{number}__csv": PLAIN for number in range(201)}), "201 tables"),
+        (lambda: zipped(**{f"a{number}": "" for number in range(10_001)}), "10001 files"),
+        (lambda: '{"t": [' + "[]," * 2_000_000 + "[]]}", "2000000 lists and records"),
+    ],
+    ids=["prefix", "path", "encoding", "entities", "tables", "files", "lists"],
+)
+def test_what_hides_in_a_file_is_counted(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    content: Callable[[], bytes | str],
+    said: str,
+) -> None:
+    monkeypatch.setattr(containers, "_MOST_CELLS", 1000)
+    with pytest.raises(InputError, match=said):
+        read_as(tmp_path, content())

@@ -3,7 +3,6 @@
 import io
 import json
 import re
-import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
 from pendpipe.formats.clock import column_of_clock_times
+from pendpipe.formats.grammar import MOST_COLUMNS
 from pendpipe.formats.header import interval_of
 from pendpipe.formats.lists import SETTINGS, WAVEFORM
 from pendpipe.formats.table import (
@@ -24,18 +24,24 @@ from pendpipe.formats.table import (
     damaged_if,
     refuse_unpacked,
     swing_of,
+    zip_archive,
 )
 from pendpipe.formats.text import table_of_text
 from pendpipe.formats.words import role_of, split_header
 
 MOST: Final = 1 << 27
 """Numbers that an array may hold."""
-_LARGEST_JSON: Final = 64 << 20
+_LARGEST_JSON: Final = 48 << 20
 _MOST_CELLS: Final = 1_500_000
 """Of records with texts: half a gigabyte."""
+_OUTSIDE: Final = "data sets of other files belong to it: copy them into it (h5repack)"
+_MOST_LISTS: Final = 2_000_000
+"""Lists and records of a JSON document: each takes a hundred bytes or more."""
 _AUDIO_HZ: Final = 4000.0
 """Rate from which on a file of sound may hold a tone that the swing modulates."""
 _STRETCH_S: Final = 5e-3
+_MOST_SOUND: Final = 1 << 25
+"""Samples of a sound, twelve minutes at 44.1 kHz: three copies of them take 0.8 GB."""
 
 
 def table_of_tree(
@@ -57,6 +63,7 @@ def table_of_tree(
     """
     arrays = dict(_numbers(tree))
     columns = {name: values for name, values in arrays.items() if values.size > 3}
+    damaged_if(len(columns) > MOST_COLUMNS, f"it holds more than {MOST_COLUMNS} arrays")
     refuse_if(
         not columns,
         place,
@@ -186,7 +193,11 @@ def _interval(arrays: dict[str, FloatArray]) -> float | None:
 
 
 def read_hdf5(place: Path, data: bytes, options: ReadOptions) -> Table:
-    """Read the data sets of all groups, with the units among their attributes."""
+    """Read the data sets of all groups, with the units among their attributes.
+
+    What lies outside of the file is refused before it is opened: it could be any file of the
+    reader's, or a pipe.
+    """
     import h5py
 
     tree: dict[str, Any] = {}
@@ -196,11 +207,18 @@ def read_hdf5(place: Path, data: bytes, options: ReadOptions) -> Table:
 
     def gather(name: str, node: Any) -> None:
         nonlocal whole
-        if not isinstance(node, h5py.Dataset) or name.startswith("#") or node.size > MOST:
+        if not isinstance(node, h5py.Dataset):
+            links = [node.get(each, getlink=True) for each in node]
+            damaged_if(any(isinstance(each, h5py.ExternalLink) for each in links), _OUTSIDE)
+            return
+        damaged_if(len(units) > MOST_COLUMNS, f"it holds more than {MOST_COLUMNS} arrays")
+        # To ask a virtual data set for its size opens the files that it is made of.
+        damaged_if(node.is_virtual or node.external, _OUTSIDE)
+        if name.startswith("#") or node.size > MOST:
             return
         if node.dtype.kind in "fiub" or node.dtype.names:
             path = name.replace("/", ".")
-            whole += node.nbytes
+            whole += node.size * max(node.dtype.itemsize, 8)
             refuse_unpacked(whole, len(data))
             tree[path] = node[()]
             unit = node.attrs.get("units", node.attrs.get("unit", ""))
@@ -209,15 +227,15 @@ def read_hdf5(place: Path, data: bytes, options: ReadOptions) -> Table:
 
     with h5py.File(io.BytesIO(data), "r") as file:
         tree.update(file.attrs)
-        file.visititems(gather)  # follows no link to another file
+        gather("", file)
+        file.visititems(gather)
     return table_of_tree(place, tree, "hdf5", options, units)
 
 
 def read_numpy(place: Path, data: bytes, options: ReadOptions) -> Table:
     """Read an array, or several by their names."""
     if data.startswith(b"PK"):
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            refuse_unpacked(sum(part.file_size for part in archive.infolist()), len(data))
+        zip_archive(data).close()
     loaded = np.load(io.BytesIO(data), allow_pickle=False)
     tree = dict(loaded) if hasattr(loaded, "files") else loaded
     return table_of_tree(place, tree, "numpy", options)
@@ -229,6 +247,12 @@ def read_json(place: Path, data: bytes, options: ReadOptions) -> Table:
         len(data) > _LARGEST_JSON,
         place,
         f"the JSON holds more than {_LARGEST_JSON >> 20} MB",
+        "export CSV",
+    )
+    refuse_if(
+        data.count(b"[") + data.count(b"{") > _MOST_LISTS,
+        place,
+        f"the JSON holds more than {_MOST_LISTS} lists and records",
         "export CSV",
     )
     text = data.decode("utf-8-sig", errors="replace")
@@ -292,8 +316,9 @@ def read_sound(place: Path, data: bytes, _options: ReadOptions) -> Table:
 
     rate: float
     rate, samples = wavfile.read(io.BytesIO(data))
+    damaged_if(samples.size > _MOST_SOUND, f"it holds {samples.size} samples")
     scale = {"i": float(np.iinfo(samples.dtype).max) + 1.0, "u": 128.0}.get(samples.dtype.kind, 1.0)
-    values = samples.reshape(len(samples), -1).astype(np.float64) / scale
+    values = samples.reshape(len(samples), -1) / np.float64(scale)
     notes: tuple[str, ...] = ()
     stretch = round(_STRETCH_S * rate)
     if rate >= _AUDIO_HZ and len(values) > 100 * stretch:
