@@ -93,6 +93,7 @@ LOCATION = {
     "frequency_hz",
     "harmonics",
     "adc_codes",
+    "mains",
 }
 ESTIMATE = {"value", "sd", "interval95", "unit"}
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -17,13 +18,15 @@ from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import Remainder, remainder_of, with_errors
 from pendpipe.diagnosis.result import Diagnosis, FittedModel, FoundEffect, Location
 from pendpipe.diagnosis.rivals import near_harmonic_by_chance
-from pendpipe.diagnosis.summary import statement
+from pendpipe.diagnosis.summary import numbers_of, statement
 from pendpipe.diagnosis.values import constants_of, curve_values
 from pendpipe.effects.baseline import OMEGA, TIME, A, B, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import CURVES, Curve, damping_curve, drive_curve
+from pendpipe.effects.effect import STRAIGHT_S, Effect
 from pendpipe.effects.model import Model
 from pendpipe.estimate import Z95, Estimate
+from pendpipe.quantities import with_error
 
 from .records import (
     FREQUENCY_HZ,
@@ -322,8 +325,34 @@ def test_parameters_have_words_and_units_and_differ_from_zero() -> None:
         },
     )
     assert diagnosis(effect).summary.missing == (
-        "second mode (frequency 1.500(10) Hz, amplitude 0.00500(10) rad)",
+        "second mode (amplitude 0.00500(10) rad, frequency 1.500(10) Hz)",
     )
+
+
+@pytest.mark.parametrize(
+    "effect", [each for each in CATALOGUE if each.parameters], ids=lambda each: each.identifier
+)
+def test_every_number_of_an_effect_is_printed_in_words_with_error_and_unit(effect: Effect) -> None:
+    values = effect.example[-len(effect.parameters) :] or (3.0,) * len(effect.parameters)
+    found = {
+        each.name: Estimate(1.1 * value, 0.1 * value, each.unit_in("rad"))
+        for each, value in zip(effect.parameters, values, strict=True)
+    }
+    printed = numbers_of(named(effect.identifier, **found))
+    for each in effect.parameters:
+        assert re.fullmatch("[a-z0-9|²]+( [a-z0-9|²]+)*", each.word), each.word
+        if not each.name.endswith(("_cosine", "_sine")):
+            one = found[each.name]
+            assert f"{each.word} {with_error(one.value, one.sd, one.unit, short=True)}" in printed
+    words = [each.word for each in effect.parameters if not each.name.endswith("_sine")]
+    assert len(set(words)) == len(words)
+    assert printed.count(", ") == len(words) - 1
+
+
+def test_a_drift_that_is_straight_says_no_time_constant() -> None:
+    straight = Estimate(STRAIGHT_S, 0.0, "s")
+    drift = named("offset-drift", rate=Estimate(1e-5, 1e-7, "rad/s"), tau=straight)
+    assert diagnosis(drift).summary.missing == ("drifting offset (rate 1.000(10) × 10⁻⁵ rad/s)",)
 
 
 def test_a_diagnosis_prints_as_its_answer() -> None:
@@ -409,6 +438,23 @@ def test_a_tone_lies_at_its_frequency() -> None:
     assert found.frequency_hz == pytest.approx((TONE_HZ,), abs=0.05 / TIME_S[-1])
     assert found.harmonics == ()
     assert "Hz" in found.summary
+
+
+@pytest.mark.parametrize(
+    ("tone_hz", "says"),
+    [(5.0, "50 Hz folded at 15 readings a second"), (3.3, ""), (5.2, "")],
+)
+def test_a_tone_of_the_mains_is_known_behind_its_alias(tone_hz: float, says: str) -> None:
+    """At 15 readings a second 50 Hz (and 100 Hz) are seen at 5 Hz."""
+    hum = 3e-4 * np.cos(2.0 * math.pi * tone_hz * TIME_S)
+    data, noise = prepared(other_engine(TRUTH) + hum + white(3))
+    tone = by_identifier("tone-pickup")
+    bare = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
+    start = np.append(bare.value, [3e-4, 0.0, tone_hz])
+    found = locate(bare, refine(bare.model.adding(tone), data, noise, start), data, tone)
+    assert found.mains == says
+    assert found.summary.endswith(says)
+    assert ("50 Hz" in numbers_of(replace(named("tone-pickup"), location=found))) == bool(says)
 
 
 def test_a_square_in_the_sensor_lies_in_the_second_harmonic_and_a_cube_in_the_third() -> None:

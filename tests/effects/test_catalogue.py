@@ -333,7 +333,7 @@ class Entry:
 def test_an_effect_of_another_package_is_found(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    known = tuple(catalogue.CATALOGUE)
+    known = catalogue._ALL
     entries = [Entry("absent"), Entry("other", known[0])]
     monkeypatch.setattr(catalogue, "entry_points", lambda **_: entries)
     assert tuple(catalogue._found()) == (*known, known[0])

@@ -1,5 +1,6 @@
 """Where an effect shows: time, amplitude, phase of the cycle, frequency, harmonic."""
 
+import itertools
 import math
 from dataclasses import replace
 from typing import Final
@@ -14,6 +15,7 @@ from pendpipe.diagnosis.result import Location
 from pendpipe.diagnosis.values import last_in
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
+from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, listed, with_error
 
 _INTERVAL_SHARE: Final = 0.9
@@ -53,12 +55,45 @@ def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
     tone = last_in(after, effect, "Hz") if effect.spectral else None
     if tone is not None:
         lines, harmonics = (tone.value,), ()
-    found = Location(time, amplitude, phase, lines, harmonics)
+    mains = mains_of(tone, data) if tone is not None else ""
+    found = Location(time, amplitude, phase, lines, harmonics, mains=mains)
     summary = _summary(found, data, sampled.amplitude, opposite_arcs(of_cycle))
     beat = beat_of(after, effect)
     if beat is not None:
         summary += f", beating with the motion every {beat:.3g} s"
     return replace(found, summary=summary)
+
+
+_MAINS_HZ: Final = (50.0, 60.0)
+_MAINS_SD: Final = 4e-4
+"""Relative standard deviation of a grid's frequency: 20 mHz at 50 Hz."""
+_BY_CHANCE: Final = 0.05
+"""Largest part of all frequencies that the lines of the mains may take: else any line is one."""
+
+
+def mains_of(line: Estimate, data: Data) -> str:
+    """Return which harmonic of 50 or 60 Hz is seen at a line's frequency; "" for none.
+
+    At f readings a second what has the frequency F is seen at ``|F - n f|``, n the nearest whole
+    number. A line is taken for it within two of its own and the grid's standard deviations.
+
+    >>> even = Data(np.arange(900) / 46.61, np.zeros(900), 1 / 46.61, True, np.ones(900))
+    >>> mains_of(Estimate(3.3854, 4e-5, "Hz"), even)
+    '50 Hz folded at 46.61 readings a second'
+    """
+    if not data.uniform:
+        return ""
+    rate, taken = (len(data) - 1) / float(data.time_s[-1] - data.time_s[0]), 0.0
+    for order in itertools.count(1):
+        for mains in (order * each for each in _MAINS_HZ):
+            within = 2.0 * math.hypot(line.sd, _MAINS_SD * mains)
+            taken += 4.0 * within / rate
+            if taken > _BY_CHANCE:
+                return ""
+            if abs(abs(mains - rate * round(mains / rate)) - line.value) < within:
+                folded = f" folded at {rate:.4g} readings a second" if mains > 0.5 * rate else ""
+                return f"{mains:g} Hz{folded or ' of the mains'}"
+    return ""
 
 
 def _difference(before: Fit, after: Fit) -> FloatArray:
@@ -157,6 +192,8 @@ def _summary(found: Location, data: Data, amplitude: FloatArray, opposite: str) 
         clauses.append(f"in {listed(parts)}")
     elif found.frequency_hz:
         clauses.append("at " + ", ".join(f"{line:.5g} Hz" for line in found.frequency_hz))
+    if found.mains:
+        clauses.append(found.mains)
     return f"it shows {', '.join(clauses)}" if clauses else ""
 
 

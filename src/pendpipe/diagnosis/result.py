@@ -81,6 +81,8 @@ class Location:
         Frequencies, and multiples of the motion's frequency.
     adc_codes
         Codes of the converter.
+    mains
+        Which harmonic of 50 or 60 Hz a line may be, and by what rate it is folded.
     summary
         One clause.
     """
@@ -92,6 +94,7 @@ class Location:
     harmonics: tuple[int, ...] = ()
     adc_codes: tuple[int, ...] = ()
     summary: str = ""
+    mains: str = ""
 
     @classmethod
     def over(
@@ -120,6 +123,7 @@ class Location:
             "frequency_hz": list(self.frequency_hz),
             "harmonics": list(self.harmonics),
             "adc_codes": list(self.adc_codes),
+            "mains": self.mains,
         }
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pendpipe.analysis.fit.printed import short_size
 from pendpipe.analysis.fit.quality import period_of_frequency, seen_qualities
-from pendpipe.effects.catalogue import CATALOGUE, by_identifier
+from pendpipe.effects.catalogue import CATALOGUE, by_identifier, declared
 from pendpipe.effects.curves import CURVES
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, in_columns, listed, with_error
@@ -53,39 +53,6 @@ UNNAMED: Final = {
     "unnamed-drive": "an unknown drive",
     "unnamed-measurement": "an unknown error of the sensor",
 }
-_WORDS: Final = {
-    "k3": "cubic stiffness",
-    "k2": "quadratic stiffness",
-    "c": "friction",
-    "a": "drag",
-    "d": "size",
-    "rate": "rate",
-    "tau": "time constant",
-    "time": "at",
-    "f_2": "frequency",
-    "f_d": "frequency",
-    "f_a": "frequency",
-    "f_h": "frequency",
-    "tau_2": "damping time",
-    "detuning": "detuning",
-    "J": "jump",
-    "s": "jump",
-    "change": "relative change",
-    "dv": "change of velocity",
-    "step": "step",
-    "number": "number",
-    "rms": "rms",
-    "dt": "step of time",
-    "sigma_t": "jitter",
-    "y_c": "critical amplitude",
-    "s2": "quadratic term",
-    "s3": "cubic term",
-    "b": "play",
-    "exponent": "exponent",
-    "gamma": "extra damping",
-    "kappa": "coefficient",
-}
-"""What the parameters of the effects are, in words; the others are in the details."""
 PARTS: Final = {
     "offset": "in the offset",
     "amplitude": "in the amplitude",
@@ -357,21 +324,20 @@ def _candidate(effect: FoundEffect) -> str:
 
 def numbers_of(effect: FoundEffect) -> str:
     """Print the parameters of an effect in words, with units, where they differ from zero."""
-    found = dict(effect.parameters)
-    said = []
-    for name in list(found):
-        if name.endswith("_cosine") and (other := name.replace("_cosine", "_sine")) in found:
-            cosine, sine = found.pop(name), found.pop(other)
-            value = math.hypot(cosine.value, sine.value)
-            sd = (
-                math.hypot(cosine.sd * cosine.value, sine.sd * sine.value) / value if value else 0.0
-            )
-            found["_amplitude"] = Estimate(value, sd, cosine.unit)
-    for name, each in found.items():
-        word = "amplitude" if name == "_amplitude" else _WORDS.get(name)
-        if word and each.sd > 0.0 and abs(each.value) > _KNOWN * each.sd:
-            said.append(f"{word} {with_error(each.value, each.sd, each.unit, short=True)}")
-    return ", ".join(said[:3])
+    said, found = list[str](), effect.parameters
+    for name, parameter in declared(effect.identifier).items():
+        each, sine = found.get(name), found.get(name.replace("_cosine", "_sine"))
+        if each is None or sine is None or name.endswith("_sine"):
+            continue
+        if sine is not each:
+            value = math.hypot(each.value, sine.value)
+            sd = math.hypot(each.sd * each.value, sine.sd * sine.value) / value if value else 0.0
+            each = Estimate(value, sd, each.unit)
+        # What is as it always is (a drift that is straight) says nothing.
+        if abs(each.value) > _KNOWN * each.sd and each.value != parameter.default:
+            number = with_error(each.value, each.sd, each.unit, short=True)
+            said.append(f"{parameter.word or name} {number}")
+    return ", ".join([*said, *filter(None, [effect.location.mains])])
 
 
 def name_of(identifier: str) -> str:
@@ -646,9 +612,8 @@ def statement(
 
 def _effect(effect: FoundEffect) -> str:
     """What one effect is, how sure that is, where it shows, and what would decide."""
-    known = {each.identifier: {p.name for p in each.parameters} for each in CATALOGUE}
     # What a test has counted, its location says.
-    wanted = known.get(effect.identifier, set(effect.parameters))
+    wanted = declared(effect.identifier) or effect.parameters
     members = class_of(effect)
     whose = "" if _leader(effect)[1] == effect.identifier else f"of {effect.name}: "
     parts = [

@@ -35,6 +35,9 @@ class Parameter(NamedTuple):
     high: float
     default: float | None = None
     """What a simulation takes where it is not given; None: it must be."""
+    word: str = ""
+    """What it is called before its number and unit; its name by default. A ``_cosine`` and its
+    ``_sine`` are printed as one amplitude under the first one's word."""
 
     def unit_in(self, unit: str) -> str:
         """Return its unit where displacements are in `unit` ("rad" or "m"); "" for a number."""
@@ -310,7 +313,7 @@ def enters(
     ...     identifier="tilt",
     ...     name="tilted sensor",
     ...     equation=r"y = x + s_2 x^2",
-    ...     parameters=(Parameter("s2", "1/rad", -1.0, 1.0),),
+    ...     parameters=(Parameter("s2", "1/rad", -1.0, 1.0, word="quadratic term"),),
     ...     discriminating_test="turn the sensor round: the sign must change",
     ... )
     ... def tilt(sampled, pendulum, s2):
@@ -377,7 +380,7 @@ def between(low: float, high: float, count: int) -> FloatArray:
 
 STRAIGHT_S: Final = 1e7
 """A relaxation time that no record can tell from infinity."""
-RELAXATION: Final = Parameter("tau", "s", 1e-2, STRAIGHT_S, STRAIGHT_S)
+RELAXATION: Final = Parameter("tau", "s", 1e-2, STRAIGHT_S, STRAIGHT_S, word="time constant")
 
 
 def relaxed(time_s: FloatArray, tau: float) -> FloatArray:
@@ -458,7 +461,7 @@ def reading_step(time_s: FloatArray, instant_s: float) -> FloatArray:
     return np.asarray(np.clip((time_s - instant_s) / interval + 0.5, 0.0, 1.0))
 
 
-INSTANT: Final = Parameter("time", "s", -math.inf, math.inf)
+INSTANT: Final = Parameter("time", "s", -math.inf, math.inf, word="at")
 
 
 class Sudden(Effect):

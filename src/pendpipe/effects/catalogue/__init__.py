@@ -13,7 +13,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Final
 
-from pendpipe.effects.effect import Effect
+from pendpipe.effects.effect import Effect, Parameter
 from pendpipe.errors import InputError, nearest
 
 ENTRY_POINT: Final = "pendpipe.effects"
@@ -22,14 +22,14 @@ _FIRST: Final = ("restoring", "losses", "in_time", "reading")
 
 
 def _found() -> Iterator[Effect]:
-    """Yield every effect, module by module, as they are declared."""
+    """Yield every effect and its variants, module by module, as they are declared."""
     names = [module.name for module in pkgutil.iter_modules(__path__)]
     for name in sorted(names, key=lambda name: (*_FIRST, name).index(name)):
         module = importlib.import_module(f"{__name__}.{name}")
         for effect in vars(module).values():
-            # A variant of an entry, which only the diagnosis uses, has a key of its own.
-            if isinstance(effect, Effect) and effect.key == effect.identifier:
-                yield effect
+            # Variants of one entry stand in a table.
+            each = effect.values() if isinstance(effect, dict) else [effect]
+            yield from (one for one in each if isinstance(one, Effect))
     for entry in sorted(entry_points(group=ENTRY_POINT)):
         try:
             effect = entry.load()
@@ -40,10 +40,18 @@ def _found() -> Iterator[Effect]:
             yield from [effect] if isinstance(effect, Effect) else []
 
 
-CATALOGUE: Final[tuple[Effect, ...]] = tuple(_found())
+_ALL: Final = tuple(_found())
+# A variant of an entry, which only the diagnosis uses, has a key of its own.
+CATALOGUE: Final = tuple(effect for effect in _ALL if effect.key == effect.identifier)
 """In the order of the manual: dynamics, then measurement."""
 
 _BY_IDENTIFIER: Final = {effect.identifier: effect for effect in CATALOGUE}
+
+
+def declared(identifier: str) -> dict[str, Parameter]:
+    """Return the parameters of an entry and of its variants, by name; none of what is no entry."""
+    entries = (effect for effect in _ALL if effect.identifier == identifier)
+    return {each.name: each for effect in entries for each in effect.parameters}
 
 
 def by_identifier(name: str, place: str | Path = "effect") -> Effect:
@@ -68,4 +76,4 @@ def by_identifier(name: str, place: str | Path = "effect") -> Effect:
     return found
 
 
-__all__ = ["CATALOGUE", "by_identifier"]
+__all__ = ["CATALOGUE", "by_identifier", "declared"]

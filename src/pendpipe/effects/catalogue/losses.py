@@ -25,7 +25,7 @@ from pendpipe.effects.effect import (
     identifier="coulomb-friction",
     name="Coulomb friction",
     equation=r"\ddot x \mathrel{+}= -\tfrac{\pi}{2}\, \omega c\, \operatorname{sgn}\dot x",
-    parameters=(Parameter("c", "rad/s", 0.0, 10.0),),
+    parameters=(Parameter("c", "rad/s", 0.0, 10.0, word="friction"),),
     inside=("eq8",),
     expected=True,
     prior=6.0,
@@ -48,7 +48,7 @@ def coulomb_friction(motion: Motion, pendulum: Pendulum, c: float) -> FloatArray
         r"\ddot x \mathrel{+}= -\tfrac{\pi}{2}\, \tfrac{a}{\omega}"
         r" (\omega^2 x^2 + \dot x^2) \operatorname{sgn}\dot x"
     ),
-    parameters=(Parameter("a", "1/(rad s)", 0.0, 100.0),),
+    parameters=(Parameter("a", "1/(rad s)", 0.0, 100.0, word="drag"),),
     inside=("eq8",),
     expected=True,
     prior=6.0,
@@ -98,9 +98,9 @@ SPEED: Final = 0.1
         r"\quad v_1 = 0.1\ \mathrm{rad/s}"
     ),
     parameters=(
-        Parameter("f", "rad/s^2", 0.0, 100.0),
-        Parameter("exponent", "1", 0.1, 6.0),
-        Parameter("energy_form", "1", 0.0, 1.0, 0.0),
+        Parameter("f", "rad/s^2", 0.0, 100.0, word="friction"),
+        Parameter("exponent", "1", 0.1, 6.0, word="exponent"),
+        Parameter("energy_form", "1", 0.0, 1.0, 0.0, word="share by energy"),
     ),
     example=(1e-3, 1.5, 0.3),
     discriminating_test=(
@@ -137,8 +137,8 @@ def power_law_damping(
         r" + p\, x^2 \dot x\right]"
     ),
     parameters=(
-        Parameter("d", "1/(rad^2 s)", -1e3, 1e3),
-        Parameter("position_form", "1", 0.0, 1.0, 0.0),
+        Parameter("d", "1/(rad^2 s)", -1e3, 1e3, word="cubic loss"),
+        Parameter("position_form", "1", 0.0, 1.0, 0.0, word="share with x²v"),
     ),
     example=(0.5, 0.4),
     discriminating_test=(
@@ -163,8 +163,8 @@ def cubic_damping(motion: Motion, pendulum: Pendulum, size: float, position: flo
     name="Stribeck friction",
     equation=r"\ddot x \mathrel{+}= -f_s\, e^{-(\dot x/v_s)^2} \operatorname{sgn}\dot x",
     parameters=(
-        Parameter("f_s", "rad/s^2", 0.0, 100.0),
-        Parameter("v_s", "rad/s", 1e-6, 100.0),
+        Parameter("f_s", "rad/s^2", 0.0, 100.0, word="friction at rest"),
+        Parameter("v_s", "rad/s", 1e-6, 100.0, word="fading at a velocity of"),
     ),
     example=(1e-3, 0.1),
     discriminating_test=(
@@ -186,7 +186,10 @@ def stribeck_friction(motion: Motion, pendulum: Pendulum, size: float, v_s: floa
     identifier="presliding-friction",
     name="presliding friction (Dahl)",
     equation=r"\ddot x \mathrel{+}= -\omega^2 k_d z, \quad \dot z = \dot x - |\dot x|\, z/z_c",
-    parameters=(Parameter("k_d", "1", 0.0, 10.0), Parameter("z_c", "rad", 1e-7, 10.0)),
+    parameters=(
+        Parameter("k_d", "1", 0.0, 10.0, word="relative stiffness"),
+        Parameter("z_c", "rad", 1e-7, 10.0, word="breakaway at"),
+    ),
     example=(1e-3, 0.02),
     discriminating_test=(
         "swing it at ever smaller amplitudes: far below the breakaway angle z_c the frequency "
@@ -235,7 +238,7 @@ _RESOLVED: Final = 0.65
         r"\omega^2 x \to \omega^2 \left(x -"
         r" \operatorname{clip}(x, -\tfrac b2, \tfrac b2)\right)"
     ),
-    parameters=(Parameter("b", "rad", 0.0, 1.0),),
+    parameters=(Parameter("b", "rad", 0.0, 1.0, word="play"),),
     example=(1e-3,),
     discriminating_test=(
         "swing it at ever smaller amplitudes: the frequency must fall as 1/amplitude"
@@ -272,7 +275,7 @@ def backlash(motion: Motion, pendulum: Pendulum, gap: float) -> FloatArray:
         r"\ddot x \mathrel{+}= -\frac{h}{\sqrt\pi}"
         r" \int_0^t \frac{\ddot x(s)}{\sqrt{t - s}}\, \mathrm{d}s"
     ),
-    parameters=(Parameter("h", "1/sqrt(s)", 0.0, 100.0),),
+    parameters=(Parameter("h", "1/sqrt(s)", 0.0, 100.0, word="history coefficient"),),
     example=(0.01,),
     discriminating_test="record the first swings after a release from rest, with a lighter bob",
 )
@@ -294,9 +297,9 @@ def history_force(motion: Motion, pendulum: Pendulum, size: float) -> FloatArray
         r" \max(0, |x_\mathrm{turn}| - y_c)\, e^{-\psi/\phi}\, \mathrm{sgn}\, \dot x"
     ),
     parameters=(
-        Parameter("k", "1/s", 0.0, 100.0),
-        Parameter("y_c", "rad", 1e-6, 10.0),
-        Parameter("phi", "1", 0.2, 2.0, 0.6),
+        Parameter("k", "1/s", 0.0, 100.0, word="loss rate"),
+        Parameter("y_c", "rad", 1e-6, 10.0, word="above an amplitude of"),
+        Parameter("phi", "1", 0.2, 2.0, 0.6, word="fading over a phase of"),
     ),
     example=(0.01, 0.1, 0.6),
     discriminating_test=(

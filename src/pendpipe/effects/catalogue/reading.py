@@ -33,7 +33,7 @@ from pendpipe.effects.effect import (
     identifier="sensor-quadratic",
     name="quadratic sensor",
     equation=r"y = x + s_2 x^2",
-    parameters=(Parameter("s2", "1/rad", -30.0, 30.0),),
+    parameters=(Parameter("s2", "1/rad", -30.0, 30.0, word="quadratic term"),),
     example=(0.05,),
     discriminating_test="calibrate the sensor at many angles",
 )
@@ -47,7 +47,7 @@ def sensor_quadratic(sampled: Sampled, pendulum: Pendulum, s2: float) -> FloatAr
     identifier="sensor-cubic",
     name="cubic sensor",
     equation=r"y = x + s_3 x^3",
-    parameters=(Parameter("s3", "1/rad^2", -300.0, 300.0),),
+    parameters=(Parameter("s3", "1/rad^2", -300.0, 300.0, word="cubic term"),),
     example=(0.05,),
     discriminating_test="calibrate the sensor at many angles",
 )
@@ -61,7 +61,10 @@ def sensor_cubic(sampled: Sampled, pendulum: Pendulum, s3: float) -> FloatArray:
     identifier="camera-geometry",
     name="geometry of the camera (pivot, obliquity), or an encoder's eccentricity",
     equation=r"y = x + e_1 (\cos x - 1) + e_2 \sin 2x",
-    parameters=(Parameter("e_1", "rad", -1.0, 1.0), Parameter("e_2", "rad", -0.5, 0.5)),
+    parameters=(
+        Parameter("e_1", "rad", -1.0, 1.0, word="cos x term"),
+        Parameter("e_2", "rad", -0.5, 0.5, word="sin 2x term"),
+    ),
     sizes=2,
     rare=True,
     angular=True,
@@ -87,7 +90,7 @@ def camera_geometry(sampled: Sampled, pendulum: Pendulum, e_1: float, e_2: float
         r"y = x - \operatorname{sgn}(\dot x)"
         r" \left[\tfrac b2 - \max(0, b - |x - x_\mathrm{turn}|)\right]"
     ),
-    parameters=(Parameter("b", "rad", 0.0, 1.0),),
+    parameters=(Parameter("b", "rad", 0.0, 1.0, word="play"),),
     example=(1e-3,),
     discriminating_test=(
         "move the pendulum slowly by hand both ways against a scale: the readings differ"
@@ -107,7 +110,7 @@ def sensor_backlash(sampled: Sampled, pendulum: Pendulum, play: float) -> FloatA
     identifier="offset-drift",
     name="drifting offset",
     equation=r"y = x + \rho\, \tau (1 - e^{-t/\tau})",
-    parameters=(Parameter("rate", "rad/s", -10.0, 10.0), RELAXATION),
+    parameters=(Parameter("rate", "rad/s", -10.0, 10.0, word="rate"), RELAXATION),
     example=(1e-5, 25.0),
     discriminating_test=(
         "use a second sensor, or turn the sensor round: creep of the equilibrium turns too"
@@ -127,7 +130,7 @@ def offset_drift(sampled: Sampled, pendulum: Pendulum, rate: float, tau: float) 
     identifier="gain-drift",
     name="drifting gain",
     equation=r"y = x \left[1 + g\, \tau (1 - e^{-t/\tau})\right]",
-    parameters=(Parameter("rate", "1/s", -10.0, 10.0), RELAXATION),
+    parameters=(Parameter("rate", "1/s", -10.0, 10.0, word="rate"), RELAXATION),
     example=(1e-4, 20.0),
     discriminating_test="read a known tilt before and after the record",
 )
@@ -141,7 +144,10 @@ def gain_drift(sampled: Sampled, pendulum: Pendulum, rate: float, tau: float) ->
     identifier="ac-coupling",
     name="AC coupling",
     equation=r"y = x + u\, e^{-t/\tau}",
-    parameters=(Parameter("u", "rad", -10.0, 10.0), Parameter("tau", "s", 1e-2, 1e6)),
+    parameters=(
+        Parameter("u", "rad", -10.0, 10.0, word="level at the start"),
+        Parameter("tau", "s", 1e-2, 1e6, word="time constant"),
+    ),
     example=(1e-3, 5.0),
     discriminating_test="tilt the sensor and hold it: with AC coupling the reading returns",
     displacement=lambda values, duration_s: float(
@@ -165,9 +171,9 @@ def ac_coupling(sampled: Sampled, pendulum: Pendulum, level: float, tau: float) 
     name="tone in the reading",
     equation=r"y = x + a_c \cos 2\pi f_a t + a_s \sin 2\pi f_a t",
     parameters=(
-        Parameter("a_cosine", "rad", -10.0, 10.0),
-        Parameter("a_sine", "rad", -10.0, 10.0, 0.0),
-        Parameter("f_a", "Hz", 0.0, 1e6),
+        Parameter("a_cosine", "rad", -10.0, 10.0, word="amplitude"),
+        Parameter("a_sine", "rad", -10.0, 10.0, 0.0, word="amplitude"),
+        Parameter("f_a", "Hz", 0.0, 1e6, word="frequency"),
     ),
     example=(1e-3, 5e-4, 3.3),
     discriminating_test=(
@@ -194,9 +200,9 @@ CLIPPING: Final[Effect] = without_template(
     name="clipping",
     equation=r"y = \operatorname{clip}(x, y_\mathrm{low}, y_\mathrm{high})",
     parameters=(
-        Parameter("lower_level", "rad", -math.inf, math.inf, -math.inf),
-        Parameter("upper_level", "rad", -math.inf, math.inf, math.inf),
-        Parameter("width", "rad", 0.0, math.inf, 0.0),
+        Parameter("lower_level", "rad", -math.inf, math.inf, -math.inf, word="lower level"),
+        Parameter("upper_level", "rad", -math.inf, math.inf, math.inf, word="upper level"),
+        Parameter("width", "rad", 0.0, math.inf, 0.0, word="width"),
     ),
     discriminating_test="widen the range, or release it with less amplitude",
 )
@@ -206,7 +212,7 @@ MISSING_CODES: Final[Effect] = without_template(
     identifier="missing-codes",
     name="missing codes",
     equation=r"y = q\, \operatorname{code}(x/q), \quad \operatorname{code} \notin \mathcal{M}",
-    parameters=(Parameter("number", "1", 0.0, 4096.0),),
+    parameters=(Parameter("number", "1", 0.0, 4096.0, word="number"),),
     discriminating_test="record a slow ramp: the same codes must be missing",
 )
 COARSE_QUANTISATION: Final[Effect] = without_template(
@@ -215,7 +221,7 @@ COARSE_QUANTISATION: Final[Effect] = without_template(
     identifier="coarse-quantisation",
     name="coarse quantisation",
     equation=r"y = q\, \operatorname{round}(x/q)",
-    parameters=(Parameter("step", "rad", 0.0, math.inf),),
+    parameters=(Parameter("step", "rad", 0.0, math.inf, word="step"),),
     discriminating_test="narrow the range, or add noise of the size of a step",
 )
 COUNT_SLIPS: Final[Effect] = without_template(
@@ -224,7 +230,10 @@ COUNT_SLIPS: Final[Effect] = without_template(
     identifier="count-slips",
     name="lost counts",
     equation=r"y = x + Q \sum_k n_k\, H(t - t_k), \quad n_k \in \mathbb{Z}",
-    parameters=(Parameter("step", "rad", 0.0, math.inf), Parameter("number", "1", 0.0, 1e6)),
+    parameters=(
+        Parameter("step", "rad", 0.0, math.inf, word="step"),
+        Parameter("number", "1", 0.0, 1e6, word="number"),
+    ),
     discriminating_test="count against the encoder's index pulse, or read it more often",
 )
 
@@ -240,9 +249,9 @@ _HARD: Final = 30.0
     name="soft clipping",
     equation=r"y = x - w \ln\left[1 + (e^{d/w} - 1)\, e^{(x - x_\mathrm{top})/w}\right]",
     parameters=(
-        Parameter("upper_loss", "rad", 0.0, 10.0),
-        Parameter("lower_loss", "rad", 0.0, 10.0),
-        Parameter("width", "rad", 1e-7, 10.0),
+        Parameter("upper_loss", "rad", 0.0, 10.0, word="loss at the upper end"),
+        Parameter("lower_loss", "rad", 0.0, 10.0, word="loss at the lower end"),
+        Parameter("width", "rad", 1e-7, 10.0, word="width"),
     ),
     sizes=2,
     discriminating_test="widen the range, or release it with less amplitude",
@@ -283,7 +292,7 @@ def _lost(beyond: FloatArray, depth: float, width: float) -> FloatArray:
     identifier="clock-drift",
     name="drifting clock",
     equation=r"t \to t + \kappa \tau \left[t - \tau (1 - e^{-t/\tau})\right]",
-    parameters=(Parameter("rate", "1/s", -1.0, 1.0), RELAXATION),
+    parameters=(Parameter("rate", "1/s", -1.0, 1.0, word="rate"), RELAXATION),
     example=(1e-5, 15.0),
     discriminating_test="record a second clock (GPS, mains) on another channel",
     prior_penalty=unusual_drift,
@@ -303,7 +312,7 @@ JITTER: Final[Effect] = without_template(
     identifier="jitter",
     name="jitter of the sampling",
     equation=r"\sigma^2 \to \sigma^2 + \dot x^2 \sigma_t^2",
-    parameters=(Parameter("sigma_t", "s", 0.0, math.inf),),
+    parameters=(Parameter("sigma_t", "s", 0.0, math.inf, word="jitter"),),
     discriminating_test="record a fast clean tone: the noise must grow with its slope",
 )
 
@@ -314,7 +323,10 @@ CLOCK_SLIPS: Final[Effect] = without_template(
     identifier="clock-slips",
     name="clock slips by whole samples",
     equation=r"t \to t + \mathrm{d}t \sum_k m_k\, H(t - t_k), \quad m_k \in \mathbb{Z}",
-    parameters=(Parameter("dt", "s", 0.0, math.inf), Parameter("number", "1", 0.0, 1e6)),
+    parameters=(
+        Parameter("dt", "s", 0.0, math.inf, word="step of time"),
+        Parameter("number", "1", 0.0, 1e6, word="number"),
+    ),
     discriminating_test="log the computer's own clock with every sample",
 )
 
@@ -335,7 +347,7 @@ def _part_of_a_sample(values: FloatArray, span: Span) -> float:
     identifier="offset-step",
     name="jump of the reading",
     equation=r"y = x + J\, H(t - t_k)",
-    parameters=(Parameter("J", "rad", -10.0, 10.0), INSTANT),
+    parameters=(Parameter("J", "rad", -10.0, 10.0, word="jump"), INSTANT),
     tried=64,
     example=(1e-3, 21.03),
     discriminating_test=(
@@ -353,7 +365,7 @@ def offset_step(sampled: Sampled, pendulum: Pendulum, jump: float, instant_s: fl
     identifier="dropped-samples",
     name="dropped samples",
     equation=r"t \to t + d\, H(t - t_k)",
-    parameters=(Parameter("d", "s", -1e5, 1e5), INSTANT),
+    parameters=(Parameter("d", "s", -1e5, 1e5, word="lost time"), INSTANT),
     tried=64,
     example=(1e-2, 21.03),
     discriminating_test="compare the number of samples with the time that a second clock shows",
@@ -369,7 +381,7 @@ def dropped_samples(time_s: FloatArray, late_s: float, instant_s: float) -> Floa
     identifier="rolling-shutter",
     name="rolling shutter",
     equation=r"y(t) = x(t + \kappa x)",
-    parameters=(Parameter("kappa", "s/rad", -1.0, 1.0),),
+    parameters=(Parameter("kappa", "s/rad", -1.0, 1.0, word="delay"),),
     rare=True,
     angular=True,
     example=(0.005,),
@@ -397,7 +409,10 @@ GLITCHES: Final[Effect] = without_template(
     identifier="glitches",
     name="glitches",
     equation=r"y_k = x_k + g_k, \quad k \in \mathcal{G}",
-    parameters=(Parameter("number", "1", 0.0, 1e6), Parameter("rms", "rad", 0.0, math.inf)),
+    parameters=(
+        Parameter("number", "1", 0.0, 1e6, word="number"),
+        Parameter("rms", "rad", 0.0, math.inf, word="rms"),
+    ),
     discriminating_test="change cable and supply, and record at rest",
 )
 TRACKING_NOISE: Final[Effect] = without_template(
@@ -412,8 +427,8 @@ TRACKING_NOISE: Final[Effect] = without_template(
     name="wander of the tracked mark",
     equation=r"y = x + \kappa\, w(t), \quad w = r/\bar r - P(x)",
     parameters=(
-        Parameter("kappa", "rad", -100.0, 100.0, 1.0),
-        Parameter("rms", "1", 0.0, 1.0),
+        Parameter("kappa", "rad", -100.0, 100.0, 1.0, word="gain"),
+        Parameter("rms", "1", 0.0, 1.0, word="rms"),
     ),
     discriminating_test="track another mark on the bob, or the same mark again",
 )
@@ -428,8 +443,8 @@ COLOURED_NOISE: Final[Effect] = without_template(
     name="coloured noise",
     equation=r"S(f) = S_0 \left[1 + (f_0/f)^{\alpha}\right]",
     parameters=(
-        Parameter("corner", "Hz", 0.0, math.inf),
-        Parameter("exponent", "1", 0.0, 4.0),
+        Parameter("corner", "Hz", 0.0, math.inf, word="corner frequency"),
+        Parameter("exponent", "1", 0.0, 4.0, word="exponent"),
     ),
     discriminating_test="record with the pendulum held",
 )

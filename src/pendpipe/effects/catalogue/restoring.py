@@ -59,7 +59,15 @@ def _seen_from_the_side(unit: str, **more: Any) -> Effect:
         key=f"circular-error:{unit}",
         name="circular error",
         equation=r"x = L \sin\theta, \quad \ddot\theta = -\omega^2 \sin\theta",
-        parameters=(Parameter("inverse_length_squared", "1/rad^2", 0.0, math.inf),),
+        parameters=(
+            Parameter(
+                "inverse_length_squared",
+                "1/rad^2",
+                0.0,
+                math.inf,
+                word="inverse square of the length",
+            ),
+        ),
         discriminating_test=circular_error.discriminating_test,
         **more,
     )(_from_the_side)
@@ -80,7 +88,7 @@ CIRCULAR_ERROR_IN: Final[dict[str, Effect]] = {
     identifier="cubic-stiffness",
     name="cubic restoring torque",
     equation=r"\omega^2 x \to \omega^2 (x + k_3 x^3)",
-    parameters=(Parameter("k3", "1/rad^2", -100.0, 100.0),),
+    parameters=(Parameter("k3", "1/rad^2", -100.0, 100.0, word="cubic stiffness"),),
     example=(0.1,),
     discriminating_test=(
         "release it again with half the amplitude: the change of frequency must follow its square"
@@ -98,7 +106,7 @@ def cubic_stiffness(motion: Motion, pendulum: Pendulum, k3: float) -> FloatArray
     identifier="quadratic-stiffness",
     name="quadratic restoring torque",
     equation=r"\omega^2 x \to \omega^2 (x + k_2 x^2)",
-    parameters=(Parameter("k2", "1/rad", -30.0, 30.0),),
+    parameters=(Parameter("k2", "1/rad", -30.0, 30.0, word="quadratic stiffness"),),
     example=(0.05,),
     discriminating_test=(
         "turn the sensor round: the second harmonic must change its sign with it, and stay "
@@ -115,7 +123,7 @@ def quadratic_stiffness(motion: Motion, pendulum: Pendulum, k2: float) -> FloatA
     identifier="amplitude-linear-stiffness",
     name="restoring torque with x|x|",
     equation=r"\omega^2 x \to \omega^2 (x + \kappa\, x |x|)",
-    parameters=(Parameter("kappa", "1/rad", -30.0, 30.0),),
+    parameters=(Parameter("kappa", "1/rad", -30.0, 30.0, word="stiffness with x|x|"),),
     rare=True,
     example=(0.05,),
     discriminating_test=(
