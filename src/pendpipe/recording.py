@@ -279,7 +279,7 @@ class Recording:
         if self.unit != "m/s^2" or not self.unit_is_stated or not len(values):
             return
         refuse_if(
-            abs(abs(float(np.median(values))) / _GRAVITY - 1.0) < 0.03,
+            pulls(values),
             place,
             "this is the pull along the string (about 9.8 m/s^2), which swings twice per period",
             "give the axis along the swing, or the gyroscope, with --column (--unit counts takes it"
@@ -324,12 +324,17 @@ class Recording:
         )
 
 
-_GRAVITY: Final = 9.8
-"""Where an accelerometer's axis along the string hangs, m/s^2."""
 _LARGEST: Final = 1e60
 """Of readings, whose fourth powers must be numbers as well; they move by its inverse at least."""
 _SHORTEST_S, _LONGEST_S = 1e-60, 1e14
 """Of a recording. Beyond three million years the search for the period counts false cycles."""
+
+
+def pulls(values: FloatArray) -> bool:
+    """Whether readings in m/s^2 hang at g, as an accelerometer's axis along the string does."""
+    from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
+
+    return abs(abs(float(np.nanmedian(values))) / STANDARD_GRAVITY_M_PER_S2 - 1.0) < 0.03
 
 
 _LEVEL: Final = 0.03

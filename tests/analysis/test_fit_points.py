@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 from scipy.optimize import lsq_linear, minimize
 
 import pendpipe as pp
-from pendpipe.analysis.fit.by_points import GRAVITY, fit_envelope, fit_points
+from pendpipe.analysis.fit.by_points import fit_envelope, fit_points
 from pendpipe.analysis.fit.least_squares import (
     CHI2_95,
     Bounds,
@@ -29,6 +29,7 @@ from pendpipe.cli import main
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.estimate import Estimate
 from pendpipe.physics.decay import amplitude
+from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 from pendpipe.recording import only_falls
 
 # The paper's route: Eq. 14 and Eq. 8's frequency from turning points.
@@ -417,7 +418,7 @@ def test_the_command_takes_period_or_frequency(tmp_path: Path, answer_of: Any) -
 def test_a_length_makes_angles_of_speeds_and_of_positions() -> None:
     """At the bottom v = 2 sqrt(g l) sin(A/2); on a ruler x = l sin A."""
     angle, length = 0.9 * FALL, 0.5
-    speeds = 2.0 * math.sqrt(GRAVITY * length) * np.sin(0.5 * angle)
+    speeds = 2.0 * math.sqrt(STANDARD_GRAVITY_M_PER_S2 * length) * np.sin(0.5 * angle)
     told = {"metadata": {"unit": "m/s"}, "quantity": "reading"}
     gate = pp.Recording(time_s=TIME, values=speeds, **told)
     assert any("--length" in said for said in pp.fit(gate).warnings)

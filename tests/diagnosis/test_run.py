@@ -490,6 +490,18 @@ def test_a_position_is_diagnosed_as_l_sin_x() -> None:
     assert abs(found.baseline.parameters["frequency"].value - 0.5 * omega / math.pi) < 1e-6
 
 
+def test_the_amplitude_of_the_baseline_is_that_of_the_model_with_what_is_missing() -> None:
+    """|y| at the first turning point kept, before the first reading: no half cycle later."""
+    law, time_s = Eq8(4.0, 0.0, 0.0, 0.03, restoring="sine"), np.arange(0.0, 60.0, 0.02)
+    hum = 2e-3 * np.cos(23.0 * time_s) + 2e-4 * np.random.default_rng(1).standard_normal(3000)
+    angle = sample(law, Release(-1e-3, 0.3), time_s) + hum
+    found = pp.diagnose(pp.Recording(time_s, angle, "angle_rad"))
+    before, after = (each.parameters["amplitude"] for each in (found.baseline, found.improved))
+    assert "tone-pickup" in names(found)
+    assert abs(before.value - 0.3) < 4.0 * before.sd
+    assert abs(after.value - 0.3) < 4.0 * after.sd
+
+
 # A wrong prediction, missing physics, or both: distinguished from each other.
 
 

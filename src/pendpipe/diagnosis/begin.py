@@ -120,7 +120,8 @@ def begin(
         friction_jump=2.0 * abs(float(own.friction(value[START], *np.array([0.0, 1.0])))),
         third=abs(angle) ** 3 / 192.0 if torque == "sine" else 0.0,
     )
-    data = replace(data, row=span.indices(len(samples.time_s))[0])
+    row = span.indices(len(samples.time_s))[0]
+    data = replace(data, row=row, turn_s=float(angles.time_s[0]))
     value = with_parts(value, held.parts)
     data = _far_from_the_stop(data, value)
     is_angle = samples.unit in ("rad", "rad/s")

@@ -62,6 +62,8 @@ class Data:
         the others are left out.
     within_rms
         How much the readings of each mean scatter about it, less the motion, over all of them.
+    turn_s
+        When the first turning point kept is, s: its amplitude is that of the decay.
     """
 
     time_s: FloatArray
@@ -79,6 +81,7 @@ class Data:
     row: int = 0
     every: int = 1
     within_rms: float = 0.0
+    turn_s: float = -math.inf
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import GRAVITY
 from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.result import Baseline, FitResult
 from pendpipe.analysis.turning_points import TurningPoints
@@ -52,6 +51,7 @@ from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.losses import drag_form as drag_form_effect
 from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.errors import NotAnalysableError
+from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 from pendpipe.quantities import stretch
 from pendpipe.recording import Recording
 
@@ -142,7 +142,7 @@ def _angle_of(
     from pendpipe.analysis.fit import fit_recording
 
     fit = fit_recording(part, points=points, restoring="sine", place=place)
-    length = GRAVITY / (2.0 * math.pi * fit.value("frequency")) ** 2
+    length = STANDARD_GRAVITY_M_PER_S2 / (2.0 * math.pi * fit.value("frequency")) ** 2
     sine = (motion.values - fit.value("offset")) / length
     step = None if motion.resolution is None else motion.resolution / length
     note = f"read as arcsin(s/L): L = g/ω² = {length:.3f} m"
@@ -387,7 +387,7 @@ def _fitted_model(fit: Fit, found: Hypothesis, law: Fit | None = None) -> Fitted
     # What is left holds all noise, whatever the model.
     noise = max(min(found.noise.rms, left, by_baseline), data.step / 12.0**0.5)
     return FittedModel(
-        parameters_of(law or fit, data.unit),
+        parameters_of(law or fit, data),
         data.rms_of_reading(left),
         data.chi2_per_dof(fit.chi2, len(fit.free)),
         data.rms_of_reading(noise),

@@ -10,12 +10,13 @@ import numpy as np
 from pendpipe.analysis.fit.least_squares import CHI2_95, Bounds, intervals95
 from pendpipe.analysis.fit.result import PARAMETERS, units
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OFFSET, OMEGA, TIME, A, B, C
 from pendpipe.effects.curves import Curve, damping_curve
-from pendpipe.effects.model import Evaluated, Model
+from pendpipe.effects.model import Evaluated
 from pendpipe.estimate import Estimate
 
 _FIRST_CYCLES: Final = 4.0
@@ -25,22 +26,22 @@ _DERIVATIVE_STEP: Final = 1e-3
 _CONSTANTS: Final = {"a": A, "b": B, "c": C, "offset": OFFSET}
 
 
-def parameters_of(fit: Fit, unit: str) -> dict[str, Estimate]:
+def parameters_of(fit: Fit, data: Data) -> dict[str, Estimate]:
     """Return a, b, c, frequency, amplitude, phase and offset, as in ``fit.json``.
 
-    The amplitude is the model's at the first turning point in the readings, the phase that at the
-    first reading.
+    The amplitude is the model's at the first turning point kept, the phase that at the first
+    reading.
     """
-    dress, found, time = units(unit), constants_of(fit, unit), fit.model.time_s
+    dress, found, time = units(data.unit), constants_of(fit, data.unit), fit.model.time_s
     # A model of the first few cycles suffices for the derivatives.
     last = max(time[0], float(fit.value[TIME])) + _FIRST_CYCLES * fit.at.span.period_s
     count = max(int(np.searchsorted(time, last)), _FEWEST_READINGS)
     early = fit.model.at_times(time[:count])
 
     def numbers(value: FloatArray) -> FloatArray:
-        return _numbers(early, early.evaluate(early.settled(value)))
+        return _numbers(early.evaluate(early.settled(value)), data.turn_s)
 
-    amplitude, phase = _numbers(fit.model, fit.at).tolist()
+    amplitude, phase = _numbers(fit.at, data.turn_s).tolist()
     _, (sd, phase_sd) = _with_errors(fit, numbers, constant=tuple(_CONSTANTS.values()))
     found["amplitude"] = Estimate(amplitude, float(sd), dress["amplitude"])
     phase = math.remainder(phase, 2.0 * math.pi)
@@ -67,11 +68,10 @@ def _sds(fit: Fit) -> FloatArray:
     return np.asarray(np.sqrt(np.maximum(np.diag(fit.covariance()), 0.0)))
 
 
-def _numbers(model: Model, at: Evaluated) -> FloatArray:
-    """Return the amplitude of the first turning point, and the phase of the first reading."""
+def _numbers(at: Evaluated, turn_s: float) -> FloatArray:
+    """Return the amplitude of the turning point at a time, and the phase of the first reading."""
     motion, sampled = at.tangent.motion, at.sampled
-    first = int(np.searchsorted(motion.time_s[:, 0], model.time_s[0] - 1e-9))
-    first = min(first, len(motion.time_s) - 1)
+    first = int(np.argmin(np.abs(motion.time_s[:, 0] - turn_s)))
     turned = math.pi if motion.upwards < 0.0 else 0.0
     return np.array([motion.amplitude[first, 0], sampled.phase[0] + turned])
 

@@ -9,6 +9,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.formats.lists import one_way
 from pendpipe.formats.table import Column, periods, swing_of
+from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 
 
 def on_a_circle(x: FloatArray, y: FloatArray, *, named: bool) -> bool:
@@ -56,7 +57,7 @@ def seen_from_pivot(x: Column, y: Column, time_s: FloatArray) -> Seen:
     pivot, weak = pivot_of(left, up), tuple[str, ...]()
     if pivot is None and (better := _better_circle(left, up)) is not None:
         period_s = float(np.median(periods(time_s, left)[0]))
-        length_m = 9.81 * (period_s / (2.0 * np.pi)) ** 2
+        length_m = STANDARD_GRAVITY_M_PER_S2 * (period_s / (2.0 * np.pi)) ** 2
         arms = [float(np.nanmedian(np.hypot(left - a, up - b))) for a, b in ((0.0, 0.0), better)]
         agree = [any(abs(arm * f / length_m - 1.0) < 0.05 for f in _LENGTHS) for arm in arms]
         if not agree[0]:

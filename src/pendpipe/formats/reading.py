@@ -51,6 +51,7 @@ from pendpipe.recording import (
     converter_step,
     find_step,
     is_uniform,
+    pulls,
     read_plain,
     sample_rate,
     sizes_of,
@@ -251,9 +252,7 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
         (missing.any(), f"{missing.sum()} row(s) without a reading, marked missing"),
         (start < 0, f"the times begin at {start:.6g} s, before their zero"),
         (
-            found.unit == "m/s^2"
-            and not found.weak_guesses
-            and abs(abs(float(np.nanmedian(values))) / 9.8 - 1.0) < 0.03,
+            found.unit == "m/s^2" and not found.weak_guesses and pulls(values),
             "the readings hang about 9.8 m/s^2, as a pull along the string does, which swings twice"
             " in a period of the pendulum",
         ),

@@ -7,6 +7,8 @@ from itertools import chain
 from math import pi
 from typing import Final, Literal
 
+from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
+
 Kind = Literal["angle", "volts", "length", "time", "own", "none"]
 
 
@@ -66,8 +68,8 @@ _SPELLINGS: Final[tuple[tuple[Kind, float, str, str], ...]] = (
     ("own", 1e-2, "m/s", "cm/s"),
     ("own", 1e-3, "m/s", "mm/s"),
     ("own", 1.0, "m/s^2", "m/s2 m/s^2 m/s/s m/sec^2 ms-2 m.s-2"),
-    ("own", 9.80665, "m/s^2", "g gn gee"),
-    ("own", 9.80665e-3, "m/s^2", "mg"),
+    ("own", STANDARD_GRAVITY_M_PER_S2, "m/s^2", "g gn gee"),
+    ("own", 1e-3 * STANDARD_GRAVITY_M_PER_S2, "m/s^2", "mg"),
     ("own", 1.0, "pixels", "px pix pixel pixels píxeles"),
     ("own", 1.0, "counts", "count counts cnt cnts tick ticks steps lsb digits bit bits adu"),
     ("own", 1.0, "divisions", "skalenteile skt div divisions"),

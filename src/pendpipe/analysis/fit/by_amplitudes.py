@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pendpipe.analysis.fit.by_points import (
-    GRAVITY,
     fit_envelope,
     numbers_of,
 )
@@ -27,6 +26,7 @@ from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
+from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 from pendpipe.recording import Quantity, Recording, sizes_of
 
 if TYPE_CHECKING:
@@ -142,7 +142,11 @@ def _points_of(recording: Recording, length_m: float | None, place: str | Path) 
     scale = 1.0
     if length_m is not None and unit in ("m", "m/s"):
         # x = l sin y, and v = 2 sqrt(g l) sin(y/2).
-        scale, part = (length_m, 1.0) if unit == "m" else (math.sqrt(GRAVITY * length_m), 2.0)
+        scale, part = (
+            (length_m, 1.0)
+            if unit == "m"
+            else (math.sqrt(STANDARD_GRAVITY_M_PER_S2 * length_m), 2.0)
+        )
         sizes = part * np.arcsin(np.clip(sizes / (part * scale), -1.0, 1.0))
         unit = "rad"
     step = (recording.resolution or 0.0) / scale

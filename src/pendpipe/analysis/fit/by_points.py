@@ -30,6 +30,7 @@ from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.physics.decay import amplitude, amplitude_and_gradient
+from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 
 ENVELOPE: Final = ("a", "b", "c", "amplitude", "level")
 BOUNDS: Final = Bounds(np.array([0.0, 0.0, 0.0, 0.0, -np.inf]), np.full(5, np.inf))
@@ -307,8 +308,6 @@ def numbers_of(
 
 _ROUNDS: Final = 4
 """In which the frequency of small swings and their angles settle."""
-GRAVITY: Final = 9.80665
-"""Standard, m/s^2."""
 
 
 def as_angles(
@@ -336,11 +335,14 @@ def as_angles(
     half = np.diff(points.half_cycle)
     if position:
         apparent = math.tau * points.apparent_frequency_hz
-        length = length_m or GRAVITY / apparent**2
+        length = length_m or STANDARD_GRAVITY_M_PER_S2 / apparent**2
         for _ in range(0 if length_m else _ROUNDS):
             angle = np.arcsin(np.clip(points.amplitude_rad / length, -1.0, 1.0))
             swings = swing_phase(np.abs(angle), "sine") * half
-            length = GRAVITY / (float(np.sum(swings)) / float(np.ptp(points.time_s))) ** 2
+            length = (
+                STANDARD_GRAVITY_M_PER_S2
+                / (float(np.sum(swings)) / float(np.ptp(points.time_s))) ** 2
+            )
         angle = np.arcsin(np.clip(points.angle_rad / length, -1.0, 1.0))
         slope = 1.0 / (length * np.maximum(np.cos(angle), 0.1))
         found = replace(points, angle_rad=angle, angle_sd_rad=points.angle_sd_rad * slope)

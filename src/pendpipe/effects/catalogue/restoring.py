@@ -8,6 +8,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.any_law import Motion
 from pendpipe.effects.effect import Effect, Parameter, Pendulum, Span, enters, other_form
+from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 
 circular_error: Final = other_form(
     __name__,
@@ -29,13 +30,12 @@ circular_error: Final = other_form(
 )
 
 
-_GRAVITY: Final = 9.81
 _LENGTH_SD: Final = 0.2
 """Of ln L about g/omega^2: physical pendulums, and marks that are not at their centre."""
 
 
 def _unlike_a_pendulum(values: FloatArray, span: Span) -> float:
-    length = _GRAVITY / span.pendulum.angular_frequency**2
+    length = STANDARD_GRAVITY_M_PER_S2 / span.pendulum.angular_frequency**2
     return float((0.5 * np.log(max(values[0], 1e-300) * length**2) / _LENGTH_SD) ** 2)
 
 
