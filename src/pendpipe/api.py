@@ -20,6 +20,7 @@ from pendpipe.options import (
     POSITIVE,
     Baseline,
     Fixed,
+    Length,
     Number,
     Option,
     Restoring,
@@ -120,15 +121,10 @@ def fit(
             Number(0, 100),
         ),
     ] = None,
-    length_m: Annotated[
+    length_m: Length = None,
+    gravity: Annotated[
         float | None,
-        Option(
-            "length of a simple pendulum, m, as 0.600 or 0.600(1): gives g, and converts positions"
-            " to angles",
-            "M",
-            measured_number,
-            flag="--length",
-        ),
+        Option("g in m/s^2 of a pendulum: gives the equivalent length", "G", POSITIVE),
     ] = None,
     period: Annotated[
         "float | Estimate | None",
@@ -191,10 +187,15 @@ def fit(
     Next: pendpipe page FILE makes a sheet to hand out; --figure draws it, --json is for programs
     """
     method = None if method == "auto" else method
-    restoring = None if restoring == "auto" else restoring
+    length, given = _measured("length_m", length_m, "m"), _measured("period", period, "s")
+    torque = _torque(restoring, is_pendulum=bool(length or gravity))
+    kept: dict[str, Any] = {
+        "length": length,
+        "gravity": _measured("gravity", gravity, "m/s^2"),
+        "drawn_by": _FIGURES_OF_A_FIT,
+    }
     from pendpipe.analysis.fit import fit_recording, fit_turning_points
     from pendpipe.analysis.fit.by_amplitudes import fit_amplitudes
-    from pendpipe.analysis.fit.by_points import as_angles
     from pendpipe.analysis.fit.result import with_clock, with_scale
     from pendpipe.analysis.free_decay import measure_recording
     from pendpipe.analysis.turning_points import (
@@ -206,68 +207,76 @@ def fit(
     if isinstance(recording, str | Path) and is_turning_points(recording):
         recording = read_turning_points(recording)
     if isinstance(recording, TurningPoints):
-        found = fit_turning_points(recording, restoring=restoring, baseline=baseline, fixed=fixed)
-        return replace(found, name=name or "", drawn_by=_FIGURES_OF_A_FIT)
+        found = fit_turning_points(
+            recording, length=length, restoring=torque, baseline=baseline, fixed=fixed
+        )
+        return replace(found, name=name or "", **kept)
     recording = _source(recording, angle_rad)
     place, motion = name or _place(recording), _motion(recording, volts_per_radian)
     own = "" if isinstance(recording, Recording) else Path(recording).name
     if motion.holds_amplitudes and points is None:
         found = fit_amplitudes(
             motion,
-            period=_given_period(period),
-            length_m=length_m,
+            period=given,
+            length=length,
+            restoring=torque,
             baseline=baseline,
             fixed=fixed,
             place=place,
         )
-        return replace(found, name=own, drawn_by=_FIGURES_OF_A_FIT)
+        return replace(found, name=own, **kept)
     refuse_if(
-        period is not None,
+        given is not None,
         "period",
         "the recording itself shows the period",
         "leave it out (--fix holds it)",
     )
     if points is None:
-        points, decay = measure_recording(motion, place)
+        seen = length.value if length and torque == "sine" else None
+        points, decay = measure_recording(motion, place, length_m=seen)
     else:
         decay = motion.between(points.start_s, points.stop_s)
+    if (length or gravity) and decay.unit not in ("rad", "rad/s", "m"):
+        # How large the swings are nobody knows, and the period does not show it.
+        torque = "linear"
     result = fit_recording(
         decay,
         points=points,
         method=method,
-        restoring=restoring,
+        restoring=torque,
         baseline=baseline,
         fixed=fixed,
-        length_m=length_m,
+        length=length,
         place=place,
     )
     result = result if clock_ppm is None else with_clock(result, clock_ppm)
     result = result if scale_percent is None else with_scale(result, scale_percent)
-    if points.unit != result["amplitude"].unit:
-        # Of its rate, or of a position, the angle was fitted.
-        points, _ = as_angles(points, position=points.unit == "m")
     return replace(
         result,
         cuts=(*(cut._asdict() for cut in points.cuts), *result.cuts),
         name=own,
         decay=decay,
-        drawn_by=_FIGURES_OF_A_FIT,
+        **kept,
     )
 
 
-def _given_period(period: "float | Estimate | None") -> "Estimate | None":
+def _measured(name: str, size: "float | Estimate | None", unit: str) -> "Estimate | None":
+    """A number that is given, with its error or without one."""
     from pendpipe.estimate import Estimate
 
-    if period is None:
+    if size is None:
         return None
-    given = period if isinstance(period, Estimate) else Estimate(float(period), 0.0, "s")
-    refuse_if(
-        not 0.0 < given.value < math.inf,
-        "period",
-        f"{given.value!r} is not a period",
-        "give seconds",
-    )
+    given = replace(size, unit=unit) if isinstance(size, Estimate) else Estimate(size, 0.0, unit)
+    problem = f"{given.value!r} is not a positive number of {unit}"
+    refuse_if(not 0.0 < given.value < math.inf, name, problem, "give another number")
     return given
+
+
+def _torque(restoring: str | None, *, is_pendulum: bool) -> Any:
+    """The torque that is given: who gives the length of a pendulum has said that it is one."""
+    if restoring in (None, "auto"):
+        return "sine" if is_pendulum else None
+    return restoring
 
 
 @checked
@@ -275,6 +284,7 @@ def diagnose(
     recording: Source | Sequence[Source] | Mapping[str, Source],
     *,
     restoring: Restoring = "auto",
+    length_m: Length = None,
     baseline: Baseline = "eq8",
     fixed: Fixed = None,
     volts_per_radian: VoltsPerRadian = None,
@@ -341,9 +351,10 @@ def diagnose(
     from pendpipe.diagnosis.run import diagnose_decay, diagnose_recording
     from pendpipe.diagnosis.several import diagnose_several
 
+    length = _measured("length_m", length_m, "m")
     common: dict[str, Any] = {
         "baseline": baseline,
-        "restoring": None if restoring == "auto" else restoring,
+        "restoring": _torque(restoring, is_pendulum=bool(length)),
         "level": level,
         "seed": seed,
         "provenance": provenance,
@@ -375,7 +386,7 @@ def diagnose(
     common |= {"fixed": fixed, "place": name or _place(recording)}
     motion = _motion(recording, volts_per_radian)
     if points is None:
-        found = diagnose_recording(motion, **common)
+        found = diagnose_recording(motion, length=length, **common)
     else:
         decay = motion.between(points.start_s, points.stop_s)
         found = diagnose_decay(decay, points, whole=motion, **common)

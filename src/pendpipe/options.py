@@ -16,6 +16,7 @@ from functools import wraps
 from pathlib import Path
 from types import UnionType
 from typing import (
+    TYPE_CHECKING,
     Annotated,
     Any,
     Final,
@@ -30,6 +31,9 @@ from typing import (
 )
 
 from pendpipe.errors import InputError, nearest, refuse_if
+
+if TYPE_CHECKING:
+    from pendpipe.estimate import Estimate
 
 Flags = dict[str, dict[str, Any]]
 """Arguments of a command by their names, each with its options; see `arguments.Command.declare`."""
@@ -140,6 +144,15 @@ Fixed: TypeAlias = Annotated[
         " quality_factor_hysteretic, quality_factor_viscous)",
         "NAME=VALUE",
         flag="--fix",
+    ),
+]
+Length: TypeAlias = Annotated[
+    "float | Estimate | None",
+    Option(
+        "length of a simple pendulum, m, as 0.600 or 0.600(1): gives g, and makes positions angles",
+        "M",
+        measured_number,
+        flag="--length",
     ),
 ]
 VoltsPerRadian: TypeAlias = Annotated[float | None, Option(SENSOR, "V", heading=A_GUESS)]

@@ -3,7 +3,7 @@
 import json
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -26,10 +26,9 @@ from pendpipe.analysis.torque import period_excess
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.cli import main
-from pendpipe.dynamics import Eq8, Release, turning_points
+from pendpipe.dynamics import Eq8, Release, sample, turning_points
 from pendpipe.estimate import Estimate
 from pendpipe.physics.decay import amplitude
-from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 from pendpipe.recording import only_falls
 
 # The paper's route: Eq. 14 and Eq. 8's frequency from turning points.
@@ -415,18 +414,46 @@ def test_the_command_takes_period_or_frequency(tmp_path: Path, answer_of: Any) -
     assert found[2]["damping"]["half_life_s"]["value"] == pytest.approx(138.6, rel=0.01)
 
 
-def test_a_length_makes_angles_of_speeds_and_of_positions() -> None:
-    """At the bottom v = 2 sqrt(g l) sin(A/2); on a ruler x = l sin A."""
-    angle, length = 0.9 * FALL, 0.5
-    speeds = 2.0 * math.sqrt(STANDARD_GRAVITY_M_PER_S2 * length) * np.sin(0.5 * angle)
-    told = {"metadata": {"unit": "m/s"}, "quantity": "reading"}
-    gate = pp.Recording(time_s=TIME, values=speeds, **told)
-    assert any("--length" in said for said in pp.fit(gate).warnings)
-    for recording in (gate, pp.Recording(time_s=TIME, displacement_m=length * np.sin(angle))):
-        fit = pp.fit(recording, length_m=length)
-        assert fit["amplitude"].unit == "rad"
-        assert abs(fit["amplitude"].value - 0.9) < 1e-6
-        assert abs(fit["b"].value * TAU - 1.0) < 1e-4
+LENGTH = 0.718
+
+
+def by_hand(law: Eq8, first: float) -> dict[str, pp.Recording]:
+    """A pendulum's turning points of one side: by a level, by a ruler, and its speeds at a gate."""
+    motion = turning_points(law, Release(0.0, first), count=160)
+    time, angle = motion.time_s[::2], motion.angle_rad[::2]
+    fine = np.arange(0.0, float(motion.time_s[-1]), 1e-3)
+    swing = sample(law, Release(0.0, first), fine)
+    at = np.flatnonzero((swing[1:] < 0.0) & (swing[:-1] >= 0.0))
+    speed = LENGTH * (swing[at] - swing[at + 1]) / 1e-3
+    told = {"metadata": {"unit": "m/s", "holds": "amplitudes"}, "quantity": "reading"}
+    return {
+        "level": pp.Recording(time_s=time, angle_rad=angle),
+        "ruler": pp.Recording(time_s=time, displacement_m=LENGTH * np.sin(angle)),
+        "gate": pp.Recording(time_s=fine[at], values=speed, **told),
+    }
+
+
+@pytest.mark.parametrize("way", ["level", "ruler", "gate"])
+@pytest.mark.parametrize("drag", ["energy", "speed"])
+def test_amplitudes_by_hand_are_a_pendulum_s(way: str, drag: Literal["energy", "speed"]) -> None:
+    """The period that is given is that of small swings: g needs no correction, Q has that at y."""
+    omega = math.tau / 1.7
+    law = Eq8(omega, 0.11, 0.001, 0.002, 0.0, "sine", drag)
+    fit = pp.fit(by_hand(law, 0.6)[way], period=1.7, length_m=LENGTH)
+    assert (fit.light, fit.restoring) == ("green", "sine")
+    assert fit["g"].value == pytest.approx(omega**2 * LENGTH)
+    for name, true in {"a": 0.11, "b": 0.003}.items():
+        assert abs(fit[name].value - true) < 2.5 * fit[name].sd + 3e-3 * true
+    cycle = turning_points(law, Release(0.0, 0.5), count=3)
+    loss = math.log(0.5 / abs(float(cycle.angle_rad[2])))
+    seen = math.sqrt(0.5 * abs(float(cycle.angle_rad[2])))
+    assert fit.quality_factor(seen).value == pytest.approx(math.pi / loss, rel=2e-3)
+
+
+def test_speeds_without_a_length_keep_their_unit() -> None:
+    fit = pp.fit(by_hand(Eq8(math.tau / 1.7, 0.0, 0.0, 0.01, 0.0, "sine"), 0.3)["gate"])
+    assert fit["amplitude"].unit == "m/s"
+    assert any("--length" in said for said in fit.warnings)
 
 
 def test_fewer_than_five_amplitudes_are_refused() -> None:

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from scipy.special import ellipe, ellipk
 
+import pendpipe as pp
 from pendpipe import cli
 from pendpipe.analysis.fit import fit_recording
 from pendpipe.analysis.fit.by_points import fit_energies
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.least_squares import covariance
-from pendpipe.analysis.fit.printed import gravity_line
+from pendpipe.analysis.fit.printed import facts, pendulum_of
 from pendpipe.analysis.fit.start import start_values
 from pendpipe.analysis.torque import elliptic, restoring_of, sine_coefficient
 from pendpipe.analysis.turning_points import TurningPoints, find_turning_points
@@ -232,17 +233,71 @@ def test_what_is_held_is_held_with_sin_x() -> None:
         assert result.value("offset") == 0.01
 
 
-@pytest.mark.parametrize("length_m", [0.6, None])
-def test_a_position_swings_as_l_sin_x(length_m: float | None) -> None:
+@pytest.mark.parametrize("length", [Estimate(0.6, 0.0, "m"), None])
+def test_a_position_swings_as_l_sin_x(length: Estimate | None) -> None:
     omega, time = math.sqrt(9.80665 / 0.6), np.arange(0.0, 40.0, 0.01)
     angle = sample(Eq8(omega, viscous=0.01, restoring="sine"), Release(-0.2, 0.5), time)
     noise = 1e-4 * np.random.default_rng(3).standard_normal(len(time))
     recording = Recording(time, 0.6 * np.sin(angle) + 0.02 + noise, "displacement_m")
-    result = fit_recording(recording, restoring="sine", length_m=length_m)
+    result = fit_recording(recording, restoring="sine", length=length)
     assert (result.light, result["amplitude"].unit) == ("green", "rad")
     assert abs(result["frequency"].value - 0.5 * omega / math.pi) < 4.0 * result["frequency"].sd
     assert abs(result["b"].value - 0.01) < 4.0 * result["b"].sd
     assert abs(result["offset"].value - 0.02) < 4.0 * result["offset"].sd
+
+
+# x in these units: 1 m is so many, and so far the period tells it.
+READ_IN = {
+    "m": (1.0, 1e-9),
+    "cm": (100.0, 1e-9),
+    "pixels": (733.0, 1e-3),
+    "m/s^2": (4.9, 3e-3),
+    "no unit: metres": (1.0, 1e-9),
+    "no unit: centimetres": (100.0, 1e-9),
+    "no unit: millimetres": (1000.0, 1e-9),
+    "no unit: its own": (733.0, 1e-3),
+}
+
+
+@pytest.mark.parametrize("unit", READ_IN)
+def test_who_gives_the_length_has_said_that_it_is_a_pendulum(unit: str) -> None:
+    """G and T0 come out, whatever the position is read in: the period tells the scale."""
+    size, known = READ_IN[unit]
+    omega, time = math.sqrt(9.81 / 0.6), np.arange(0.0, 60.0, 0.02)
+    angle = sample(Eq8(omega, viscous=0.01, restoring="sine"), Release(-0.2, 0.5), time)
+    x = 0.6 * np.sin(angle) + 2e-4 * np.random.default_rng(3).standard_normal(len(time))
+    told = {"m": (x, "displacement_m"), "cm": (x, "displacement_m")}
+    values, quantity = told.get(unit, (size * x, "reading"))
+    metadata = {} if "no unit" in unit or unit in told else {"unit": unit}
+    recording = Recording(time, values, quantity, metadata=metadata)  # type: ignore[arg-type]
+    fit = pp.fit(recording, length_m=0.6)
+    assert (fit.restoring, fit.light, fit["amplitude"].unit) == ("sine", "green", "rad")
+    assert abs(fit["period"].value - math.tau / omega) < 4.0 * fit["period"].sd
+    assert abs(fit["g"].value - 9.81) < 4.0 * fit["g"].sd
+    assert fit["g"].sd < 2e-4 * 9.81
+    assert abs(fit["amplitude"].value / 0.5 - 1.0) < 0.01 + known
+
+
+def test_swings_too_small_to_tell_their_size_say_so() -> None:
+    omega, time = math.sqrt(9.81 / 0.6), np.arange(0.0, 60.0, 0.02)
+    angle = sample(Eq8(omega, viscous=0.01, restoring="sine"), Release(-0.2, 0.02), time)
+    noise = 1e-3 * np.random.default_rng(3).standard_normal(len(time))
+    recording = Recording(time, 4.0 * np.sin(angle) + noise, "reading", metadata={"unit": "m/s^2"})
+    fit = pp.fit(recording, length_m=0.6)
+    assert fit.restoring == "linear"
+    assert "of these swings" in str(fit)
+    assert fit["g"].value == pytest.approx(9.81, rel=1e-3)
+
+
+def test_a_length_by_another_g_is_no_cubic_torque() -> None:
+    """L = g/omega^2 by standard gravity is 3e-4 off where g is 9.81: the readings tell it."""
+    omega, time = math.sqrt(9.81 / 0.6), np.arange(0.0, 120.0, 0.02)
+    law = Eq8(omega, 0.004, 0.002, 0.003, restoring="sine")
+    position = 0.6 * np.sin(sample(law, Release(-0.2, 0.6), time))
+    noise = 5e-5 * np.random.default_rng(1).standard_normal(len(time))
+    recording = Recording(time, position + noise, "displacement_m")
+    assert pp.diagnose(recording, restoring="sine").verdict == "consistent"
+    assert pp.diagnose(recording, length_m=0.6).verdict == "consistent"
 
 
 @pytest.mark.parametrize("amplitude", [0.15, 0.35, 1.5])
@@ -267,7 +322,7 @@ def test_a_rate_is_that_of_a_pendulum(amplitude: float) -> None:
         assert low - result[name].sd <= value <= high + result[name].sd
     assert result.noise_rms_rad == pytest.approx(1e-3, rel=0.05)
     # Its length tells g as that of an angle does.
-    g = float(gravity_line(result, length=Estimate(0.4, 0.0, "m")).split()[1].partition("(")[0])
+    g = pendulum_of(replace(result, length=Estimate(0.4, 0.0, "m")))["g"].value
     assert g == pytest.approx(0.4 * OMEGA**2, rel=8.0 * result["frequency"].sd * math.pi / OMEGA)
 
 
@@ -277,8 +332,8 @@ def test_g_of_a_linear_fit_is_that_of_small_swings() -> None:
     law = Eq8(OMEGA, viscous=1e-4, restoring="sine")
     values = sample(law, Release(-0.2, 0.5), time)
     result = fit_recording(recorded(values, time, 1e-3), restoring="linear")
-    line = gravity_line(result, length=Estimate(0.4, 0.0, "m"))
-    assert float(line.split()[1].partition("(")[0]) == pytest.approx(0.4 * OMEGA**2, rel=1e-3)
+    line = dict(facts(replace(result, length=Estimate(0.4, 0.0, "m"))))["g"]
+    assert float(line.partition("(")[0]) == pytest.approx(0.4 * OMEGA**2, rel=1e-3)
     longer = 2.0 * ellipk(math.sin(0.25) ** 2) / math.pi
     said = re.search(r"finite-amplitude correction (\S+) % included", line)
     assert said is not None

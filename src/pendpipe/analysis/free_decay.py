@@ -17,10 +17,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from pendpipe.analysis.angles import as_pendulum
 from pendpipe.analysis.coarse import HARDLY, between
 from pendpipe.analysis.half_cycles import SEEN, HalfCycles, half_cycles, usual_half_period
 from pendpipe.analysis.noise import noise_rms
-from pendpipe.analysis.torque import may_be_sine, sine_coefficient
 from pendpipe.analysis.turning_points.find import find_turning_points
 from pendpipe.analysis.turning_points.table import BEAT, Cut, TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray
@@ -34,8 +34,6 @@ _FALL: Final = 0.3
 _TAIL: Final = 0.05
 _PERIOD: Final = 0.3
 _WAVER: Final = 0.12
-_TELLS: Final = 0.2
-"""Error of the share of sin x up to which a period tells the unit."""
 _FLAT: Final = 0.025
 """Of a swing, within which turning points are the same."""
 _FEW_FLAT: Final = 4
@@ -700,44 +698,12 @@ def _start(time: FloatArray, values: FloatArray, run: Run) -> float:
     return begin if abs(float(values[0]) - expected) < 0.15 * abs(amplitude) else start
 
 
-_ANGLES: Final = {"radians": 1.0, "degrees": math.pi / 180.0, "turns": 2.0 * math.pi}
-
-
-def _as_pendulum(recording: Recording, points: TurningPoints) -> Recording | None:
-    """Take readings of an unknown unit as the angle whose period lengthens so with its swing.
-
-    A step, or a size, tells no unit: only one of them makes the period that of sin x.
-    """
-    if recording.unit != "1" or recording.quantity != "reading":
-        return None
-    agreeing = []
-    for name, factor in _ANGLES.items():
-        angles = replace(
-            points,
-            angle_rad=factor * points.angle_rad,
-            angle_sd_rad=factor * points.angle_sd_rad,
-            unit="rad",
-        )
-        coefficient = sine_coefficient(angles) if may_be_sine(angles) else None
-        if coefficient is not None and coefficient.agrees and coefficient.sd < _TELLS:
-            agreeing.append((name, factor))
-    if len(agreeing) != 1:
-        return None
-    name, factor = agreeing[0]
-    note = f"the period lengthens with the swing as a pendulum's does in {name}: taken to be {name}"
-    step = None if recording.resolution is None else factor * recording.resolution
-    angle = replace(
-        recording,
-        values=factor * recording.values,
-        quantity="angle_rad",
-        resolution=step,
-        notes=(*recording.notes, note),
-    )
-    return angle.as_motion()
-
-
 def measure_recording(
-    recording: Recording, place: str | Path, provenance: Mapping[str, Any] | None = None
+    recording: Recording,
+    place: str | Path,
+    provenance: Mapping[str, Any] | None = None,
+    *,
+    length_m: float | None = None,
 ) -> tuple[TurningPoints, Recording]:
     """Find the free decay of a recording and measure its turning points.
 
@@ -749,6 +715,8 @@ def measure_recording(
         Named in messages.
     provenance
         Goes into the table's head.
+    length_m
+        Length of a simple pendulum, along whose swing an unknown unit is read.
 
     Returns
     -------
@@ -758,7 +726,7 @@ def measure_recording(
     decay = find_free_decay(recording, place)
     part = decay.of(recording)
     points = find_turning_points(part, place)
-    if (told := _as_pendulum(recording, points)) is not None:
+    if (told := as_pendulum(recording, points, length_m)) is not None:
         return measure_recording(told, place, provenance)
     notes = (*decay.notes, *points.notes)
     metadata = {key: str(value) for key, value in (provenance or {}).items() if value is not None}

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from pendpipe import api
 from pendpipe.analysis.fit.fixed import parse_fixed
-from pendpipe.analysis.fit.printed import gravity_line, lines
+from pendpipe.analysis.fit.printed import lines
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.turning_points import is_turning_points, read_turning_points
 from pendpipe.arguments import FILES, Arguments, command, name_of, print_answer, read_motion, tell
@@ -29,7 +29,6 @@ from pendpipe.options import (
     ALTERNATIVES,
     NATURAL,
     OUTPUT,
-    POSITIVE,
     flags,
     flags_of,
     given,
@@ -53,11 +52,6 @@ from pendpipe.report.class_table import Fitted, form_of, printed, together, writ
             "help": "draw decay, residual, and Q against amplitude (.svg, .png, .pdf)",
         }
         | OUTPUT,
-        "--gravity": {
-            "type": POSITIVE,
-            "metavar": "G",
-            "help": "g in m/s^2: prints the equivalent length",
-        },
         "--accept": {
             "action": "store_true",
             "help": "print a law that contradicts the decay, status 0",
@@ -135,10 +129,9 @@ def _fit(arguments: Arguments, say: Callable[[str], None] = tell) -> FitResult:
     fixed = parse_fixed(arguments.fixed, arguments.baseline)
     recording, provenance = read_motion(arguments, quiet=not arguments.verbose, say=say)
     points = arguments.turning_points and read_turning_points(arguments.turning_points)
-    period, frequency, length = arguments.period, arguments.frequency, arguments.length_m
+    period, frequency = arguments.period, arguments.frequency
     options = given(arguments, api.fit) | {
         "fixed": fixed,
-        "length_m": length.value if length else None,
         "scale_percent": _scale_percent(arguments),
         "period": over(1.0, frequency, "s") if frequency else period,
     }
@@ -171,9 +164,6 @@ def _scale_percent(arguments: Arguments) -> float | None:
 def _text(arguments: Arguments, result: FitResult) -> str:
     """The answer in words."""
     printed = lines(result, name=name_of(arguments.file), law=arguments.accept)
-    length, gravity = arguments.length_m, arguments.gravity
-    if length or gravity:
-        printed.insert(-2, gravity_line(result, length=length, gravity=gravity))
     return "\n".join(printed)
 
 

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import as_angles
+from pendpipe.analysis.angles import as_angles
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.result import Baseline, FitResult
 from pendpipe.analysis.fit.start import start_values, usable_span
@@ -87,7 +87,7 @@ def begin(
     readings are angles.
     """
     held = Held(fixed, baseline, points.apparent_frequency_hz)
-    angles, _ = as_angles(points, None, position=False)
+    angles, _ = as_angles(points)
     beats = not fixed and any(note.startswith(BEAT) for note in points.notes)
     torque: Restoring = fit.restoring if fit else restoring_of(angles, stated=stated)
     if beats:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from pendpipe.analysis.angles import scale_of
 from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.result import Baseline, FitResult
 from pendpipe.analysis.turning_points import TurningPoints
@@ -51,8 +52,8 @@ from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.losses import drag_form as drag_form_effect
 from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.errors import NotAnalysableError
-from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
-from pendpipe.quantities import stretch
+from pendpipe.estimate import Estimate
+from pendpipe.quantities import stretch, with_error
 from pendpipe.recording import Recording
 
 
@@ -64,6 +65,7 @@ def diagnose_recording(
     seed: int = 0,
     level: float = LEVEL,
     restoring: Restoring | None = None,
+    length: Estimate | None = None,
     place: str | Path = "recording",
     provenance: Mapping[str, Any] | None = None,
     progress: Progress = silent,
@@ -85,6 +87,8 @@ def diagnose_recording(
     restoring
         The torque, where it is known: ``"linear"`` for a torsion wheel or a mass on a spring, for
         which sin x is no candidate. By default that of the fit.
+    length
+        Of a pendulum whose position is read.
     place
         Named in error messages.
     provenance
@@ -115,9 +119,10 @@ def diagnose_recording(
     check_fixed(fixed or {}, baseline)
     progress("finding the free decay and its turning points")
     motion = recording.as_motion(place=place)
-    points, part = measure_recording(motion, place)
-    if restoring == "sine" and motion.unit == "m":
-        points, part = measure_recording(_angle_of(motion, part, points, place), place)
+    points, part = measure_recording(motion, place, length_m=length.value if length else None)
+    if restoring == "sine" and part.unit == "m":
+        angles, part = measure_recording(_angle_of(part, points, length, place), place)
+        points = replace(angles, cuts=points.cuts)
     for cut in points.cuts:
         progress(f"left out: {stretch(cut.start_s, cut.stop_s)}, {cut.reason}")
     return diagnose_decay(
@@ -136,22 +141,22 @@ def diagnose_recording(
 
 
 def _angle_of(
-    motion: Recording, part: Recording, points: TurningPoints, place: str | Path
+    part: Recording, points: TurningPoints, length: Estimate | None, place: str | Path
 ) -> Recording:
     """The angle arcsin((s - s0)/L) of a pendulum's position s, with the s0 and L of its fit."""
-    from pendpipe.analysis.fit import fit_recording
+    from pendpipe.analysis.fit import fit_recording, fitted_arm
 
-    fit = fit_recording(part, points=points, restoring="sine", place=place)
-    length = STANDARD_GRAVITY_M_PER_S2 / (2.0 * math.pi * fit.value("frequency")) ** 2
-    sine = (motion.values - fit.value("offset")) / length
-    step = None if motion.resolution is None else motion.resolution / length
-    note = f"read as arcsin(s/L): L = g/ω² = {length:.3f} m"
+    arm = fitted_arm(prepare(part, place), points, length, scale_of(part))
+    fit = fit_recording(part, points=points, restoring="sine", length=arm, place=place)
+    sine = (part.values - fit.value("offset")) / arm.value
+    step = None if part.resolution is None else part.resolution / arm.value
+    note = f"read as arcsin(s/L): L = {with_error(arm.value, arm.sd, 'm', short=True)}"
     return replace(
-        motion,
+        part,
         values=np.arcsin(np.clip(sine, -1.0, 1.0)),
         quantity="angle_rad",
         resolution=step,
-        notes=(*motion.notes, note),
+        notes=(*part.notes, note),
     )
 
 

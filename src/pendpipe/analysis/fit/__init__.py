@@ -9,7 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import as_angles, fit_points
+from pendpipe.analysis.angles import arm_of, as_angles, scale_of, seen_along
+from pendpipe.analysis.fit.by_points import fit_points
 from pendpipe.analysis.fit.by_waveform import (
     ODDS,
     Forms,
@@ -19,7 +20,7 @@ from pendpipe.analysis.fit.by_waveform import (
 from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.goodness import LEVEL
 from pendpipe.analysis.fit.printed import period_text
-from pendpipe.analysis.fit.result import Baseline, FitResult, Method, read_fit
+from pendpipe.analysis.fit.result import Baseline, FitResult, Method, read_fit, with_scale
 from pendpipe.analysis.torque import may_be_sine, restoring_of, told_apart
 from pendpipe.analysis.turning_points import BEAT, TurningPoints
 from pendpipe.analysis.turning_points.find import turning_points_of
@@ -27,7 +28,7 @@ from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.dynamics.eq8 import OMEGA, Restoring
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
-from pendpipe.quantities import after_number, pretty_unit
+from pendpipe.quantities import after_number, pretty_unit, with_error
 from pendpipe.recording import Recording
 
 __all__ = ["FitResult", "fit_recording", "read_fit"]
@@ -36,6 +37,8 @@ _STEP: Final = 1.25
 """By which the least amplitude grows, where the smaller ones contradict every law tried."""
 _SURE: Final = 1e9
 """Logarithm of a likelihood ratio beyond which it has no meaning."""
+_FARTHEST: Final = 2.0
+"""Standard deviations by which the readings may move an arm."""
 _MISSED: Final = 0.3
 """Of the first amplitude: a misfit beyond is that of another motion."""
 _LEAST: Final = 0.6
@@ -54,7 +57,7 @@ def fit_recording(
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
     points: TurningPoints | None = None,
-    length_m: float | None = None,
+    length: Estimate | None = None,
     place: str | Path = "recording",
 ) -> FitResult:
     """Fit a, b, c, frequency, amplitude, phase and offset of one free decay.
@@ -75,9 +78,9 @@ def fit_recording(
         Parameters that are held, by name (see `fixed.NAMES`).
     points
         Turning points found before; they are found here when they are not given.
-    length_m
-        Length of the pendulum whose displacement is read, L sin x; by default g/omega^2, which is
-        then among the warnings.
+    length
+        Length of the pendulum whose displacement is read, L sin x; by default that of `arm_of`,
+        which is then among the warnings. Its error enters as that of a scale.
     place
         Named in messages.
 
@@ -97,14 +100,18 @@ def fit_recording(
     check_fixed(fixed or {}, baseline)
     samples = prepare(recording, place)
     points = turning_points_of(samples, place) if points is None else points
-    position, given = restoring == "sine" and samples.unit == "m", length_m
-    points, length_m = as_angles(points, length_m, position=position)
-    if position and given is None:
-        said = f"read as L sin x: L = g/ω² = {length_m:.3f} m (--length)"
+    position = restoring == "sine" and samples.unit == "m"
+    arm = fitted_arm(samples, points, length, scale_of(recording)) if position else None
+    points, _ = as_angles(points, arm, position=position)
+    if arm and not length:
+        size = with_error(arm.value, arm.sd, "m", short=True)
+        said = f"read as L sin x: L = {size}, g/ω² and what the period shows (--length)"
         points = replace(points, notes=(*points.notes, said))
-    stated = recording.unit_is_stated
+    length_m, stated = arm.value if arm else None, recording.unit_is_stated
     result = _fit(samples, method, restoring, baseline, fixed, points, length_m, place, stated)
     result = replace(result, points=points)
+    if arm and arm.sd:
+        result = replace(with_scale(result, 100.0 * arm.sd / arm.value), scale_percent=None)
     beats = [note for note in points.notes if note.startswith(BEAT)]
     if beats:
         # What its turning points lose is no mode's loss.
@@ -131,15 +138,50 @@ def fit_recording(
     return result
 
 
+def fitted_arm(
+    samples: Samples, points: TurningPoints, length: Estimate | None, scale: float
+) -> Estimate:
+    """Fit the arm L of a position L sin x to the readings, about what is known of it.
+
+    Parameters
+    ----------
+    samples, points
+        In metres.
+    length
+        Of the pendulum; by default that of `arm_of`.
+    scale
+        Relative error of the metre, which is one of L.
+    """
+    arm = length or arm_of(points)
+    sd = math.hypot(arm.sd / arm.value, scale)
+    if not sd:
+        return arm
+    at = arm.value * np.array([1.0, 1.0 + sd, 1.0 - sd])
+    middle, *sides = (
+        fitted_waveform(samples, seen_along(points, each), restoring="sine", length_m=each)
+        for each in at.tolist()
+    )
+    if middle is None or None in sides:
+        return replace(arm, sd=sd * arm.value)
+    # The logarithm of the likelihood is a parabola, and so is that of what was known.
+    long, short = (middle.fitted.better_by(each.fitted) for each in sides if each)
+    curvature = max(long + short, 0.0) + 1.0
+    step = min(max(0.5 * (short - long) / curvature, -_FARTHEST), _FARTHEST)
+    moved, sd = 1.0 + step * sd, sd / math.sqrt(curvature)
+    return replace(arm, value=moved * arm.value, sd=sd * arm.value)
+
+
 def fit_turning_points(
     points: TurningPoints,
     *,
+    length: Estimate | None = None,
     restoring: Restoring | None = None,
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
 ) -> FitResult:
     """Fit Eq. 14 to turning points whose readings are not there; see `fit_recording`."""
-    points, _ = as_angles(points)
+    position = restoring == "sine" and points.unit == "m"
+    points, _ = as_angles(points, length, position=position)
     torque = restoring or restoring_of(points)
     found = fit_points(points, baseline=baseline, fixed=fixed, restoring=torque)
     return replace(found, points=points, cuts=tuple(cut._asdict() for cut in points.cuts))

@@ -1,4 +1,4 @@
-"""Eq. 14 on amplitudes alone: a ruler's, or the speeds at a gate, against time.
+"""Losses of amplitudes alone: a ruler's, or the speeds at a gate, against time.
 
 Their times are those at which somebody looked, and show no period: it is given, or there is none.
 """
@@ -6,27 +6,30 @@ Their times are those at which somebody looked, and show no period: it is given,
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import (
-    fit_envelope,
-    numbers_of,
-)
+from pendpipe.analysis.fit.by_points import Decay, EnvelopeFit, fit_envelope, numbers_of
 from pendpipe.analysis.fit.damping import fast_beside
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness
 from pendpipe.analysis.fit.period import Period
 from pendpipe.analysis.fit.result import PARAMETERS, result_of
 from pendpipe.analysis.noise import quantisation_rms
+from pendpipe.analysis.torque import TOP, elliptic
 from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.eq8 import Drag, Restoring
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
+from pendpipe.physics.decay import amplitude_and_gradient
 from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
+from pendpipe.quantities import after_number
 from pendpipe.recording import Quantity, Recording, sizes_of
 
 if TYPE_CHECKING:
@@ -36,18 +39,31 @@ _FEWEST: Final = 5
 """Amplitudes: a, b, c and the first are four numbers."""
 _FINEST: Final = 1e-6
 """Of the first amplitude: no ruler or gate is better."""
+_DRAGS: Final[tuple[Drag, ...]] = ("energy", "speed")
+_SLIGHT: Final = 0.05
+"""Probability below which a description does not widen an interval."""
+_NODES: Final = 2000
+"""Of a decay, to `_LEAST` of the first amplitude: the sums are right to 1e-6."""
+_LEAST: Final = 1e-3
+PLACES: Final = [0, 1, 2, 4]
+"""Of a, b, c and the amplitude among `PARAMETERS`."""
 
 
 def fit_amplitudes(
     recording: Recording,
     *,
     period: Estimate | None = None,
-    length_m: float | None = None,
+    length: Estimate | None = None,
+    restoring: Restoring | None = None,
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
     place: str | Path = "recording",
 ) -> FitResult:
-    """Fit a, b, c and the first amplitude of Eq. 14 to amplitudes against time.
+    """Fit a, b, c and the first amplitude to amplitudes against time.
+
+    Eq. 14, which is first order in the amplitude, where the torque is linear. A pendulum loses in
+    a swing what `pendulum_decay` says, by the division of b and the form of its drag: the numbers
+    are averages over these, and their errors cover what they differ by.
 
     Parameters
     ----------
@@ -55,9 +71,11 @@ def fit_amplitudes(
         Amplitudes, or turning points on both sides in turn.
     period
         Of small swings, s; without it Q and the period are NaN.
-    length_m
-        Of a simple pendulum: speeds in m/s become the angles ``2 arcsin(v/(2 sqrt(g l)))``, and
-        positions in m ``arcsin(x/l)``.
+    length
+        Of a simple pendulum: speeds in m/s become the angles ``2 arcsin(v/(2 omega l))``, and
+        positions in m ``arcsin(x/l)``. By default g/omega^2 of what swings by sin x.
+    restoring
+        The torque; by default that of sin x for angles.
     baseline, fixed
         As for `fit_recording`.
     place
@@ -68,26 +86,49 @@ def fit_amplitudes(
     NotAnalysableError
         If there are fewer than five.
     """
-    points = _points_of(recording, length_m, place)
-    first, step, unit = float(points.angle_rad[0]), points.step_rad, points.unit
     fixed = dict(fixed or {})
     if "frequency" in fixed and period is None:
         period = Estimate(1.0 / fixed["frequency"], 0.0, "s")
     turning = math.tau / period.value if period else math.nan
+    arm, speed = math.nan, math.nan
+    if length or (restoring == "sine" and period):
+        arm = length.value if length else STANDARD_GRAVITY_M_PER_S2 / turning**2
+        speed = arm * turning if period else math.sqrt(STANDARD_GRAVITY_M_PER_S2 * arm)
+    points = _points_of(recording, arm, speed, place)
+    first, step, unit = float(points.angle_rad[0]), points.step_rad, points.unit
+    sine = restoring != "linear" and unit == "rad" and float(np.max(points.angle_rad)) < TOP
+    refuse_if(
+        restoring == "sine" and not sine,
+        place,
+        f"sin x needs angles below pi (the first is {first:.3g}{after_number(unit)})",
+        "give --length with --unit cm, or --restoring linear",
+        NotAnalysableError,
+    )
     held = Held(fixed, baseline, 0.5 * turning / math.pi)
     freedom = max(len(points) - 4 + len(held.envelope.keys() - {"offset"}), 1)
-    rough = fit_envelope(points, held.envelope).residual
-    scatter = max(math.sqrt(float(rough @ rough) / freedom), quantisation_rms(step))
+    share = held.share(fixed.get("b", 0.0))
+    shares = (0.0, 1.0) if share is None else (share,)
+    decays: list[tuple[Drag, Decay]] = [("energy", amplitude_and_gradient)]
+    if sine:
+        decays = [(drag, partial(pendulum_decay, s, drag)) for drag in _DRAGS for s in shares]
+    rough = min((fit_envelope(points, held.envelope, each) for _, each in decays), key=_misfit)
+    left = float(rough.residual @ rough.residual)
+    scatter = max(math.sqrt(left / freedom), quantisation_rms(step))
     sd = max(scatter, _FINEST * first) * _students(freedom)
     points = replace(points, angle_sd_rad=np.full(len(points), sd))
-    envelope = fit_envelope(points, held.envelope)
-    a, b, c = envelope.value[:3].tolist()
+    fits = [(drag, fit_envelope(points, held.envelope, decay)) for drag, decay in decays]
+    drag, envelope = min(fits, key=lambda each: _misfit(each[1]))
     spread = turning * period.sd / period.value if period else math.nan
     times = Period(turning, points.start_s, np.diag([spread**2, 0.0]), math.nan, np.empty(0))
-    value, matrix, intervals = numbers_of(points, envelope, times, 1.0)
+    value, matrix, intervals = _averaged(
+        [numbers_of(points, each, times, 1.0) for _, each in fits],
+        np.exp(-0.5 * np.array([_misfit(each) - _misfit(envelope) for _, each in fits])),
+    )
     phase = PARAMETERS.index("phase")
     value[phase] = matrix[phase] = matrix[:, phase] = math.nan
-    law = held.law(turning if period else fast_beside(a, b, c, first), (a, b, c))
+    a, b, c = value[:3].tolist()
+    omega = turning if period else fast_beside(a, b, c, first)
+    law = replace(held.law(omega, (a, b, c), "sine" if sine else "linear"), drag=drag)
     null = "phase and noise_rms_rad" if period else "frequency, phase and noise_rms_rad"
     said = [
         f"{null} have no finite value: amplitudes show none",
@@ -109,6 +150,7 @@ def fit_amplitudes(
         samples=len(points),
         turning_points=len(points),
         settled=envelope.converged,
+        drag_form="undecided" if sine else "energy",
     )
     quantities: dict[str, Quantity] = {"rad": "angle_rad", "m": "displacement_m"}
     shown = Recording(
@@ -121,6 +163,74 @@ def fit_amplitudes(
     return replace(result, points=points, decay=shown)
 
 
+def _misfit(fit: EnvelopeFit) -> float:
+    return fit.quadratic.chi2
+
+
+Numbers = tuple[FloatArray, FloatArray, list[tuple[float, float]]]
+
+
+def _averaged(each: Sequence[Numbers], weight: FloatArray) -> Numbers:
+    """Average over descriptions: the mean variance, and the spread between them."""
+    weight = weight / weight.sum()
+    values = np.array([value for value, *_ in each])
+    value = weight @ values
+    apart = (values - value)[:, PLACES]
+    matrix = np.einsum("i,ijk->jk", weight, np.array([matrix for _, matrix, _ in each]))
+    matrix[np.ix_(PLACES, PLACES)] += np.einsum("i,ij,ik->jk", weight, apart, apart)
+    kept = [ends for (*_, ends), w in zip(each, weight, strict=True) if w > _SLIGHT]
+    both = [list(zip(*one, strict=True)) for one in zip(*kept, strict=True)]
+    return value, matrix, [(min(low), max(high)) for low, high in both]
+
+
+def pendulum_decay(
+    share: float, drag: Drag, time_s: FloatArray, amplitude0: float, a: float, b: float, c: float
+) -> tuple[FloatArray, FloatArray]:
+    """Amplitude of a pendulum of sin x whose losses in a swing are small, with its derivatives.
+
+    ``sin(y) dy/dt = -E(y)/(2 K)``: a half swing, which lasts 2 K(k)/omega with k = sin(y/2), loses
+    E/omega of the energy ``1 - cos y``. With a, b_h, b_v, c of one E is 4 pi y k^2 (or
+    3 pi (sin y - y cos y) of v|v|), 2 pi y k, 16 (E(k) - (1 - k^2) K(k)) and pi y: at small
+    amplitude Eq. 13.
+
+    Parameters
+    ----------
+    share
+        The hysteretic part of b.
+    drag
+        ``"energy"`` or ``"speed"``.
+    time_s, amplitude0, a, b, c
+        As in `pendpipe.physics.decay.amplitude`; times from the first on.
+
+    Returns
+    -------
+    amplitude, gradient
+        y in rad, shape (n,), and dy/d(y0, a, b, c), shape (n, 4).
+    """
+    y = np.geomspace(amplitude0, _LEAST * amplitude0, _NODES)
+    k2 = np.sin(0.5 * y) ** 2
+    first, second = elliptic(k2)
+    dragged = 4.0 * math.pi * y * k2 if drag == "energy" else _of_speed(y)
+    viscous = 16.0 * (second - (1.0 - k2) * first)
+    linear = share * 2.0 * math.pi * y * np.sqrt(k2) + (1.0 - share) * viscous
+    losses = np.stack([dragged, linear, math.pi * y]) / (2.0 * first * np.sin(y))
+    loss = np.maximum(np.array([a, b, c]) @ losses, 1e-300)
+    parts = np.concatenate([np.ones((1, len(y))), losses / loss]) / loss * y
+    step = math.log(_LEAST) / (1 - len(y))
+    sums = np.zeros(parts.shape)
+    np.cumsum(0.5 * step * (parts[:, 1:] + parts[:, :-1]), axis=1, out=sums[:, 1:])
+    elapsed, *integrals = sums
+    found = np.exp(np.interp(time_s, elapsed, np.log(y)))
+    slopes = [loss / loss[0], *(-loss * each for each in integrals)]
+    return found, np.stack([np.interp(time_s, elapsed, each) for each in slopes], axis=1)
+
+
+def _of_speed(y: FloatArray) -> FloatArray:
+    """3 pi (sin y - y cos y), without the cancellation at small y."""
+    series = y**3 * (1.0 - 0.1 * y**2 * (1.0 - y**2 / 28.0))
+    return np.asarray(math.pi * np.where(y < 0.1, series, 3.0 * (np.sin(y) - y * np.cos(y))))
+
+
 def _students(freedom: int) -> float:
     """By how much wider Student's 95 % interval is than that of a known scatter."""
     from scipy.special import stdtrit
@@ -128,7 +238,9 @@ def _students(freedom: int) -> float:
     return float(stdtrit(freedom, 0.975)) / 1.959964
 
 
-def _points_of(recording: Recording, length_m: float | None, place: str | Path) -> TurningPoints:
+def _points_of(
+    recording: Recording, length: float, speed: float, place: str | Path
+) -> TurningPoints:
     """The amplitudes, as angles where a length makes them so, each known to a hundredth or so."""
     time = recording.time_s[recording.usable]
     sizes, unit = sizes_of(recording.values[recording.usable]), recording.unit
@@ -139,16 +251,13 @@ def _points_of(recording: Recording, length_m: float | None, place: str | Path) 
         f"give {_FEWEST} or more",
         NotAnalysableError,
     )
-    scale = 1.0
-    if length_m is not None and unit in ("m", "m/s"):
-        # x = l sin y, and v = 2 sqrt(g l) sin(y/2).
-        scale, part = (
-            (length_m, 1.0)
-            if unit == "m"
-            else (math.sqrt(STANDARD_GRAVITY_M_PER_S2 * length_m), 2.0)
-        )
+    # x = l sin y, and v = 2 omega l sin(y/2).
+    scale, part = {"m": (length, 1.0), "m/s": (speed, 2.0)}.get(unit, (math.nan, 1.0))
+    if math.isfinite(scale):
         sizes = part * np.arcsin(np.clip(sizes / (part * scale), -1.0, 1.0))
         unit = "rad"
+    else:
+        scale = 1.0
     step = (recording.resolution or 0.0) / scale
     return TurningPoints(
         half_cycle=2 * np.arange(len(time)),

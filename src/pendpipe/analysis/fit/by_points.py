@@ -5,8 +5,8 @@ amplitude: they also tell which torque the half swings favour, and where fits of
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -24,15 +24,15 @@ from pendpipe.analysis.fit.least_squares import (
 )
 from pendpipe.analysis.fit.period import Period, fit_period
 from pendpipe.analysis.fit.result import Baseline, FitResult, result_of
-from pendpipe.analysis.torque import TOP, clear, elliptic, swing_phase
+from pendpipe.analysis.torque import TOP, clear, elliptic
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import Restoring
-from pendpipe.physics.decay import amplitude, amplitude_and_gradient
-from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
+from pendpipe.physics.decay import amplitude_and_gradient
 
 ENVELOPE: Final = ("a", "b", "c", "amplitude", "level")
+Decay = Callable[..., tuple[FloatArray, FloatArray]]
 BOUNDS: Final = Bounds(np.array([0.0, 0.0, 0.0, 0.0, -np.inf]), np.full(5, np.inf))
 
 
@@ -55,7 +55,11 @@ class EnvelopeFit:
         return self.quadratic.chi2 / max(freedom, 1)
 
 
-def fit_envelope(points: TurningPoints, fixed: Mapping[str, float] | None = None) -> EnvelopeFit:
+def fit_envelope(
+    points: TurningPoints,
+    fixed: Mapping[str, float] | None = None,
+    decay: Decay = amplitude_and_gradient,
+) -> EnvelopeFit:
     """Fit a, b, c >= 0 and y0 of Eq. 14 to turning points.
 
     The shared error of the level is a parameter with a prior: it has the alternating
@@ -67,6 +71,8 @@ def fit_envelope(points: TurningPoints, fixed: Mapping[str, float] | None = None
         Turning points with their errors.
     fixed
         Values of a, b, c, amplitude or offset that are held.
+    decay
+        The amplitude at some times by y0, a, b, c, with its derivatives; Eq. 14.
     """
     time = points.time_s - points.time_s[0]
     measured = points.amplitude_rad
@@ -74,7 +80,7 @@ def fit_envelope(points: TurningPoints, fixed: Mapping[str, float] | None = None
 
     def evaluate(value: FloatArray) -> Quadratic:
         a, b, c, y0, level = value
-        model, gradient = amplitude_and_gradient(time, y0, a, b, c)
+        model, gradient = decay(time, y0, a, b, c)
         jacobian = np.concatenate([gradient[:, 1:], gradient[:, :1], shared[:, None]], axis=1)
         if not np.all(np.isfinite(jacobian)):
             return Quadratic(np.inf, np.zeros(5), np.eye(5))
@@ -83,7 +89,7 @@ def fit_envelope(points: TurningPoints, fixed: Mapping[str, float] | None = None
     start, held = _start(points, fixed or {})
     found = minimise(evaluate, start, BOUNDS, held=held)
     a, b, c, y0, level = found.value
-    model = amplitude(time, y0, a, b, c)
+    model = decay(time, y0, a, b, c)[0]
     residual = measured - model - shared * level
     return EnvelopeFit(found.value, found.quadratic, held, model, residual, found.converged)
 
@@ -304,72 +310,3 @@ def numbers_of(
     value: FloatArray = np.array([a, b, c, frequency, amplitude, phase, level])
     ends = intervals95(envelope.value, normal, gradient, BOUNDS, range(3), envelope.held, rates)
     return value, matrix, ends
-
-
-_ROUNDS: Final = 4
-"""In which the frequency of small swings and their angles settle."""
-
-
-def as_angles(
-    points: TurningPoints, length_m: float | None = None, *, position: bool = False
-) -> tuple[TurningPoints, float | None]:
-    """Turning points of the angle, from those of its rate or of a position L sin x.
-
-    Between two extremes of the rate, where the pendulum hangs down, the angle turns: its amplitude
-    there is that of both, 2 arcsin(u/2 omega). The level stays that of the readings.
-
-    Parameters
-    ----------
-    points
-        In rad, rad/s, or m.
-    length_m
-        L; by default g/omega^2.
-    position
-        Whether metres are a pendulum's position.
-
-    Returns
-    -------
-    points, length_m
-        In rad; as they are given where they are neither.
-    """
-    half = np.diff(points.half_cycle)
-    if position:
-        apparent = math.tau * points.apparent_frequency_hz
-        length = length_m or STANDARD_GRAVITY_M_PER_S2 / apparent**2
-        for _ in range(0 if length_m else _ROUNDS):
-            angle = np.arcsin(np.clip(points.amplitude_rad / length, -1.0, 1.0))
-            swings = swing_phase(np.abs(angle), "sine") * half
-            length = (
-                STANDARD_GRAVITY_M_PER_S2
-                / (float(np.sum(swings)) / float(np.ptp(points.time_s))) ** 2
-            )
-        angle = np.arcsin(np.clip(points.angle_rad / length, -1.0, 1.0))
-        slope = 1.0 / (length * np.maximum(np.cos(angle), 0.1))
-        found = replace(points, angle_rad=angle, angle_sd_rad=points.angle_sd_rad * slope)
-        return replace(found, level_sd_rad=points.level_sd_rad / length, unit="rad"), length
-    if points.unit != "rad/s":
-        return points, None
-    rate, paces = points.amplitude_rad, np.diff(points.time_s) / half
-    omega = math.pi / float(np.median(paces))
-    for _ in range(_ROUNDS):
-        angle = 2.0 * np.arcsin(np.clip(0.5 * rate / omega, -1.0, 1.0))
-        omega = float(np.median(swing_phase(np.abs(angle), "sine") / paces))
-    whole = half == 1
-    sd = points.angle_sd_rad / (omega * np.maximum(np.cos(0.5 * angle), 0.1))
-    turned = np.sqrt(np.maximum(angle[1:] * angle[:-1], 0.0)) * points.side[:-1]
-
-    def between(values: FloatArray) -> FloatArray:
-        return np.asarray(0.5 * (values[1:] + values[:-1])[whole])
-
-    return replace(
-        points,
-        half_cycle=points.half_cycle[:-1][whole],
-        time_s=between(points.time_s),
-        time_sd_s=between(points.time_sd_s),
-        angle_rad=turned[whole],
-        angle_sd_rad=between(sd),
-        level_rad=between(points.level_rad),
-        level_sd_rad=points.level_sd_rad / omega,
-        step_rad=points.step_rad / omega,
-        unit="rad",
-    ), None

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendpipe.analysis.angles import READ_AS
 from pendpipe.analysis.fit.consequence import unsure
 from pendpipe.analysis.fit.damping import FALLS, is_extrapolated
 from pendpipe.analysis.fit.quality import LOSSES, SEEN, Quality, period_of_frequency
-from pendpipe.analysis.torque import TOP
+from pendpipe.analysis.torque import TOP, swing_phase
 from pendpipe.analysis.turning_points import BEAT
-from pendpipe.dynamics import Eq8, Release, turning_points
-from pendpipe.errors import refuse_if
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, pretty_unit, stretch, with_error
 
@@ -33,6 +32,7 @@ SHORT: Final = {"a": "drag ~ speed²", "b": "viscous or internal", "c": "dry fri
 _CLOCK: Final = 50e-6
 """By what part a laboratory's clock may well be off."""
 _TIMELESS: Final = "not shown by amplitudes: give --period or --frequency, which also gives Q"
+_OF_AN_ANGLE: Final = "of these swings, small ones are 0.2 % faster at 10°, 0.8 % at 20°"
 _DIAGNOSE: Final = "pendpipe diagnose FILE says what the law lacks"
 
 
@@ -122,6 +122,8 @@ def _remarks(result: FitResult) -> Iterator[str]:
     """What must be known before any number is read."""
     if result.light != "green":
         yield result.light_reason
+    if result.decay is not None and READ_AS in result.decay.metadata:
+        yield f"a guess: {result.decay.metadata[READ_AS]} (--unit)"
     if (other := result.other_frequency) is not None:
         text = period_text(other)
         yield f"as a spring or torsion wheel (--restoring linear) its period would be {text}"
@@ -150,6 +152,8 @@ def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
         large = qualities[0]
         text += f"  ({large.period_s:.5g} s at {short_size(large.amplitude_rad, unit)})"
     if unit == "m/s^2":
+        if result.restoring == "linear":
+            text += f"; {_OF_AN_ANGLE}"
         text += "; twice that, if the axis lies along the string (--column)"
     yield small, text + _widened(wide.period if result.light != "red" else 1.0)
     by_clock = period.sd < _CLOCK * period.value and result.method != "amplitudes"
@@ -171,6 +175,7 @@ def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
         yield "energy goes to", energy(result)
     yield "law", f"−dy/dt = a y² + b y + c: {_law(result)}"
     yield "misfit", misfit(result)
+    yield from _pendulum_line(result)
 
 
 def _widened(factor: float) -> str:
@@ -296,60 +301,55 @@ def following(result: FitResult) -> str:
     return "pendpipe page FILE makes a sheet to hand out; --figure draws it, --json is for programs"
 
 
-def gravity_line(
-    result: FitResult, *, length: Estimate | None = None, gravity: float | None = None
-) -> str:
-    """Print g from the length of a simple pendulum, or its length from g: omega_0^2 = g/l.
+def pendulum_of(result: FitResult) -> dict[str, Estimate]:
+    """Return ``g`` by the length of a simple pendulum, or its ``length`` by g: omega_0^2 = g/l.
 
-    Parameters
-    ----------
-    result
-        A fit of angles.
-    length, gravity
-        The one that is known, m or m/s^2.
-
-    Notes
-    -----
-    With the torque of sin x the fitted omega is omega_0, that of small amplitudes. Otherwise
-    omega_0 = omega 2 K(sin(y/2))/pi at the root-mean-square amplitude y, and the line names this
-    correction. A bob of radius r on a light string adds 2 r^2/(5 l^2) to g, air of density rho
-    rho/rho_bob and more, a string of mass m less than m/(6 M): they are named and not made.
+    With the torque of sin x the fitted omega is omega_0, that of small swings. Otherwise
+    omega_0 = omega 2 K(sin(y/2))/pi at the root-mean-square angle y, where that is known.
     """
-    omega = 2.0 * math.pi * result.value("frequency")
-    relative = 2.0 * result["frequency"].sd / result.value("frequency")
-    corrected = ""
-    if result.restoring == "linear":
-        squares = [quality.amplitude_rad**2 for quality in result.quality_factors]
-        amplitude = math.sqrt(sum(squares) / len(squares)) / _arm(result, omega, length, gravity)
-        release = Release(0.0, min(amplitude, TOP))
-        swing = turning_points(Eq8(1.0, restoring="sine"), release, count=2)
-        factor = float(swing.time_s[1]) / math.pi
-        omega *= factor
-        corrected = f", finite-amplitude correction {100.0 * (factor**2 - 1.0):+.2g} % included"
-    if length is not None:
-        relative = math.hypot(relative, length.sd / length.value)
-        value, name, unit = omega**2 * length.value, "g", "m/s^2"
-        corrected += "; not in it: the finite bob, the string's mass, buoyancy and added mass"
-        if length.sd == 0.0:
-            corrected += "; the length's error, which --length 0.600(1) would give"
+    frequency = result.parameters["frequency"]
+    omega = math.tau * frequency.value * (_lengthening(result) or 1.0)
+    relative = 2.0 * frequency.sd / frequency.value
+    if result.length is not None:
+        value, given, name, unit = omega**2 * result.length.value, result.length, "g", "m/s^2"
+    elif result.gravity is not None:
+        value, given, name, unit = result.gravity.value / omega**2, result.gravity, "length", "m"
     else:
-        assert gravity is not None
-        value, name, unit = gravity / omega**2, "length", "m"
-    return _line(name, with_error(value, relative * value, unit, short=True) + corrected)
+        return {}
+    return {name: Estimate(value, math.hypot(relative, given.sd / given.value) * value, unit)}
 
 
-def _arm(result: FitResult, omega: float, length: Estimate | None, gravity: float | None) -> float:
-    """What an amplitude is divided by to be an angle: 1 of angles, the length of positions."""
-    unit = result["amplitude"].unit
-    refuse_if(
-        unit not in ("rad", "m"),
-        "--length" if length else "--gravity",
-        f"the amplitude is not an angle (its unit is {unit})",
-        "give --unit: its correction needs an angle",
-    )
-    if unit == "rad":
+def _lengthening(result: FitResult) -> float | None:
+    """The swings' period over that of small ones; 1 of the torque of sin x, None of no angle."""
+    if result.restoring == "sine":
         return 1.0
-    return length.value if length else (gravity or 1.0) / omega**2
+    unit, arm = result.parameters["amplitude"].unit, result.length and result.length.value
+    length = {"rad": math.inf, "m": arm}.get(unit)
+    squares = [each.amplitude_rad**2 for each in result.quality_factors]
+    if length is None or not squares:
+        return None
+    size = math.sqrt(sum(squares) / len(squares))
+    angle = size if unit == "rad" else math.asin(min(size / length, 1.0))
+    return float(swing_phase(np.array([min(angle, TOP)] * 2), "sine")[0]) / math.pi
+
+
+def _pendulum_line(result: FitResult) -> Iterator[tuple[str, str]]:
+    """Print g, or the length, and what is not in it.
+
+    A bob of radius r on a light string adds 2 r^2/(5 l^2) to g, air of density rho rho/rho_bob and
+    more, a string of mass m less than m/(6 M): they are named and not made.
+    """
+    for name, found in pendulum_of(result).items():
+        said = "; not in it: the finite bob, the string's mass, buoyancy and added mass"
+        if result.length is not None and result.length.sd == 0.0:
+            said += "; the length's error, which --length 0.600(1) would give"
+        factor = _lengthening(result)
+        if factor is None:
+            said += f"; by T {_OF_AN_ANGLE}"
+        elif factor > 1.0:
+            change = 100.0 * (factor**2 - 1.0)
+            said = f", finite-amplitude correction {change:+.2g} % included{said}"
+        yield name, with_error(found.value, found.sd, found.unit, short=True) + said
 
 
 def _line(title: str, value: str) -> str:

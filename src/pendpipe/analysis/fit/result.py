@@ -16,7 +16,7 @@ from pendpipe.analysis.fit.damping import damping_of, fast_beside
 from pendpipe.analysis.fit.decrement import Check, Light, check_decrement
 from pendpipe.analysis.fit.goodness import LEVEL, Goodness, combined
 from pendpipe.analysis.fit.least_squares import CHI2_95
-from pendpipe.analysis.fit.printed import html, lines
+from pendpipe.analysis.fit.printed import html, lines, pendulum_of
 from pendpipe.analysis.fit.quality import (
     qualities,
     quality_at,
@@ -27,7 +27,7 @@ from pendpipe.analysis.turning_points import TurningPoints, write_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release
 from pendpipe.dynamics.eq8 import Restoring
-from pendpipe.errors import InputError, refuse_if
+from pendpipe.errors import InputError, nearest, refuse_if
 from pendpipe.estimate import Estimate, number, quality_of_rate
 from pendpipe.files import read_json, write_json, writing
 from pendpipe.quantities import compact
@@ -44,7 +44,7 @@ Method = Literal["waveform", "turning-points", "amplitudes"]
 Baseline = Literal["eq8", "viscous"]
 DragForm = Literal["energy", "speed", "undecided"]
 PARTS: Final = ("quality_factor_hysteretic", "quality_factor_viscous")
-OPTIONAL: Final = ("zero_drift", "other_frequency")
+OPTIONAL: Final = ("zero_drift", "other_frequency", "length", "gravity")
 PARAMETERS: Final = ("a", "b", "c", "frequency", "amplitude", "phase", "offset")
 
 
@@ -146,6 +146,8 @@ class FitResult:
     scale_percent
         What the scale of the readings (V/rad, a camera's) may be off by, in percent; None where
         that is not in the errors.
+    length, gravity
+        Of a simple pendulum, where it was given: the other of the two is a number of the fit.
     name
         Of the file that was fitted.
     motion
@@ -191,6 +193,8 @@ class FitResult:
     hysteretic_share: float = 0.5
     clock_ppm: float | None = None
     scale_percent: float | None = None
+    length: Estimate | None = None
+    gravity: Estimate | None = None
     name: str = field(default="", compare=False)
     motion: tuple[Eq8, Release] | None = field(default=None, repr=False, compare=False)
     points: TurningPoints | None = field(default=None, repr=False, compare=False)
@@ -199,6 +203,8 @@ class FitResult:
 
     def __getitem__(self, name: str) -> Estimate:
         """Return one number: a parameter, ``"Q"`` at the amplitude released, or ``"period"``.
+
+        With the length of a pendulum also ``"g"``, with g ``"length"``.
 
         Examples
         --------
@@ -209,7 +215,15 @@ class FitResult:
         """
         if name == "Q":
             return released_quality(self)
-        return self.period if name == "period" else self.parameters[name]
+        if name == "period":
+            return self.period
+        if name in self.parameters:
+            return self.parameters[name]
+        numbers: dict[str, Estimate] = self.numbers()
+        if name not in numbers:
+            remedy = nearest(name, numbers, f"give one of {', '.join(numbers)}")
+            raise InputError(f"fit[{name!r}]", "there is no such number", remedy)
+        return numbers[name]
 
     period = property(small_period)
     quality_factors = cached_property(qualities)
@@ -332,7 +346,7 @@ class FitResult:
 
     def numbers(self) -> dict[str, Estimate]:
         """Return every number of the fit by its name; see `to_frame`."""
-        found = {**self.parameters, "period": self.period}
+        found = {**self.parameters, "period": self.period, **pendulum_of(self)}
         unit, limit = self.parameters["amplitude"].unit, self.quality_factor_limit
         shares: dict[str, Estimate] = {}
         for each in self.quality_factors:
