@@ -280,13 +280,7 @@ def _waveform(
     is_spring = for_spring > ODDS or no_pendulum
     if spring is not None and spring.minimum.converged and is_spring:
         spring_forms = forms if first == "linear" else others or fitted(restoring="linear")
-        found, words = result(spring_forms, "linear"), for_spring / math.log(10.0)
-        # How far out the noise goes nobody has tested.
-        ratio = f"10^{words:.0f}" if words < 12.0 else "10^12 or more"
-        said = (
-            f"x fits better than sin x by a likelihood ratio of {ratio}: a spring or torsion wheel"
-        )
-        return replace(found, torque_odds=for_spring, warnings=(*found.warnings, said))
+        return replace(result(spring_forms, "linear"), torque_odds=for_spring)
     found = result(forms if first == "sine" else others or fitted(restoring="sine"), "sine")
     found = replace(found, torque_odds=-for_spring)
     if spring is None or for_spring < -ODDS or not spring.minimum.converged:

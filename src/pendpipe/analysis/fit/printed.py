@@ -122,6 +122,11 @@ def _remarks(result: FitResult) -> Iterator[str]:
     """What must be known before any number is read."""
     if result.light != "green":
         yield result.light_reason
+    if result.restoring == "linear" and result.torque_odds is not None:
+        digits = result.torque_odds / math.log(10.0)
+        # How far out the noise goes nobody has tested.
+        ratio = f"10^{digits:.0f}" if digits < 12.0 else "10^12 or more"
+        yield f"x fits better than sin x, {ratio} to 1: a spring or torsion wheel, no pendulum"
     if result.decay is not None and READ_AS in result.decay.metadata:
         yield f"a guess: {result.decay.metadata[READ_AS]} (--unit)"
     if (other := result.other_frequency) is not None:
