@@ -412,3 +412,10 @@ def test_a_pull_along_the_string_is_refused(level: float, unit: str, refused: bo
         return
     with pytest.raises(InputError, match=r"twice per period; give the axis along the swing"):
         phone.as_motion()
+
+
+def test_a_number_that_a_fit_has_not_is_answered_with_those_that_it_has() -> None:
+    fit = pp.fit("examples/rod-pendulum.csv", gravity=9.81)
+    assert fit["length"].value == pytest.approx(9.81 * (fit["period"].value / (2.0 * np.pi)) ** 2)
+    with pytest.raises(pp.InputError, match=r"there is no such number; give one of a, b, c"):
+        print(fit["Z"])

@@ -328,8 +328,8 @@ def _lengthening(result: FitResult) -> float | None:
     """The swings' period over that of small ones; 1 of the torque of sin x, None of no angle."""
     if result.restoring == "sine":
         return 1.0
-    unit, arm = result.parameters["amplitude"].unit, result.length and result.length.value
-    length = {"rad": math.inf, "m": arm}.get(unit)
+    unit = result.parameters["amplitude"].unit
+    length = {"rad": math.inf, "m": result.length.value if result.length else None}.get(unit)
     squares = [each.amplitude_rad**2 for each in result.quality_factors]
     if length is None or not squares:
         return None

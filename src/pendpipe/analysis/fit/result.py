@@ -216,7 +216,7 @@ class FitResult:
         if name == "Q":
             return released_quality(self)
         if name == "period":
-            return self.period
+            return small_period(self)
         if name in self.parameters:
             return self.parameters[name]
         numbers: dict[str, Estimate] = self.numbers()
