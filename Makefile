@@ -19,7 +19,7 @@ test: .venv/installed
 
 # The pages in docs/ as HTML in docs/_build; their commands are executed, warnings are errors.
 docs: .venv/installed-docs
-	$(RUN) sphinx-build -q -W --keep-going -b html -d docs/_build/doctrees docs docs/_build/html
+	$(RUN) sphinx-build -q -W --keep-going -j $(CORES) -b html -d docs/_build/doctrees docs docs/_build/html
 	@echo "docs/_build/html/index.html"
 
 report: .venv/installed

@@ -9,23 +9,22 @@ of them has written. A command that fails is an error of the build. `command-hel
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
+from contextlib import redirect_stdout, suppress
 from pathlib import Path
 from typing import Any, ClassVar
+from unittest.mock import patch
 
 from docutils import nodes
 from docutils.parsers.rst import directives
 from sphinx.util.docutils import SphinxDirective
 
 ROOT = Path(__file__).parents[2]
-LONGEST_S = 300
-"""No command of a page may take longer."""
-_SCRATCH: list[tempfile.TemporaryDirectory[str]] = []
-"""Folders of the pages, removed when the build ends."""
 
 
 def _environment() -> dict[str, str]:
@@ -43,12 +42,11 @@ class _Executed(SphinxDirective):
     @property
     def folder(self) -> Path:
         """The scratch folder of this page, made at its first block."""
-        folders = self.env.temp_data.setdefault("scratch", {})
-        if "this" not in folders:
-            _SCRATCH.append(tempfile.TemporaryDirectory(prefix="pendpipe-docs-"))
-            folders["this"] = Path(_SCRATCH[-1].name)
-            shutil.copytree(ROOT / "examples", folders["this"], dirs_exist_ok=True)
-        return Path(folders["this"])
+        if "scratch" not in self.env.temp_data:
+            made = tempfile.TemporaryDirectory(prefix="pendpipe-docs-")
+            self.env.temp_data["scratch"] = made
+            shutil.copytree(ROOT / "examples", made.name, dirs_exist_ok=True)
+        return Path(self.env.temp_data["scratch"].name)
 
     def done(self, command: list[str] | str) -> str:
         """Run a command; return what it printed, or fail the build."""
@@ -59,7 +57,6 @@ class _Executed(SphinxDirective):
             env=_environment(),
             capture_output=True,
             text=True,
-            timeout=LONGEST_S,
             check=False,
         )
         if ran.returncode:
@@ -125,13 +122,20 @@ class CommandHelp(_Executed):
 
     def run(self) -> list[nodes.Node]:
         """Show the help of each."""
-        from pendpipe.cli import COMMANDS, STAGES
+        from pendpipe.cli import COMMANDS, STAGES, main
 
         sections: list[nodes.Node] = []
         for name in [*COMMANDS, *STAGES]:
             section = nodes.section(ids=[nodes.make_id(f"command-{name}")])
             section += nodes.title("", "", nodes.literal("", name))
-            section += self.block(self.done(f"pendpipe {name} --help"), "text")
+            # argparse prints it and ends the program.
+            with (
+                redirect_stdout(io.StringIO()) as said,
+                suppress(SystemExit),
+                patch.dict(os.environ, _environment()),
+            ):
+                main([name, "--help"])
+            section += self.block(said.getvalue().rstrip(), "text")
             sections.append(section)
         return sections
 
@@ -156,8 +160,15 @@ class Catalogue(SphinxDirective):
         return self.parse_text_to_nodes(catalogue_manual().partition("\n")[2])
 
 
+def _remove_scratch(app: Any, doctree: nodes.document) -> None:
+    """The page has been read, and what its blocks have written is shown or copied."""
+    if "scratch" in app.env.temp_data:
+        app.env.temp_data["scratch"].cleanup()
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Add the directives."""
+    app.connect("doctree-read", _remove_scratch)
     for name, directive in {
         "run": Run,
         "run-python": RunPython,
