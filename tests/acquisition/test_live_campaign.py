@@ -8,7 +8,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 import pytest
 
+from pendpipe import manifest
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.raw import RawWriter, read_raw
 from pendpipe.cli import main
@@ -41,6 +42,10 @@ simulated: null
 typical_record: null
 diagnose: {{enabled: false}}
 """
+
+
+LIVE: Final = "record.live"
+"""The chunk of the live record."""
 
 
 @contextmanager
@@ -68,20 +73,10 @@ class LiveCampaign:
         Where it is made.
     port, duration_s
         What the live record is recorded from, and for how long.
-    stage, chunks
-        Up to which stage records are asked for, and which: the live one, by default both.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        port: str,
-        duration_s: float,
-        stage: str = "acquire",
-        chunks: tuple[str, ...] = ("record.live", "all"),
-    ) -> None:
+    def __init__(self, folder: Path, port: str, duration_s: float) -> None:
         self.folder = folder
-        self.stage, self.chunks = stage, chunks
         self.results = folder / "results"
         self.recording = self.results / "live/recording.csv"
         time_s = np.arange(0.0, 10.0, 1 / 60)
@@ -105,31 +100,29 @@ class LiveCampaign:
         """The raw files of the live record, by name."""
         return {path.name: path.read_bytes() for path in self.results.glob("live/raw/*")}
 
-    def command(self, *arguments: str) -> list[str]:
-        """The call of Snakemake that runs the stage of the records."""
-        done = f"{self.results}/chunks/{self.stage}"
+    def words(self, chunk: str = LIVE, stage: str = "acquire") -> list[str]:
+        """The command of the job that does a stage for a chunk."""
+        done = self.results / f"chunks/{stage}-{chunk}.json"
+        done.unlink(missing_ok=True)  # as Snakemake does before the job
+        campaign = str(self.folder / "config.yaml")
+        return ["stage", stage, "--campaign", campaign, "--chunk", chunk, "--out", str(done)]
+
+    def job(self, *chunk_and_stage: str) -> int:
+        """Do a stage for a chunk, and return the job's status."""
+        return main(self.words(*chunk_and_stage))
+
+    def snakemake(self) -> list[str]:
+        """The call of Snakemake that runs the live record up to its turning points."""
         return [
             *(sys.executable, "-m", "snakemake", "--cores", "2", "--nolock"),
-            *("--configfile", str(self.folder / "config.yaml"), *arguments, "--"),
-            *(f"{done}-{chunk}.json" for chunk in self.chunks),
+            *("--configfile", str(self.folder / "config.yaml"), "--"),
+            f"{self.results}/chunks/turning-points-{LIVE}.json",
         ]
-
-    def run(self, *arguments: str, library: Path | None = None) -> subprocess.CompletedProcess[str]:
-        """Run Snakemake to its end, with another copy of the library if one is given."""
-        environment = os.environ | ({"PYTHONPATH": str(library)} if library else {})
-        return subprocess.run(
-            self.command(*arguments),
-            cwd=ROOT,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
 
     def kill_at(self, recorded_s: float) -> None:
         """Run Snakemake, and kill it with all its jobs when so much has been recorded."""
         process = subprocess.Popen(
-            self.command(),
+            self.snakemake(),
             cwd=ROOT,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -165,42 +158,58 @@ pytestmark = pytest.mark.slow
 LINK = "pty" if hasattr(os, "openpty") else "socket"
 """Both kinds of line are those of `test_sessions`."""
 DURATION_S = 2.0
-ALONE = ("record.live",)
 LONG_S = 8.0
 """Of a recording that is broken off, so that a busy machine does not end it before."""
 
 
-def test_neither_changed_code_nor_force_records_again(tmp_path: Path) -> None:
+@pytest.fixture
+def forced(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Force stages, as a run hands it on to its jobs."""
+    monkeypatch.setenv(manifest.RUN, "")
+    return lambda *stages: manifest.hand_on(anew=stages, repaired={})
+
+
+def test_neither_changed_code_nor_force_records_again(
+    tmp_path: Path, forced: Callable[..., None]
+) -> None:
     """With the device gone, everything is made from the raw file, byte for byte."""
     with served_process(tmp_path, LINK) as (_, port):
-        campaign = LiveCampaign(tmp_path, port, DURATION_S, chunks=ALONE)
-        done = campaign.run()
-        assert done.returncode == 0, done.stderr
+        campaign = LiveCampaign(tmp_path, port, DURATION_S)
+        assert campaign.job() == 0
     recording, raw = campaign.recording.read_bytes(), campaign.raw_files
     assert len(read_plain(campaign.recording)) == 60 * DURATION_S
     assert len(raw) == 1
-    done = campaign.run(library=changed_library(tmp_path))
+    done = subprocess.run(
+        [sys.executable, "-m", "pendpipe.cli", *campaign.words()],
+        env=os.environ | {"PYTHONPATH": str(changed_library(tmp_path))},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     assert f"live: {60 * DURATION_S:g} samples" in done.stdout
     assert campaign.recording.read_bytes() == recording
     # Another length and another port in the table are no request to record either.
     campaign.connect("no-such-port", 2 * DURATION_S)
-    assert campaign.run("--forceall").returncode == 0
+    forced("acquire")
+    assert campaign.job() == 0
     assert campaign.recording.read_bytes() == recording
     assert campaign.raw_files == raw
     # Even a recording that has lost its raw file is never given up.
     for path in campaign.results.glob("live/raw/*"):
         path.unlink()
-    assert campaign.run("--forceall").returncode == 0
+    assert campaign.job() == 0
     assert campaign.recording.read_bytes() == recording
 
 
 def test_a_killed_campaign_uses_what_was_recorded(tmp_path: Path) -> None:
     with served_process(tmp_path, LINK) as (_, port):
-        campaign = LiveCampaign(tmp_path, port, 600.0, "turning-points", ALONE)
+        campaign = LiveCampaign(tmp_path, port, 600.0)
         campaign.kill_at(0.7 * DURATION_S)
         raw = campaign.raw_files
-        done = campaign.run()
+        done = subprocess.run(
+            campaign.snakemake(), cwd=ROOT, capture_output=True, text=True, check=False
+        )
     assert done.returncode == 0, done.stderr
     assert campaign.raw_files == raw
     recording = read_plain(campaign.recording)
@@ -213,53 +222,52 @@ def test_a_killed_campaign_uses_what_was_recorded(tmp_path: Path) -> None:
     assert (campaign.results / "live/turning_points.csv").stat().st_size > 500
 
 
-def test_a_dead_line_fails_its_job_alone_and_the_next_run_tries_again(tmp_path: Path) -> None:
+def test_a_dead_line_fails_its_job_alone_and_the_next_tries_again(tmp_path: Path) -> None:
     # Nobody listens there, and nobody else can: the name of a terminal, or of a socket that was
     # closed, is given to the next device of any test.
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         port = f"socket://127.0.0.1:{silent.getsockname()[1]}"
         campaign = LiveCampaign(tmp_path, port, DURATION_S)
-        done = campaign.run()
-    assert done.returncode == 1
+        assert campaign.job() != 0
+        assert campaign.job("all") == 0
     assert port in (campaign.results / "live/logs/acquire.log").read_text()
     assert (campaign.results / "file/recording.csv").exists()
     assert not campaign.recording.exists()
     assert not (campaign.results / "live/refused.json").exists()
     with served_process(tmp_path, LINK) as (_, port):
         campaign.connect(port, 1.0)
-        done = campaign.run()
-    assert done.returncode == 0, done.stderr
+        assert campaign.job() == 0
     assert len(read_plain(campaign.recording)) == 60
 
 
-def test_a_line_that_is_lost_fails_its_job_and_the_next_run_records_anew(tmp_path: Path) -> None:
+def test_a_line_that_is_lost_fails_its_job_and_the_next_records_anew(tmp_path: Path) -> None:
     with served_process(tmp_path, LINK) as (device, port):
         campaign = LiveCampaign(tmp_path, port, LONG_S)
-        running = subprocess.Popen(
-            campaign.command(), cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        job = subprocess.Popen(
+            [sys.executable, "-m", "pendpipe.cli", *campaign.words()], stderr=subprocess.DEVNULL
         )
-        while running.poll() is None and campaign.recorded_s() < 0.5:
+        while job.poll() is None and campaign.recorded_s() < 0.5:
             time.sleep(0.02)
         device.kill()
-        assert running.wait() == 1
+        assert job.wait() == 1
     log = (campaign.results / "live/logs/acquire.log").read_text()
     assert f"s of {LONG_S:g} s are kept in" in log.splitlines()[-1]
     assert "Traceback" not in log
-    assert (campaign.results / "file/recording.csv").exists()
     assert not campaign.recording.exists()
     first = campaign.raw_files
     assert len(first) == 1
     with served_process(tmp_path, LINK) as (_, port):
         campaign.connect(port, 1.0)
-        done = campaign.run()
-    assert done.returncode == 0, done.stderr
+        assert campaign.job() == 0
     assert first.items() < campaign.raw_files.items()
     assert len(read_plain(campaign.recording)) == 60
 
 
-def test_what_is_kept_of_a_lost_line_is_a_recording_once_it_is_accepted(tmp_path: Path) -> None:
-    campaign = LiveCampaign(tmp_path, "gone", LONG_S, "calibrate", ALONE)
+def test_what_is_kept_of_a_lost_line_is_a_recording_once_it_is_accepted(
+    tmp_path: Path, forced: Callable[..., None]
+) -> None:
+    campaign = LiveCampaign(tmp_path, "gone", LONG_S)
     codes = np.rint(9000.0 * np.cos(0.3 * np.arange(120))).astype(np.int64)
     header = {"model": "DI-2108", "port": "gone", "channels": [1], "rate_hz": 60.0}
     header |= {"duration_s": LONG_S, "recorded_at": "2026-01-01T00:00:00+00:00"}
@@ -273,8 +281,8 @@ def test_what_is_kept_of_a_lost_line_is_a_recording_once_it_is_accepted(tmp_path
     call = ["acquire", "--campaign", str(tmp_path / "config.yaml"), "--record", "live"]
     assert main([*call, "--accept-short"]) == 0
     recording = campaign.recording.read_bytes()
-    done = campaign.run("--forceall")
-    assert done.returncode == 0, done.stderr
+    forced("acquire", "calibrate")
+    assert [campaign.job(LIVE, stage) for stage in ("acquire", "calibrate")] == [0, 0]
     assert campaign.recording.read_bytes() == recording
     assert list(campaign.raw_files) == ["1.raw"]
     kept_s = read_plain(campaign.recording).time_s[-1]
