@@ -12,9 +12,9 @@ import pytest
 
 from pendpipe.cli import main
 from pendpipe.configuration.jobs import prepare_environment
-from pendpipe.configuration.load import read_records
+from pendpipe.configuration.load import load_campaign, read_configuration, read_records
 from pendpipe.project import SNAKEFILE
-from pendpipe.stages.chunks import batch_for, split
+from pendpipe.stages.chunks import STAGES, batch_for, chunks_of, plan, split
 
 # The workflow runs in any folder: begun by `init`, run by `campaign`, or used as a module.
 
@@ -111,7 +111,6 @@ def test_a_campaign_that_was_begun_runs_to_its_report(begun: Path) -> None:
     assert any("did you mean 'rod-pendulum.csv'?" in line for line in lines), "of the lost file"
     assert "fit: 1 done" in lines
     assert "1 of 3 records were refused" in lines[-1]
-    assert not jobs(call(begun, "pendpipe", "campaign", "-n"))
     assert not sprung.exists(), sprung.read_text()
     alone = call(begun, "pendpipe", "campaign", "-n", "--record", "rod", "--", "--forcerun", "fit")
     assert jobs(alone) == dict.fromkeys(RECORDS_STAGES, 1) | {"all": 1, "total": 5}
@@ -129,6 +128,7 @@ def test_a_line_a_stage_hides_no_fault(begun: Path) -> None:
 
 
 def test_the_workflow_is_a_module_of_others(begun: Path) -> None:
+    """Rules under other names; no hook of a workflow is run."""
     begun.joinpath("Snakefile").write_text(
         f"""
 configfile: "config/config.yaml"
@@ -142,21 +142,23 @@ rule all:
 """,
         encoding="utf-8",
     )
-    counted = jobs(call(begun, "snakemake", "-n", "--quiet", "rules"))
-    assert counted["pendpipe_fit"] == 1
-    assert counted["pendpipe_report"] == 1
+    records = begun / "config/records.tsv"
+    records.write_text("record\tsource\nrod\trecordings/rod-pendulum.csv\n", encoding="utf-8")
     targets = ("results/chunks/fit-all.json", "results/records.csv")
-    jobs(call(begun, "snakemake", "--cores", "2", *targets))
+    ran = jobs(call(begun, "snakemake", "--cores", "2", *targets))
+    names = {f"pendpipe_{name}" for name in (*RECORDS_STAGES, "records")}
+    assert set(ran) == names | {"total"}
     fit, table = begun / "results/rod/fit.json", begun / "results/records.csv"
     made, before = fit.stat().st_ino, (fit.read_bytes(), table.read_bytes())
     for path in (fit, table):
         path.write_bytes(path.read_bytes()[:-5])
     done = call(begun, "snakemake", "--cores", "2", *targets)
     assert set(jobs(done)) == {"pendpipe_fit", "pendpipe_records", "total"}
-    assert (fit.read_bytes(), table.read_bytes()) == before, "without the hooks of a workflow"
+    assert (fit.read_bytes(), table.read_bytes()) == before
     assert len(list(fit.parent.glob("fit.json.damaged-*"))) == 1
-    assert not jobs(call(begun, "snakemake", "-n", *targets))
-    jobs(call(begun, "snakemake", "--cores", "2", targets[0], "--forcerun", "pendpipe_fit"))
+    forced = ("--forcerun", "pendpipe_fit")
+    ran = jobs(call(begun, "snakemake", "--cores", "2", targets[0], *forced))
+    assert set(ran) == {"pendpipe_fit", "total"}, "all else is done"
     assert fit.stat().st_ino != made, "made again, under the name that the rule has here"
 
 
@@ -210,7 +212,7 @@ def test_what_is_wrong_is_said_before_snakemake_starts(
     assert said in line
 
 
-def test_a_row_says_how_its_file_is_read(begun: Path) -> None:
+def test_a_row_says_how_its_file_is_read(begun: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A comma, a unit and a part that the reader is told of; the fit's torque too."""
     lines = (begun / "recordings/rod-pendulum.csv").read_text(encoding="utf-8").splitlines()
     rows = [line.split(",") for line in lines if line[:1].isdigit()]
@@ -221,8 +223,13 @@ def test_a_row_says_how_its_file_is_read(begun: Path) -> None:
         "comma\trecordings/comma.csv\tmm\t,\t20\tlinear\n",
         encoding="utf-8",
     )
-    done = call(begun, "pendpipe", "campaign", "--record", "comma")
-    assert done.returncode == 0, done.stdout + done.stderr
+    monkeypatch.chdir(begun)
+    campaign = load_campaign(read_configuration("config/config.yaml"), "config/config.yaml")
+    for stage in ("acquire", "calibrate", "turning-points", "fit"):
+        out = STAGES[stage].path(campaign, "all")
+        out.parent.mkdir(parents=True, exist_ok=True)
+        words = ["stage", stage, "--campaign", "config/config.yaml", "--chunk", "all"]
+        assert main([*words, "--out", str(out)]) == 0
     fit = json.loads((begun / "results/comma/fit.json").read_text(encoding="utf-8"))
     assert fit["parameters"]["amplitude"]["unit"] == "m"
     assert fit["restoring"] == "linear"
@@ -266,47 +273,43 @@ def test_the_default_campaign_has_a_job_a_chunk_in_each_of_its_stages(tmp_path: 
     assert total == 5 * jobs_of_stage + len(counted)
 
 
-def test_records_of_one_pendulum_have_a_job_together(tmp_path: Path) -> None:
-    header, *rows = (ROOT / "tests/workflow/small/records.tsv").read_text().splitlines()
-    width = header.count("\t")
-    names = ["brass", "brass", "alone", *[""] * (len(rows) - 3)]
-    lines = [
-        row + "\t" * (width - row.count("\t") + 1) + name
-        for row, name in zip(rows, names, strict=True)
-    ]
-    table = tmp_path / "records.tsv"
-    table.write_text("\n".join([f"{header}\tpendulum", *lines]) + "\n")
-    done = dry_run(
-        tmp_path / "results",
-        *("--configfile", "tests/workflow/small/config.yaml"),
-        override=f"records={table.as_posix()}",
-    )
-    assert jobs(done)["diagnose_pendulum"] == 1
-
-
 def test_a_source_of_any_name_stops_no_other_record(tmp_path: Path) -> None:
-    """Its own job reads it, or refuses the record."""
+    """Its own job reads it, or refuses the record. Records of one pendulum have a job together."""
     (tmp_path / "folder").mkdir()
     names = ["a{b}.csv", "{.csv", "b{.csv", "folder", "x" * 300, "none.csv"]
     names += [] if sys.platform == "win32" else ["a<b>.csv", "a*b.csv"]
     for name in names[:3] + names[6:]:
         (tmp_path / name).write_text("time_s,angle_rad\n0.0,0.1\n")
     table, configuration = tmp_path / "records.tsv", tmp_path / "config.yaml"
-    rows = (f"record-{n}\t{tmp_path.as_posix()}/{name}\n" for n, name in enumerate(names))
-    table.write_text("record\tsource\n" + "".join(rows))
+    pendulums = ["brass", "brass", "alone", *[""] * len(names)]
+    rows = (
+        f"record-{n}\t{tmp_path.as_posix()}/{name}\t{pendulum}\n"
+        for n, (name, pendulum) in enumerate(zip(names, pendulums, strict=False))
+    )
+    table.write_text("record\tsource\tpendulum\n" + "".join(rows))
     configuration.write_text(
         f"title: Odd\nrecords: {table.as_posix()}\nresults: x\napparatus: null\n"
         "calibration: null\nsimulated: null\ntypical_record: null\n"
     )
-    done = dry_run(tmp_path / "results", "--configfile", str(configuration))
-    assert jobs(done)["acquire"] == chunks(table)
+    counted = jobs(dry_run(tmp_path / "results", "--configfile", str(configuration)))
+    assert counted["acquire"] == chunks(table)
+    assert counted["diagnose_pendulum"] == 1
 
 
-def test_recordings_of_others_need_no_file_for_a_dry_run(tmp_path: Path) -> None:
+def test_recordings_of_others_need_no_file_for_a_plan(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """On a clean checkout there is no ../shared; the records are then refused, one by one."""
-    done = dry_run(tmp_path / "results", "--configfile", "benchmarks/shared_recordings.yaml")
-    table = ROOT / "benchmarks/shared_recordings.tsv"
-    assert jobs(done)["acquire"] == chunks(table)
+    monkeypatch.chdir(ROOT)
+    name = "benchmarks/shared_recordings.yaml"
+    content = read_configuration(name) | {"results": (tmp_path / "results").as_posix()}
+    campaign = load_campaign(content, name)
+    planned = {
+        chunk: [plan(campaign, stage, chunk, records).found for stage in STAGES.values()]
+        for chunk, records in chunks_of(campaign).items()
+    }
+    assert len(planned) == chunks(ROOT / "benchmarks/shared_recordings.tsv")
+    assert not any(found.damages for of_chunk in planned.values() for found in of_chunk)
 
 
 def test_a_faulty_configuration_stops_before_any_job(tmp_path: Path) -> None:

@@ -74,11 +74,6 @@ class Campaign:
         """Count the jobs that Snakemake would run."""
         return jobs_in(self.snakemake("-n", *arguments, library=library))
 
-    def assert_nothing_planned(self, library: Path | None = None) -> None:
-        """Nothing is to be done; where something is, Snakemake's reasons are the message."""
-        said = self.snakemake("-n", library=library)
-        assert not jobs_in(said), said
-
     @property
     def chunks(self) -> int:
         """In how many jobs a stage does the records."""
@@ -96,6 +91,13 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     campaign = Campaign(tmp_path_factory.mktemp("campaign"))
     campaign.snakemake()
     return campaign
+
+
+def copied_library(folder: Path) -> Path:
+    """A copy of the library, for a run of its own."""
+    ignore = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(LIBRARY / "pendpipe", folder / "src/pendpipe", ignore=ignore)
+    return folder / "src"
 
 
 def pull(number: dict[str, float], truth: float) -> float:
@@ -274,56 +276,27 @@ def test_a_campaign_of_refused_records_ends_with_its_figures_places(
     assert json.loads((results / "campaign.json").read_text())["theory_factor"] is None
 
 
-def test_a_lost_result_is_made_again(campaign: Campaign) -> None:
-    """Snakemake knows what the job of a chunk leaves, and no record's files."""
-    names = ("calibration.json", "diagnosis/diagnosis.json")
-    lost = [campaign.results / "air-07" / name for name in names]
-    for path in lost:
-        path.rename(path.with_name("lost"))
-    try:
-        planned = campaign.planned()
-    finally:
-        for path in lost:
-            path.with_name("lost").rename(path)
-    assert planned["calibrate"] == planned["diagnose"] == 1
-
-
-def test_forcing_the_fit_reruns_it_and_what_follows(campaign: Campaign) -> None:
-    planned = campaign.planned("--forcerun", "fit")
-    assert planned["fit"] == campaign.chunks
-    assert planned["separate"] == planned["compare"] == planned["report"] == 1
-    assert not {"acquire", "calibrate", "turning_points", "diagnose"} & set(planned)
-
-
-def test_an_added_row_runs_the_jobs_of_its_chunk_and_the_campaigns(campaign: Campaign) -> None:
+def test_an_added_row_and_a_changed_library_rerun_what_they_concern(
+    campaign: Campaign, tmp_path: Path
+) -> None:
+    """A row its chunk and the campaign's jobs; a change of the fit all fits and what follows."""
+    library = copied_library(tmp_path)
+    with (library / "pendpipe/analysis/fit/by_waveform.py").open("a") as source:
+        source.write("# changed\n")
     before = campaign.records.read_text(encoding="utf-8")
     row = "water-high-3\tsimulated\twater\thigh\thigh-3\t\t\t\t\t20.0\n"
     unsplit = campaign.chunks
     campaign.records.write_text(before + row, encoding="utf-8")
     try:
-        planned, split_in = campaign.planned(), 1 + campaign.chunks - unsplit
+        planned, chunks = campaign.planned(library=library), campaign.chunks
     finally:
         campaign.records.write_text(before, encoding="utf-8")
-    for stage in ("acquire", "calibrate", "turning_points", "fit", "diagnose"):
-        assert planned[stage] == split_in < campaign.chunks
+    for stage in ("acquire", "calibrate", "turning_points"):
+        assert planned[stage] == 1 + chunks - unsplit < chunks
+    assert planned["fit"] == chunks
     for stage in ("separate", "compare", "figures", "report"):
         assert planned[stage] == 1
-
-
-def test_a_finished_campaign_has_nothing_to_do_until_its_library_changes(
-    campaign: Campaign, tmp_path: Path
-) -> None:
-    """A change of the fit reruns the fits and what follows; an untouched copy nothing."""
-    library = tmp_path / "src"
-    ignore = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(LIBRARY / "pendpipe", library / "pendpipe", ignore=ignore)
-    campaign.assert_nothing_planned(library)
-    with (library / "pendpipe/analysis/fit/by_waveform.py").open("a") as source:
-        source.write("# changed\n")
-    planned = campaign.planned(library=library)
-    assert planned["fit"] == campaign.chunks
-    assert planned["separate"] == planned["compare"] == planned["report"] == 1
-    assert not {"acquire", "caliper", "calibrate", "turning_points"} & set(planned)
+    assert "caliper" not in planned
 
 
 def test_the_results_name_no_path_of_the_machine(campaign: Campaign) -> None:
@@ -340,8 +313,10 @@ def damage(path: Path, change: Callable[[bytes], bytes]) -> None:
     os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
 
 
-def test_damaged_results_are_named_and_made_again(campaign: Campaign) -> None:
-    """Torn, emptied and altered with their old times: the next run ends as the first."""
+def test_damaged_results_are_named_and_made_again_and_nothing_else_is(
+    campaign: Campaign, tmp_path: Path
+) -> None:
+    """Torn, emptied, lost, altered with their old times: the next run ends as the first."""
     damages: dict[str, Callable[[bytes], bytes]] = {
         "air-03/recording.csv": lambda content: content[: len(content) // 2],
         "water-low-4/fit.json": lambda content: content.replace(b"1", b"2", 1),
@@ -352,21 +327,29 @@ def test_damaged_results_are_named_and_made_again(campaign: Campaign) -> None:
         "separation.json": lambda content: content[:0],
         "campaign.json": lambda content: content[:-2],
     }
+    # Snakemake knows what the job of a chunk leaves, and no record's files.
+    lost = ("air-07/calibration.json", "air-07/diagnosis/diagnosis.json")
     before = (campaign.results / "campaign.json").read_bytes()
     source = campaign.folder / NO_DECAY.name
     source_before = (source.read_bytes(), source.stat().st_mtime_ns)
     for name, change in damages.items():
         damage(campaign.results / name, change)
+    for name in lost:
+        (campaign.results / name).unlink()
     planned = campaign.snakemake("-n")
     assert not list(campaign.results.rglob("*.damaged-*")), "a dry run moves nothing"
     ran = campaign.snakemake()
-    for name in damages:
+    for name in (*damages, *lost):
         assert f"{campaign.results.name}/{name}: " in planned
         assert f"{campaign.results.name}/{name}: " in ran
-        assert len(list(campaign.results.glob(f"{name}.damaged-*"))) == 1
+        assert (campaign.results / name).exists()
+        aside = campaign.results.glob(f"{name}.damaged-*")
+        assert len(list(aside)) == (0 if name in lost else 1)
     assert (campaign.results / "campaign.json").read_bytes() == before
     assert (source.read_bytes(), source.stat().st_mtime_ns) == source_before
-    campaign.assert_nothing_planned()
+    # A copy of the library is the same library.
+    said = campaign.snakemake("-n", library=copied_library(tmp_path))
+    assert not jobs_in(said), said
 
 
 def test_a_job_that_reads_a_damaged_result_says_so_and_writes_none(
