@@ -1,7 +1,7 @@
 # Everything lives in .venv/; nothing else is installed. The README has the same steps for
 # a machine without make.
 .DELETE_ON_ERROR:
-.PHONY: campaign test docs report bench evidence integrity proof check clean wheel
+.PHONY: campaign test quick docs report bench evidence integrity proof check clean wheel
 
 SHELL := bash
 PYTHON ?= python3
@@ -16,6 +16,10 @@ campaign: .venv/installed
 
 test: .venv/installed
 	$(RUN) pytest -q -n $(CORES)
+
+# What to run while you work: all but the tests of more than two seconds of processor.
+quick: .venv/installed
+	$(RUN) pytest -q -n $(CORES) -m "not slow"
 
 # The pages in docs/ as HTML in docs/_build; their commands are executed, warnings are errors.
 docs: .venv/installed-docs

@@ -1,14 +1,15 @@
 """What all tests share: examples of hypothesis depend on the code alone, and not on its speed.
 
-``--hypothesis-profile=untimed`` draws new ones.
+``--hypothesis-profile=untimed`` draws new ones. Of each test its processor time is known, that of
+the processes that it has waited for as well: a busy machine makes no test slow.
 """
 
 import importlib.util
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import pytest
 from hypothesis import settings
@@ -25,6 +26,42 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files with slow tests come first: no process waits for another, or makes a campaign twice."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: item.path not in slow)
+
+
+SLOW_S: Final = 2.0
+"""Processor seconds from which on a test carries the mark `slow`."""
+MARGIN: Final = 2.0
+"""A processor whose other thread is busy, or that is half as fast, takes so many times as long."""
+
+
+def cpu_s() -> float:
+    """Processor time of this process and of those that it has waited for."""
+    return sum(os.times()[:4])
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
+    """Note a test's processor time, without that of what its fixtures share."""
+    began = cpu_s()
+    try:
+        return (yield)
+    finally:
+        item.user_properties.append(("cpu_s", cpu_s() - began))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Name the tests that should carry the mark `slow`: ``pytest -m "not slow"`` is to be quick."""
+    passed = terminalreporter.getreports("passed")
+    took = {
+        one.nodeid: dict(one.user_properties)["cpu_s"]
+        for one in passed
+        if one.when == "call" and "slow" not in one.keywords
+    }
+    for name, seconds in sorted(took.items()):
+        if seconds > MARGIN * SLOW_S:
+            terminalreporter.line(
+                f"{name}: {seconds:.1f} s of processor: mark it slow", yellow=True
+            )
 
 
 @pytest.fixture(scope="session")

@@ -78,6 +78,7 @@ def recorder(tmp_path: Path) -> Iterator[Recorder]:
     running.process.wait()
 
 
+@pytest.mark.slow
 def test_nothing_that_happens_to_the_view_costs_a_scan(recorder: Recorder) -> None:
     """A browser that asks and takes no answer, a viewer that stands still, one that is killed."""
     recorder.until(lambda: recorder.data()["scans"] > 200)

@@ -76,6 +76,7 @@ def test_eq_17_at_the_papers_record() -> None:
     assert found.estimate("hysteretic_quality", number).value == pytest.approx(1049.0, abs=1.0)
 
 
+@pytest.mark.slow
 def test_pulls_of_every_number_are_normal() -> None:
     """Over campaigns whose inputs are off by what the configuration states."""
     design, count = default(0.0), 30

@@ -193,6 +193,7 @@ def truth_of(
     return make_item(recipe, np.random.default_rng(seed)).truth
 
 
+@pytest.mark.slow
 def test_the_oracle_finds_and_names_a_large_effect_and_no_null() -> None:
     single = truth_of(11, "sensor-cubic", sizes=(400.0,), own_form=True)
     oracle = single["oracle"]
@@ -205,6 +206,7 @@ def test_the_oracle_finds_and_names_a_large_effect_and_no_null() -> None:
     assert sum(null["detected"] for null in nulls) <= 1
 
 
+@pytest.mark.slow
 def test_a_class_ends_where_the_likelihood_has_fallen_by_exp_minus_3() -> None:
     oracle = truth_of(3, "frequency-drift", sizes=(100.0,), own_form=True)["oracle"]
     best = oracle["scores"][oracle["named"]]
@@ -212,6 +214,7 @@ def test_a_class_ends_where_the_likelihood_has_fallen_by_exp_minus_3() -> None:
     assert oracle["class"][: len(inside)] == inside
 
 
+@pytest.mark.slow
 def test_a_cancelling_pair_hides_itself() -> None:
     pair = truth_of(
         2,

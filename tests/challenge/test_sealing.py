@@ -217,6 +217,7 @@ def test_an_interrupted_set_goes_on_and_the_ledger_misses_nothing(tmp_path: Path
     assert sets.entered(ledger, "another") == set()
 
 
+@pytest.mark.slow
 def test_the_same_seed_makes_the_same_file_of_what_a_laboratory_knows_and_no_more() -> None:
     first, second = (make_item(NULL, np.random.default_rng([7, 1])) for _ in range(2))
     assert first.text == second.text

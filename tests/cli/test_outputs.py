@@ -187,6 +187,7 @@ def test_a_diagnosis_leaves_the_users_figures_alone(
     assert [path.name for path in folder.iterdir()] == ["decay.svg"]
 
 
+@pytest.mark.slow
 def test_the_front_door_goes_the_same_way(given: dict[str, Path], tmp_path: Path) -> None:
     fit = pp.fit(given["recording"])
     fit.save(tmp_path / "fit")

@@ -67,7 +67,12 @@ CAMPAIGN = re.compile(r"^pendpipe campaign\b", re.MULTILINE)
 
 
 @pytest.mark.parametrize(
-    "page", [README, *sorted((README.parent / "docs").glob("*.md"))], ids=lambda page: page.name
+    "page",
+    [
+        pytest.param(README, marks=pytest.mark.slow),
+        *sorted((README.parent / "docs").glob("*.md")),
+    ],
+    ids=lambda page: page.name,
 )
 def test_the_commands_of_the_pages_run(page: Path, tmp_path: Path) -> None:
     """Those that need an instrument have options that there are; CI does what the set-up says.

@@ -71,6 +71,7 @@ for name in {modules!r}:
 """
 
 
+@pytest.mark.slow
 def test_every_module_imports_without_the_posix_modules() -> None:
     modules = [
         found.name

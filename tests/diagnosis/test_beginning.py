@@ -365,6 +365,7 @@ def test_a_fit_of_displacements_is_the_same_fit(name: str, view: str) -> None:
     fits_agree(name, METRES["as it is"], METRES[view])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "view"),
     [
@@ -380,6 +381,7 @@ def test_a_diagnosis_of_angles_is_the_same_diagnosis(name: str, view: str) -> No
     diagnoses_agree(name, View(), VIEWS[view])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["equilibrium-step", "frequency-drift"])
 def test_a_diagnosis_of_displacements_is_the_same_diagnosis(name: str) -> None:
     diagnoses_agree(name, METRES["as it is"], METRES["slow"])

@@ -437,6 +437,7 @@ def test_the_noise_is_that_of_a_reading_whatever_was_averaged(rate_hz: float) ->
     assert left["chi2_per_dof"] == pytest.approx(1.0, abs=2.0 * within)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [45.0, 120.0])
 def test_so_it_is_beside_an_effect(rate_hz: float) -> None:
     plain = simulated(rate_hz, amplitude=0.1)
@@ -457,6 +458,7 @@ def test_a_drag_that_follows_the_speed_is_fitted_and_presumed() -> None:
     assert abs(fit["a"].value - 0.02) < 4.0 * fit["a"].sd
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "spoilt",
     [
@@ -521,6 +523,7 @@ def test_a_wrong_loss_is_no_drift_and_comes_out_right(factor: float) -> None:
     assert abs(found.value - TRUTH[B]) < 4.0 * found.sd
 
 
+@pytest.mark.slow
 def test_two_wrong_losses_are_not_an_unnamed_third() -> None:
     given = {"a": 0.5 * float(TRUTH[A]), "c": 2.0 * float(TRUTH[C])}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
@@ -536,6 +539,7 @@ def test_of_several_predictions_the_wrong_one_is_reported() -> None:
     assert names(outcome) == {"parameter-a"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("excess", [5.5e-4, 5e-3])
 def test_a_wrong_frequency_and_circular_error_are_both_reported(excess: float) -> None:
     """The one shifts the frequency throughout, the other with the amplitude's square."""

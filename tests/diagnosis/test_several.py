@@ -75,6 +75,7 @@ def test_shared_values_are_better_known_than_in_the_best_recording() -> None:
     assert found.to_dict()["improved"]["parameters"]["c"]["sd"] < best
 
 
+@pytest.mark.slow
 def test_a_torque_that_is_known_is_that_of_all() -> None:
     pair = [swing(amplitude, 7).between(0.0, 40.0) for amplitude in (0.05, 0.4)]
     springs = pp.diagnose(pair, volts_per_radian=1.0, together=True, restoring="linear")
@@ -91,6 +92,7 @@ def test_each_release_is_predicted_from_the_others_within_its_band() -> None:
         assert f" {100 * within:.0f} % of {each['name']} " in found.details
 
 
+@pytest.mark.slow
 def test_amplitudes_exclude_a_drift_that_one_recording_cannot_tell_from_cubic_damping() -> None:
     found = together("cubic")
     largest = found.alone[-1].missing[0]
@@ -128,6 +130,7 @@ def test_derivatives_of_two_recordings_are_those_of_each_by_what_it_has() -> Non
         assert np.linalg.norm(error) < 0.025 * np.linalg.norm(found[:, index]), index
 
 
+@pytest.mark.slow
 def test_recording_with_another_damping_is_named_with_its_value() -> None:
     found = together("odd")
     effect = found.missing[0]

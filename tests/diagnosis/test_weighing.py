@@ -143,6 +143,7 @@ def test_a_pendulum_is_one_though_its_torque_is_off_by_less_than_a_hundredth() -
     assert other <= own
 
 
+@pytest.mark.slow
 def test_a_pendulum_over_a_magnet_is_a_pendulum_beside_the_curve() -> None:
     """Without the curve of the magnet's torque others would seem likelier than sin x."""
     values = np.append(np.where(TRUTH == 0.15, 0.3, TRUTH), [1.0, -0.5, 0.05])
@@ -162,6 +163,7 @@ def test_a_curve_that_fits_better_does_not_lower_a_name() -> None:
     assert named > drawn
 
 
+@pytest.mark.slow
 def test_a_curve_without_a_name_takes_nothing_from_the_law() -> None:
     """A pull that no entry of the catalogue describes: a, b, c and f are those of Eq. 8 alone."""
     outcome = diagnose_recording(recording(pulled(0.5, 0.03), 3), restoring="linear")

@@ -38,6 +38,7 @@ def small(example: Any, tmp_path: Path) -> tuple[dict[str, Any], Path]:
     return {**example.content, "records": records}, tmp_path
 
 
+@pytest.mark.slow
 def test_every_figure_is_there_as_svg_and_png_however_many_processes_draw(
     small: tuple[dict[str, Any], Path], tmp_path: Path
 ) -> None:
@@ -103,6 +104,7 @@ def test_recordings_of_others_have_their_decays_only(small: tuple[dict[str, Any]
     assert "refused" in drawn.left_out["gone, decay"]
 
 
+@pytest.mark.slow
 def test_the_command_draws_and_says_what_it_left_out(
     small: tuple[dict[str, Any], Path], example: Any, answer_of: Any
 ) -> None:

@@ -247,6 +247,7 @@ def outcome(path: Path, sample: Sample) -> tuple[str, str]:
     return ("right", "") if exact else ("guess", said)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [SEED])
 def test_no_dialect_is_read_wrong_in_silence(tmp_path: Path, seed: int) -> None:
     random = Random(seed)

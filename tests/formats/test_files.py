@@ -240,6 +240,7 @@ def test_what_is_packed_is_counted_before_it_is_there(
     assert peak_bytes < most_bytes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "said"),
     [
