@@ -77,17 +77,21 @@ class Estimate:
 
         return with_error(self.value, self.sd, self.unit)
 
+    @property
+    def is_limit(self) -> bool:
+        """Whether it is no larger than its error and may be zero: then its upper limit is known."""
+        return self.at_bound or (self.bounds95[0] <= 0.0 and self.value < self.sd)
+
     def or_limit(self, *, short: bool = True) -> str:
-        """Print it, or its upper limit where it is no larger than its error and may be zero.
+        """Print it, or its upper limit where it `is_limit`.
 
         >>> Estimate(0.0, 0.001, "1/s", (0.0, 0.002), at_bound=True).or_limit()
         '< 0.002 s⁻¹'
         """
         from pendpipe.quantities import with_error
 
-        low, high = self.bounds95
-        if self.at_bound or (low <= 0.0 and self.value < self.sd):
-            return f"< {with_error(float(f'{high:.2g}'), None, self.unit)}"
+        if self.is_limit:
+            return f"< {with_error(float(f'{self.bounds95[1]:.2g}'), None, self.unit)}"
         return with_error(self.value, self.sd, self.unit, short=short)
 
 

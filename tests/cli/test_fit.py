@@ -1,5 +1,6 @@
 """The commands that fit and print."""
 
+import csv
 import io
 import json
 import math
@@ -13,6 +14,7 @@ import pytest
 
 import pendpipe as pp
 from pendpipe import cli, manifest
+from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.quantities import with_error
 from pendpipe.recording import write_plain
 
@@ -59,8 +61,8 @@ def test_several_recordings_make_one_table_and_a_bad_one_stops_nothing(
     assert "1.14547" in rows[1]
     assert ") s " in rows[1]
     assert "rad⁻¹ s⁻¹" in rows[1]
-    assert "4.21°" in rows[1]
-    assert "61.8(3.2) % viscous" in rows[1]
+    assert "4.94°" in rows[1]
+    assert "64.6(3.5) % viscous" in rows[1]
     assert rows[-1] == "2 fitted, 0 red, 1 refused"
     assert "mean" not in captured.out, "1.15 and 2.01 s: of two values none is the class's"
     assert str(bad) in captured.err
@@ -114,6 +116,81 @@ def test_the_files_of_a_class_that_agree_are_put_together(tmp_path: Path, answer
     mean = together["T0"]["mean"]
     assert abs(mean["value"] - 1.0 / 0.7) < 4.0 * mean["sd"]
     assert together["T0"]["p_value"] > 1e-3
+
+
+TIME = np.arange(0.0, 60.0, 0.02)
+NOISE = 1e-3 * np.random.default_rng(1).standard_normal(len(TIME))
+OF_A_CLASS = {
+    "wheel": Eq8(4.0, 0.0, 0.0, 0.01, 0.0),
+    "pendulum": Eq8(4.0, 0.0, 0.0, 0.01, 0.0, "sine"),
+    "shorter": Eq8(4.01, 0.0, 0.0, 0.01, 0.0, "sine"),
+}
+
+
+@pytest.fixture
+def of_a_class(tmp_path: Path) -> list[str]:
+    """A torsion wheel, two pendulums that are not one, and amplitudes read with a ruler."""
+    for name, law in OF_A_CLASS.items():
+        angle = sample(law, Release(-0.2, 0.6), TIME) + NOISE
+        write_plain(tmp_path / f"{name}.csv", pp.Recording(time_s=TIME, angle_rad=angle))
+    ruler = "".join(f"{t},{20.0 * math.exp(-0.01 * t):.2f}\n" for t in range(0, 200, 10))
+    (tmp_path / "ruler.csv").write_text(f"t (s),A (cm)\n{ruler}")
+    return [str(tmp_path / f"{name}.csv") for name in (*OF_A_CLASS, "ruler")]
+
+
+def test_t_of_a_spring_is_not_called_t0_and_pendulums_that_differ_have_no_mean(
+    of_a_class: list[str], tmp_path: Path, answer_of: Any
+) -> None:
+    out = tmp_path / "class.csv"
+    said = answer_of(["fit", *of_a_class, "--out", str(out)]).out.splitlines()
+    wheel, pendulum, shorter, ruler = csv.DictReader(out.read_text().splitlines())
+    assert (wheel["T0_s"], pendulum["T_s"]) == ("", "")
+    assert float(wheel["T_s"]) == pytest.approx(math.tau / 4.0, rel=1e-5)
+    assert float(shorter["T0_s"]) == pytest.approx(math.tau / 4.01, rel=1e-5)
+    assert float(pendulum["a_limit95"]) > 0.0
+    assert [row.split()[2] for row in said[1:4]] == ["T", "T0", "T0"]
+    assert "T0: 2 files scatter by" in "\n".join(said)
+    assert "mean of" not in "\n".join(said)
+    # The ruler's row holds what the fit of the ruler alone says.
+    alone = pp.fit(of_a_class[3])
+    half = alone.damping()["half_life_s"].value
+    assert (ruler["light"], ruler["T0_s"], ruler["Q"]) == (alone.light, "", "")
+    assert float(ruler["half_life_s"]) == pytest.approx(half) == pytest.approx(69.3, rel=0.01)
+    assert "to 1/2 in 69.3" in said[4]
+    asked = answer_of(["fit", *of_a_class, "--mean"]).out
+    assert "T0: mean of 2 files" in asked
+
+
+def test_a_table_in_latex_keeps_losses_and_remarks(
+    of_a_class: list[str], tmp_path: Path, answer_of: Any
+) -> None:
+    out = tmp_path / "class.tex"
+    answer_of(["fit", *of_a_class, str(refused_file(tmp_path)), "--out", str(out)])
+    text = out.read_text(encoding="utf-8")
+    assert "viscous or internal" in text
+    assert "loses most by" in text
+    assert " & refused & " in text
+    assert "samples only" in text
+
+
+def test_q_is_one_number_in_text_json_table_and_python(answer_of: Any) -> None:
+    """That at the release."""
+    fit = pp.fit(STRING)
+    written = json.loads(answer_of(["fit", STRING, "--json"]).out)["quality_factors"][0]
+    assert written["value"] == fit["Q"].value == fit.quality_factor(fit["amplitude"].value).value
+    number = with_error(fit["Q"].value, fit["Q"].sd, short=True)
+    assert f"  Q                     {number} at " in str(fit)
+    assert f"  {number}  " in answer_of(["fit", STRING, ROD]).out
+
+
+def test_a_page_takes_the_options_of_the_fit(
+    of_a_class: list[str], tmp_path: Path, answer_of: Any
+) -> None:
+    out = tmp_path / "sheet.html"
+    asked = ["page", of_a_class[1], "--length", "0.613", "--clock-ppm", "1000", "--no-diagnosis"]
+    answer_of([*asked, "--out", str(out)])
+    fit = pp.fit(of_a_class[1], length_m=0.613, clock_ppm=1000.0)
+    assert with_error(fit["g"].value, fit["g"].sd, "m/s^2", short=True) in out.read_text("utf-8")
 
 
 def test_a_length_with_its_error_makes_g_with_its_error(

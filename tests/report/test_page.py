@@ -431,6 +431,8 @@ def entry(**changes: Any) -> dict[str, Any]:
         ({"light": "amber", "light_reason": "don't quote Q"}, "amber"),
         ({"light": "red", "light_reason": "the law contradicts the decay"}, "red"),
         ({"b": {"value": None, "sd": None}}, "red"),
+        # Amplitudes by hand have no period; their light is that of the fit all the same.
+        ({"frequency": {"value": None, "sd": None}}, "green"),
         ({"refused": "no decay"}, "refused"),
     ],
 )

@@ -15,12 +15,17 @@ and the exit status is 2 unless --accept is given. Of several FILEs it is 2 if n
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 from pendpipe import api
 from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.analysis.fit.printed import lines
 from pendpipe.analysis.fit.result import FitResult
-from pendpipe.analysis.turning_points import is_turning_points, read_turning_points
+from pendpipe.analysis.turning_points import (
+    TurningPoints,
+    is_turning_points,
+    read_turning_points,
+)
 from pendpipe.arguments import FILES, Arguments, command, name_of, print_answer, read_motion, tell
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import over
@@ -34,7 +39,22 @@ from pendpipe.options import (
     given,
     measured_number,
 )
+from pendpipe.recording import Recording
 from pendpipe.report.class_table import Fitted, form_of, printed, together, write_fits
+
+OPTIONS: Final = (
+    flags_of(api.fit)
+    | {
+        "--frequency": {
+            "type": measured_number,
+            "metavar": "HZ",
+            "help": "frequency of small swings, Hz, instead of the period",
+            "heading": ALTERNATIVES,
+        }
+    }
+    | flags("--calibration")
+)
+"""How a recording is fitted, by whatever command."""
 
 
 @command(
@@ -57,17 +77,13 @@ from pendpipe.report.class_table import Fitted, form_of, printed, together, writ
             "help": "print a law that contradicts the decay, status 0",
         },
         "--wide": {"action": "store_true", "help": "with several FILEs: columns for a, b and c"},
-    }
-    | flags_of(api.fit)
-    | {
-        "--frequency": {
-            "type": measured_number,
-            "metavar": "HZ",
-            "help": "frequency of small swings, Hz, instead of the period",
-            "heading": ALTERNATIVES,
+        "--mean": {
+            "action": "store_true",
+            "help": "with several FILEs: means of T0 and Q even if they differ by more than errors",
         },
     }
-    | flags("--verbose", "-v", "--json", "--turning-points", "--calibration")
+    | OPTIONS
+    | flags("--verbose", "-v", "--json", "--turning-points")
     | flags("--record", "--refused")
     | {
         "--seed": {
@@ -95,7 +111,7 @@ def run(arguments: Arguments) -> int:
         "its format is unknown",
         "end its name in .svg, .png or .pdf",
     )
-    result = _fit(arguments)
+    result = _stored(arguments)
     if result.light == "red":
         why = result.light_reason if arguments.json else "no law is printed"
         tell(f"pendpipe: {arguments.file}: {why} (--accept prints it)")
@@ -118,44 +134,51 @@ def _stage(arguments: Arguments) -> None:
     run_stage(
         "fit",
         arguments.record,
-        lambda: write_json(arguments.out, _fit(arguments).to_dict()),
+        lambda: write_json(arguments.out, _stored(arguments).to_dict()),
         outputs=[Path(arguments.out)],
         refused=arguments.refused,
         inputs=[Path(arguments.file), arguments.calibration, arguments.turning_points],
     )
 
 
-def _fit(arguments: Arguments, say: Callable[[str], None] = tell) -> FitResult:
+def fitted(
+    arguments: Arguments,
+    say: Callable[[str], None] = tell,
+    *,
+    quiet: bool = True,
+    points: TurningPoints | None = None,
+) -> tuple[Recording, FitResult]:
+    """Read FILE, and fit it by `OPTIONS`."""
     fixed = parse_fixed(arguments.fixed, arguments.baseline)
-    recording, provenance = read_motion(arguments, quiet=not arguments.verbose, say=say)
-    points = arguments.turning_points and read_turning_points(arguments.turning_points)
+    recording, provenance = read_motion(arguments, quiet=quiet, say=say)
     period, frequency = arguments.period, arguments.frequency
     options = given(arguments, api.fit) | {
         "fixed": fixed,
         "scale_percent": _scale_percent(arguments),
+        "name": arguments.file,
         "period": over(1.0, frequency, "s") if frequency else period,
     }
     source = arguments.file if is_turning_points(arguments.file) else recording
-    result = api.fit(source, points=points, name=arguments.file, **options)
+    result = api.fit(source, points=points, **options)
+    return recording, replace(result, provenance={**provenance, "fixed": list(arguments.fixed)})
+
+
+def _stored(arguments: Arguments, say: Callable[[str], None] = tell) -> FitResult:
+    """Fit FILE as this command does, and say what its user should know."""
+    points = arguments.turning_points and read_turning_points(arguments.turning_points)
+    _, result = fitted(arguments, say, quiet=not arguments.verbose, points=points)
     if arguments.verbose or arguments.record is not None:
         for warning in result.warnings:
             say(f"{arguments.file}: {warning}")
-    return replace(
-        result,
-        provenance={
-            "input_sha256": provenance["input_sha256"],
-            "version": provenance["version"],
-            "seed": arguments.seed,
-            "volts_per_radian": provenance["volts_per_radian"],
-            "fixed": list(arguments.fixed),
-        },
-    )
+    own = {"seed": arguments.seed}
+    return replace(result, provenance={**result.provenance, **own})
 
 
 def _scale_percent(arguments: Arguments) -> float | None:
     """What the scale may be off by; a campaign has the calibration's error as a common one."""
     given: float | None = arguments.scale_percent
-    if given is not None or arguments.calibration is None or arguments.record is not None:
+    of_campaign = getattr(arguments, "record", None) is not None
+    if given is not None or arguments.calibration is None or of_campaign:
         return given
     constant = read_json(arguments.calibration).get("volts_per_radian")
     return None if constant is None else 100.0 * float(constant["sd"]) / float(constant["value"])
@@ -184,7 +207,7 @@ def _table(arguments: Arguments) -> int:
     for file in arguments.files:
         arguments.file = file
         try:
-            result = _fit(arguments, notes.append)
+            result = _stored(arguments, notes.append)
         except InputError as problem:
             found.append({"file": file, "error": str(problem)})
             fits.append(Fitted(file, None, str(problem).removeprefix(f"{file}: ")))
@@ -194,12 +217,12 @@ def _table(arguments: Arguments) -> int:
     content = {
         "schema_version": 1,
         "fits": found,
-        "together": [each.as_json() for each in together(fits)],
+        "together": [each.as_json() for each in together(fits, mean=arguments.mean)],
     }
     if arguments.out:
         write_fits(arguments.out, fits, content)
     if not (arguments.out and is_stream(arguments.out)):
-        print_answer(arguments, content, printed(fits, wide=arguments.wide))
+        print_answer(arguments, content, printed(fits, wide=arguments.wide, mean=arguments.mean))
     for each in fits:
         notes += [f"pendpipe: {each.file}: {each.refusal}"] if each.refusal else []
     for note in notes:

@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pendpipe import api
-from pendpipe.arguments import FILES, Arguments, command, name_of, read_motion, tell
+from pendpipe.analysis.fit.fixed import parse_fixed
+from pendpipe.arguments import FILES, Arguments, command, name_of, tell
+from pendpipe.commands.fit import OPTIONS, fitted
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.options import OUTPUT, flags
+from pendpipe.options import OUTPUT
 from pendpipe.process import cores, in_order
 from pendpipe.report.class_table import Fitted, class_page
 
@@ -38,7 +40,7 @@ class Sheet(NamedTuple):
             "help": "leave out the diagnosis",
         },
     }
-    | flags("--calibration")
+    | OPTIONS
 )
 def run(arguments: Arguments) -> int:
     """Fit, diagnose, and write the page, or a page each."""
@@ -72,11 +74,17 @@ def _sheet(arguments: Arguments, file: str) -> Sheet:
     notes: list[str] = []
     arguments.file = file
     name = name_of(file)
-    recording, provenance = read_motion(arguments, quiet=True, say=notes.append)
-    result = replace(api.fit(recording, name=file), provenance=provenance, name=name)
-    outcome = None
+    recording, result = fitted(arguments, notes.append)
+    result, outcome = replace(result, name=name), None
     if not arguments.no_diagnosis and result.method != "amplitudes":
-        outcome = api.diagnose(recording, name=file)
+        outcome = api.diagnose(
+            recording,
+            restoring="sine" if arguments.gravity else arguments.restoring,
+            length_m=arguments.length_m,
+            baseline=arguments.baseline,
+            fixed=parse_fixed(arguments.fixed, arguments.baseline),
+            name=file,
+        )
     page = render_recording(name, recording, result, outcome)
     return Sheet(Fitted(file, replace(result, points=None, decay=None)), page, tuple(notes))
 

@@ -12,26 +12,29 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from pendpipe.analysis.fit.printed import SHORT, percent, short_size
+from pendpipe.analysis.fit.printed import SHORT, pendulum_of, percent, period_name, short_size
 from pendpipe.errors import refuse_if
 from pendpipe.estimate import Estimate, chi_square_p_value
 from pendpipe.files import MADE_BY, is_stream, write_json, write_whole
 from pendpipe.quantities import in_columns, with_error
 
 if TYPE_CHECKING:
+    from pendpipe.analysis.fit.quality import Quality
     from pendpipe.analysis.fit.result import FitResult
 
 COLUMNS: Final = (
     *("file", "light", "T0_s", "T0_sd_s", "Q", "Q_sd", "amplitude", "amplitude_unit"),
     *("amplitude_deg", "dominant_loss", "dominant_share", "a", "a_sd", "a_unit", "b", "b_sd"),
     *("b_unit", "c", "c_sd", "c_unit", "damping_time_s", "half_life_s", "logarithmic_decrement"),
-    *("quotable", "remark"),
+    *("quotable", "remark", "T_s", "T_sd_s", "a_limit95", "b_limit95", "c_limit95"),
+    *("g_m_per_s2", "g_sd_m_per_s2", "length_m", "length_sd_m"),
 )
-"""Of the table that is written: a value and its standard deviation have a column each."""
+"""Of the table that is written: a value and its standard deviation have a column each. T is the
+period of what is no pendulum; a rate that may be zero has its upper limit (95 %) as well."""
 FORMS: Final = (".json", ".csv", ".xlsx", ".html", ".tex")
 _AGREES: Final = 5.0
 """Standard deviations, or robust ones of the class, within which a file agrees with its median."""
-_ALIKE: Final = {"T0": 0.03, "Q": 0.3}
+_ALIKE: Final = {"T0": 0.03, "T": 0.03, "Q": 0.3}
 """Part by which those of a class may differ: beyond, they are of different pendulums."""
 _CHANCE: Final = 0.001
 """Probability of a larger chi^2 below which the values differ by more than their errors."""
@@ -46,13 +49,13 @@ class Fitted(NamedTuple):
 
 
 class Together(NamedTuple):
-    """A quantity over the files that agree."""
+    """A quantity over the files that agree; its mean where their errors explain its scatter."""
 
     name: str
     files: int
     of: int
     mean: Estimate
-    """Weighted by the variances."""
+    """Weighted by the variances; NaN where they differ by more than their errors."""
     scatter: float
     """Standard deviation of the values."""
     chi2: float
@@ -64,6 +67,12 @@ class Together(NamedTuple):
 
     def __str__(self) -> str:
         mean, unit = self.mean, self.mean.unit
+        if math.isnan(mean.value):
+            by, own = with_error(self.scatter, None, unit), f"{self.chi2:.3g} for {self.files - 1}"
+            return (
+                f"{self.name}: {self.files} files scatter by {by}, more than their errors"
+                f" (chi² {own}): no mean (--mean)"
+            )
         agree = "they agree" if self.p_value >= _CHANCE else "they differ by more than their errors"
         left = f" ({self.of - self.files} far from them left out)" if self.files < self.of else ""
         return (
@@ -114,7 +123,9 @@ def record(fitted: Fitted) -> dict[str, Any]:
     if fit is None:
         return row
     unit = fit["amplitude"].unit
-    numbers = {"T0": (fit.period, "_s")}
+    numbers = {period_name(fit): (fit.period, "_s")}
+    ends = {"g": "_m_per_s2", "length": "_m"}
+    numbers |= {name: (each, ends[name]) for name, each in pendulum_of(fit).items()}
     if fit.quality_factors:
         large = fit.quality_factors[0]
         numbers["Q"] = large.quality_factor, ""
@@ -127,8 +138,10 @@ def record(fitted: Fitted) -> dict[str, Any]:
     if fit.light != "red":
         numbers |= {name: (fit[name], "") for name in "abc"}
         row |= {f"{name}_unit": fit[name].unit for name in "abc"}
+        row |= {f"{n}_limit95": fit[n].bounds95[1] for n in "abc" if fit[n].is_limit}
     for name, (estimate, end) in numbers.items():
         row |= {f"{name}{end}": estimate.value, f"{name}_sd{end}": estimate.sd}
+    row = {name: None if cell != cell else cell for name, cell in row.items()}
     return row | {
         "light": fit.light,
         "quotable": " ".join(fit.quotable),
@@ -136,15 +149,24 @@ def record(fitted: Fitted) -> dict[str, Any]:
     }
 
 
-def together(fits: Sequence[Fitted]) -> list[Together]:
-    """Return mean, scatter and chi^2 of T0 and Q over the files that agree."""
+def together(fits: Sequence[Fitted], *, mean: bool = False) -> list[Together]:
+    """Return scatter and chi^2 of T0, T and Q over the files that agree with their median.
+
+    Their means, where errors explain the scatter: else they are of different pendulums, of which
+    there is a `mean` only if it is asked for.
+    """
     found = [each.fit for each in fits if each.fit is not None and each.fit.light != "red"]
-    timed = [fit for fit in found if "period" in fit.quotable]
-    one = [timed[k] for k in _agreeing("T0", [fit.period for fit in timed])]
-    lossy = [fit.quality_factors[0].quality_factor for fit in one if "Q" in fit.quotable]
-    alike = [lossy[k] for k in _agreeing("Q", lossy)]
-    groups = (("T0", [fit.period for fit in one], len(timed)), ("Q", alike, len(lossy)))
-    return [_together(name, kept, of) for name, kept, of in groups if len(kept) > 1]
+    groups = list[Together]()
+    for name in ("T0", "T"):
+        timed = [f for f in found if "period" in f.quotable and period_name(f) == name]
+        one = [timed[k] for k in _agreeing(name, [fit.period for fit in timed])]
+        lossy = [fit.quality_factors[0].quality_factor for fit in one if "Q" in fit.quotable]
+        alike = [lossy[k] for k in _agreeing("Q", lossy)]
+        if len(one) > 1:
+            groups.append(_together(name, [f.period for f in one], len(timed), mean=mean))
+            if len(alike) > 1 and not math.isnan(groups[-1].mean.value):
+                groups.append(_together("Q", alike, len(lossy), mean=mean))
+    return groups
 
 
 def _agreeing(name: str, values: Sequence[Estimate]) -> list[int]:
@@ -161,22 +183,24 @@ def _agreeing(name: str, values: Sequence[Estimate]) -> list[int]:
     ]
 
 
-def _together(name: str, kept: Sequence[Estimate], of: int) -> Together:
+def _together(name: str, kept: Sequence[Estimate], of: int, *, mean: bool) -> Together:
     weights = [each.sd**-2 for each in kept]
-    mean = sum(w * each.value for w, each in zip(weights, kept, strict=True)) / sum(weights)
-    chi2 = sum(w * (each.value - mean) ** 2 for w, each in zip(weights, kept, strict=True))
+    middle = sum(w * each.value for w, each in zip(weights, kept, strict=True)) / sum(weights)
+    chi2 = sum(w * (each.value - middle) ** 2 for w, each in zip(weights, kept, strict=True))
     scatter = statistics.stdev([each.value for each in kept]) if len(kept) > 1 else 0.0
-    estimate = Estimate(mean, sum(weights) ** -0.5, kept[0].unit)
     p_value = chi_square_p_value(chi2, len(kept) - 1)
+    estimate = Estimate(middle, sum(weights) ** -0.5, kept[0].unit)
+    if not (mean or p_value >= _CHANCE):
+        estimate = Estimate(math.nan, math.nan, kept[0].unit)
     return Together(name, len(kept), of, estimate, scatter, chi2, p_value)
 
 
-HEAD: Final = ("file", "light", "T0", "Q", "at", "loses most by", "remark")
+HEAD: Final = ("file", "light", "period", "Q", "at", "loses most by", "remark")
 WIDE: Final = ("a", "b", "c")
 _REMARK: Final = 60
 
 
-def printed(fits: Sequence[Fitted], *, wide: bool = False) -> str:
+def printed(fits: Sequence[Fitted], *, wide: bool = False, mean: bool = False) -> str:
     """Lay a class out, one line per file; then what the files say together."""
     rows = [_row(each, wide=wide) for each in fits]
     head = (*HEAD[:-1], *(WIDE if wide else ()), HEAD[-1])
@@ -184,7 +208,7 @@ def printed(fits: Sequence[Fitted], *, wide: bool = False) -> str:
     red = sum(each.fit is not None and each.fit.light == "red" for each in fits)
     refused = len(fits) - kept - red
     counts = f"{kept} fitted, {red} red, {refused} refused"
-    return "\n".join([in_columns([head, *rows]), *map(str, together(fits)), counts])
+    return "\n".join([in_columns([head, *rows]), *map(str, together(fits, mean=mean)), counts])
 
 
 def _row(fitted: Fitted, *, wide: bool) -> tuple[str, ...]:
@@ -201,15 +225,32 @@ def _row(fitted: Fitted, *, wide: bool) -> tuple[str, ...]:
     return (
         fitted.file,
         fit.light,
-        with_error(fit.period.value, fit.period.sd, "s", short=True),
-        with_error(large.quality_factor.value, large.quality_factor.sd, short=True)
-        if large
-        else "",
+        _period(fit),
+        _quality(fit, large) if large else "",
         short_size(large.amplitude_rad, unit) if large else "",
         f"{percent(large.losses[loss])} {SHORT[loss]}" if large and loss else "",
         *rates,
         remark if len(remark) <= _REMARK else f"{remark[: _REMARK - 1]}…",
     )
+
+
+def _period(fit: FitResult) -> str:
+    """The period by its name, with what it tells of a pendulum whose length, or g, is given."""
+    if math.isnan(fit.period.value):
+        return "not shown: --period"
+    given = {period_name(fit): fit.period, **pendulum_of(fit)}
+    return ", ".join(
+        f"{name} {with_error(each.value, each.sd, each.unit, short=True)}"
+        for name, each in given.items()
+    )
+
+
+def _quality(fit: FitResult, large: Quality) -> str:
+    """Q; of amplitudes without a period the time to a half."""
+    found, name = large.quality_factor, ""
+    if math.isnan(large.period_s):
+        found, name = fit.damping()["half_life_s"], "to 1/2 in "
+    return f"{name}{with_error(found.value, found.sd, found.unit, short=True)}"
 
 
 def _csv(fits: Sequence[Fitted]) -> str:
@@ -292,9 +333,8 @@ def latex(text: str) -> str:
 
 
 def _latex(fits: Sequence[Fitted]) -> str:
-    head = (*HEAD[:5], *WIDE)
-    rows = [(*cells[:5], *cells[6:9]) for cells in cells_of(fits)]
-    lines = [" & ".join(map(latex, cells)) + r" \\" for cells in rows]
+    head = (*HEAD[:-1], *WIDE, HEAD[-1])
+    lines = [" & ".join(map(latex, cells)) + r" \\" for cells in cells_of(fits)]
     return "\n".join(
         [
             f"% made_by: {MADE_BY}",

@@ -185,8 +185,8 @@ STATES: Final = {
 
 
 def health(entry: Mapping[str, Any]) -> Health:
-    """The light of one record of comparison.json, with its reason; red without finite values."""
-    needed = ("frequency", "a", "b", "c")
+    """The light of a record's fit, with its reason; red without a, b, c (not without a period)."""
+    needed = ("a", "b", "c")
     missing = [each for each in needed if not math.isfinite(number(entry.get(each)))]
     if entry.get("refused"):
         word, reason = "refused", "refused"

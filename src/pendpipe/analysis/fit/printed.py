@@ -11,7 +11,7 @@ import numpy as np
 from pendpipe.analysis.angles import READ_AS
 from pendpipe.analysis.fit.consequence import unsure
 from pendpipe.analysis.fit.damping import FALLS, is_extrapolated
-from pendpipe.analysis.fit.quality import LOSSES, SEEN, Quality, period_of_frequency
+from pendpipe.analysis.fit.quality import LOSSES, SEEN, Quality, period_of_frequency, small_period
 from pendpipe.analysis.torque import TOP, swing_phase
 from pendpipe.analysis.turning_points import BEAT
 from pendpipe.estimate import Estimate
@@ -142,6 +142,11 @@ def period_text(frequency: Estimate) -> str:
     return f"{_number(period_of_frequency(frequency))} s"
 
 
+def period_name(result: FitResult) -> str:
+    """Return T0, the period of small swings of a pendulum, or T of what swings by x."""
+    return "T0" if result.restoring == "sine" else "T"
+
+
 def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
     """Yield what is known, a title and a value each."""
     unit, has_law = result.parameters["amplitude"].unit, result.light != "red" or law
@@ -265,12 +270,12 @@ def sentence(result: FitResult) -> str:
     unit, said = result.parameters["amplitude"].unit, []
     if "period" in result.quotable:
         period = result.period
-        name = "T0" if result.restoring == "sine" else "T"
-        said.append(f"{name} = {with_error(period.value, period.sd, 's')}")
+        said.append(f"{period_name(result)} = {with_error(period.value, period.sd, 's')}")
     known = list(result.quality_factors)
     if result.light != "red":
-        doubted = {each.amplitude_rad for some in unsure(result) for each in some}
-        known = [each for each in known if each.amplitude_rad not in doubted]
+        doubted = [each for some in unsure(result) for each in some]
+        checks = result.decrement_check or [None] * len(known)
+        known = [each for each, seen in zip(known, checks, strict=False) if seen not in doubted]
     if known:
         q = known[0]
         timeless = math.isnan(q.period_s)
@@ -312,9 +317,9 @@ def pendulum_of(result: FitResult) -> dict[str, Estimate]:
     With the torque of sin x the fitted omega is omega_0, that of small swings. Otherwise
     omega_0 = omega 2 K(sin(y/2))/pi at the root-mean-square angle y, where that is known.
     """
-    frequency = result.parameters["frequency"]
-    omega = math.tau * frequency.value * (_lengthening(result) or 1.0)
-    relative = 2.0 * frequency.sd / frequency.value
+    period = small_period(result)
+    omega = math.tau / period.value * (_lengthening(result) or 1.0)
+    relative = 2.0 * period.sd / period.value
     if result.length is not None:
         value, given, name, unit = omega**2 * result.length.value, result.length, "g", "m/s^2"
     elif result.gravity is not None:

@@ -84,15 +84,15 @@ class Quality:
 
 
 def qualities(result: FitResult) -> tuple[Quality, ...]:
-    """Q and the shares of the losses at a large, a middle and a small amplitude of the decay.
+    """Q and the shares of the losses at the release, a middle and a small amplitude of the decay.
 
     The fitted law's, or what the turning points show where the light is red.
     """
     if result.light == "red":
         return seen_qualities(result)
-    first = result.parameters["amplitude"].value
-    seen = [check.amplitude_rad for check in result.decrement_check] or [first]
-    return tuple(quality_by_law(result, amplitude) for amplitude in dict.fromkeys(seen))
+    smaller = [check.amplitude_rad for check in result.decrement_check[1:]]
+    wanted = dict.fromkeys([result.parameters["amplitude"].value, *smaller])
+    return tuple(quality_by_law(result, amplitude) for amplitude in wanted)
 
 
 def seen_qualities(result: FitResult) -> tuple[Quality, ...]:
