@@ -91,6 +91,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory, make_example: Callable[..
 def pages(campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A page of each kind; the documents only where `make docs` has built them."""
     folder = tmp_path_factory.mktemp("pages")
+    few, _ = repeated(campaign, folder / "3", 3)
     report, _ = repeated(campaign, folder / "27", 27)
     many, own = repeated(campaign, folder / "many", 110)
     recording = campaign / "water-low-7" / "recording.csv"
@@ -98,6 +99,7 @@ def pages(campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
     assert main(["page", "--no-diagnosis", files[0], "--out", str(folder / "one.html")]) == 0
     assert main(["page", "--no-diagnosis", *files, "--out", str(folder / "class.html")]) == 0
     return {
+        "few records": few,
         "campaign": report,
         "many records": many,
         "record": many.parent / own[0] / "record.html",
