@@ -96,6 +96,7 @@ def test_what_a_model_loses_grows_with_chi2_and_never_exceeds_it(
 
 
 @given(numbers=st.floats(2.0, 1e3), part=st.floats(1e-6, 1e-3))
+@pytest.mark.structure
 def test_a_small_loss_counts_against_what_is_left_for_each_number(
     numbers: float, part: float
 ) -> None:
@@ -115,6 +116,7 @@ def test_a_magnet_may_be_a_restoring_torque_without_a_name() -> None:
     assert effect.probability < 0.5 or effect.identifier == "unnamed-restoring"
 
 
+@pytest.mark.structure
 def test_two_names_for_one_law_give_way_to_a_curve() -> None:
     state = state_with(pulled() + white(6), "frequency-drift", "cubic-stiffness")
     before = state.fit.chi2
@@ -128,6 +130,7 @@ def test_two_real_effects_keep_their_names() -> None:
     assert all(step.winner.lead.effect.kind != "unnamed" for step in diagnosed("two").search.steps)
 
 
+@pytest.mark.structure
 def test_each_further_name_has_its_price_and_sin_x_has_none() -> None:
     fit, _, _ = null_fit()
 
@@ -143,6 +146,7 @@ def test_each_further_name_has_its_price_and_sin_x_has_none() -> None:
     assert price(steps("impulse", "sensor-cubic", "gain-drift")) == one + 2.0 * FURTHER
 
 
+@pytest.mark.structure
 def test_a_name_that_leaves_noise_stays() -> None:
     state = state_with(with_effects("sensor-quadratic") + white(5), "sensor-quadratic")
     before = state.fit
@@ -168,6 +172,7 @@ def test_what_chance_does_not_explain_is_never_called_consistent(first_hz: float
     assert all(effect.probability <= 0.5 for effect in found.effects)
 
 
+@pytest.mark.structure
 def test_a_second_name_that_the_readings_do_not_need_is_dropped() -> None:
     readings = with_effects("sensor-quadratic") + white(5)
     state = state_with(readings, "sensor-quadratic", "tone-pickup")
@@ -204,6 +209,7 @@ def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
     assert remainder_of(state.fit, state.data, state.noise).excess < 0.2 * before.excess
 
 
+@pytest.mark.structure
 def test_what_is_left_is_described_where_only_sin_x_was_found() -> None:
     """A line that sweeps, of which no curve makes much."""
     sine = by_identifier("circular-error")
@@ -271,6 +277,7 @@ def test_a_rare_name_that_looks_like_nothing_that_was_found_is_no_rival() -> Non
 
 @pytest.mark.parametrize("names", [(), ("sensor-quadratic",)])
 @pytest.mark.parametrize("name", ["jitter", "broadband-drive", "clipping"])
+@pytest.mark.structure
 def test_a_random_cause_pays_the_price_of_a_name(name: str, names: tuple[str, ...]) -> None:
     """Beside one name more than beside none; a fault that shows by itself pays nothing."""
     readings = with_effects(*names) + white(5)
@@ -297,6 +304,7 @@ def test_two_laws_that_share_a_misfit_are_both_found() -> None:
 
 
 @pytest.mark.parametrize(("part", "worth", "tried"), [(0.5, 5.0, True), (0.1, 5.0, False)])
+@pytest.mark.structure
 def test_a_name_is_tried_on_credit_if_it_takes_a_good_part_of_the_misfit(
     part: float, worth: float, tried: bool
 ) -> None:

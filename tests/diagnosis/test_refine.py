@@ -231,6 +231,7 @@ def test_a_step_without_a_limit_is_not_damped_however_long_it_is() -> None:
 
 
 @pytest.mark.parametrize("gain", [0.0, 20.0, 100.0, 400.0, 1e4])
+@pytest.mark.structure
 def test_effects_of_the_best_ones_class_are_useful(gain: float) -> None:
     fit, _, _ = null_fit()
     lead = Lead(by_identifier("cubic-stiffness"), (), gain, 0.0)
@@ -247,6 +248,7 @@ def test_a_name_may_end_farther_behind_a_curve_than_behind_a_name(gain: float) -
     assert behind_a_name < behind_a_curve < 2.0 / 3.0 * gain + NEAR
 
 
+@pytest.mark.structure
 def test_in_a_gross_misfit_every_refit_ends_at_its_minimum() -> None:
     """Otherwise only those that come near the best: here the true friction."""
     model, data, noise, truth = stribeck_record()
@@ -274,6 +276,7 @@ def _detection(scores: dict[str, tuple[float, tuple[float, ...]]]) -> Detection:
 
 
 @pytest.mark.parametrize(("others", "at_a_bound"), [(LINEAR, True), (TRUTH, False)])
+@pytest.mark.structure
 def test_an_effect_whose_score_a_bound_halves_is_refitted(
     others: FloatArray, at_a_bound: bool
 ) -> None:
@@ -299,6 +302,7 @@ def test_an_effect_whose_score_a_bound_halves_is_refitted(
 @pytest.mark.parametrize(
     ("behind", "first"), [(1.0, "presliding-friction"), (30.0, "frequency-step")]
 )
+@pytest.mark.structure
 def test_in_a_misfit_a_law_that_acts_throughout_comes_before_an_event(
     behind: float, first: str
 ) -> None:

@@ -101,6 +101,7 @@ def test_a_class_is_listed_with_the_likeliest_first() -> None:
         ("presliding-friction", "unnamed-damping", 0.55, "unnamed-damping"),
     ],
 )
+@pytest.mark.structure
 def test_the_likeliest_of_a_class_says_what_decides(
     own: str, rival: str, p: float, says: str
 ) -> None:
@@ -120,6 +121,7 @@ def test_the_likeliest_of_a_class_says_what_decides(
         ("unnamed-restoring", 0.6, (), "described by a restoring torque of unknown form"),
     ],
 )
+@pytest.mark.structure
 def test_numbers_are_those_of_what_is_named(
     rival: str, p: float, missing: tuple[str, ...], candidates: str
 ) -> None:
@@ -216,12 +218,14 @@ def likely(identifier: str, probability: float, *rivals: tuple[str, float]) -> F
     return replace(named(identifier), probability=probability, indistinguishable=rivals)
 
 
+@pytest.mark.structure
 def test_a_healthy_pendulum_takes_one_line() -> None:
     healthy = diagnosis()
     assert healthy.statement == "nothing is missing (p = 0.9)"
     assert healthy.to_dict()["summary"]["missing"] == []
 
 
+@pytest.mark.structure
 def test_a_misfit_that_chance_does_not_explain_is_not_nothing() -> None:
     left = replace(diagnosis(), unexplained_p_value=5e-10)
     said = "no cause is found for the small misfit that is left (p = 5e-10)"
@@ -232,6 +236,7 @@ def test_a_misfit_that_chance_does_not_explain_is_not_nothing() -> None:
         assert f"no effect of the catalogue improves the fit{chance}" in text
 
 
+@pytest.mark.structure
 def test_what_is_presumed_is_fitted_and_not_missing() -> None:
     presumed = replace(named("circular-error"), presumed=True)
     assert replace(diagnosis(), effects=(presumed,)).statement == (
@@ -261,6 +266,7 @@ def test_what_is_presumed_is_fitted_and_not_missing() -> None:
         ),
     ],
 )
+@pytest.mark.structure
 def test_a_name_is_given_from_one_half_on(
     effect: FoundEffect, headline: str, candidates: str
 ) -> None:
@@ -272,6 +278,7 @@ def test_a_name_is_given_from_one_half_on(
     assert not any(percent in found.statement for percent in below)
 
 
+@pytest.mark.structure
 def test_the_answer_has_a_dozen_lines_in_the_order_of_the_questions() -> None:
     found = diagnosis(likely("impulse", 0.9, ("backlash", 0.06)), remainder=REST, name="a.csv")
     lines = str(found).splitlines()
@@ -290,6 +297,7 @@ def test_the_answer_has_a_dozen_lines_in_the_order_of_the_questions() -> None:
     assert lines[-1].startswith("Copy: “Eq. 8 does not describe this recording (p < 1e-12)")
 
 
+@pytest.mark.structure
 def test_a_number_that_moves_keeps_its_power_of_ten() -> None:
     rates = [Estimate(4.0e-4, 0.2e-4, "1/s"), Estimate(1.11e-3, 0.2e-4, "1/s")]
     found = diagnosis(likely("impulse", 0.9))
@@ -301,6 +309,7 @@ def test_a_number_that_moves_keeps_its_power_of_ten() -> None:
     assert matters.endswith("b 4.00(20) × 10⁻⁴ → 0.001110(20) s⁻¹")
 
 
+@pytest.mark.structure
 def test_the_table_shows_the_numbers_as_fitted_and_with_what_is_missing() -> None:
     found = diagnosis(likely("impulse", 0.9))
     (period, b) = found.to_dict()["summary"]["consequence"]
@@ -314,6 +323,7 @@ def test_the_table_shows_the_numbers_as_fitted_and_with_what_is_missing() -> Non
     assert "1.098901(28) s" in new
 
 
+@pytest.mark.structure
 def test_parameters_have_words_and_units_and_differ_from_zero() -> None:
     effect = replace(
         likely("second-mode", 0.9),
@@ -349,6 +359,7 @@ def test_every_number_of_an_effect_is_printed_in_words_with_error_and_unit(effec
     assert printed.count(", ") == len(words) - 1
 
 
+@pytest.mark.structure
 def test_a_drift_that_is_straight_says_no_time_constant() -> None:
     straight = Estimate(STRAIGHT_S, 0.0, "s")
     drift = named("offset-drift", rate=Estimate(1e-5, 1e-7, "rad/s"), tau=straight)

@@ -112,6 +112,7 @@ def test_a_rival_is_compared_by_its_gain_with_the_final_noise(
 
 
 @pytest.mark.parametrize("loss", [1.0, 30.0, 3e4])
+@pytest.mark.structure
 def test_a_negative_gain_stays_negative(loss: float) -> None:
     """Later, under a smaller noise, it must not be credited with what it had lost."""
     fit, _, _ = null_fit()
@@ -123,6 +124,7 @@ def test_a_negative_gain_stays_negative(loss: float) -> None:
 
 
 @pytest.mark.parametrize("gain", [1e4, 1e5, 1e6])
+@pytest.mark.structure
 def test_a_prior_raises_no_effect_that_the_readings_reject(gain: float) -> None:
     """Circular error has a higher prior than a cubic torque; but not if it is far behind."""
     cubic = rival(by_identifier("cubic-stiffness"), gain)
@@ -133,6 +135,7 @@ def test_a_prior_raises_no_effect_that_the_readings_reject(gain: float) -> None:
     assert other <= own
 
 
+@pytest.mark.structure
 def test_a_pendulum_is_one_though_its_torque_is_off_by_less_than_a_hundredth() -> None:
     """At a gain of 10^8 anything else that is small, an encoder's eccentricity say, weighs more."""
     cubic = rival(by_identifier("cubic-stiffness"), 1e8)
@@ -155,6 +158,7 @@ def test_a_pendulum_over_a_magnet_is_a_pendulum_beside_the_curve() -> None:
     assert [each.identifier for each in found.missing] == ["unnamed-restoring"]
 
 
+@pytest.mark.structure
 def test_a_curve_that_fits_better_does_not_lower_a_name() -> None:
     """A real law differs from the catalogue's form by more than that at a gain of 10^5."""
     curve = rival(CURVES[0](null_fit()[0].at.span), 1e5)
@@ -179,6 +183,7 @@ def test_a_curve_without_a_name_takes_nothing_from_the_law() -> None:
         assert abs(given.value - alone.value) < 0.1 * given.sd
 
 
+@pytest.mark.structure
 def test_each_of_several_names_is_less_certain_than_one() -> None:
     """The same effect with the same gain, where one name, and where three, leave only noise."""
     found = jumped().search
@@ -214,6 +219,7 @@ def test_a_line_near_a_harmonic_is_doubted_by_the_chance_that_it_is_so_near(
 
 @pytest.mark.parametrize("none", [0.0, 0.3, 0.9])
 @pytest.mark.parametrize("name", ["broadband-drive", "missing-codes"])
+@pytest.mark.structure
 def test_a_random_cause_is_no_more_probable_than_the_names_beside_it(
     name: str, none: float
 ) -> None:
@@ -228,6 +234,7 @@ def test_a_random_cause_is_no_more_probable_than_the_names_beside_it(
     assert ratio == pytest.approx(1.0 - none if name == "broadband-drive" else 1.0)
 
 
+@pytest.mark.structure
 def test_a_random_torque_that_explains_no_more_than_a_smooth_misfit_is_not_confident() -> None:
     """What a law lacks changes amplitude and phase too."""
     found = jumped().search
@@ -293,6 +300,7 @@ def led(outcome: Diagnosis, name: str) -> tuple[Step, float, dict[str, float], H
 
 
 @pytest.mark.parametrize("taken", ["cubic-stiffness", "clock-drift", "unnamed-restoring"])
+@pytest.mark.structure
 def test_a_likelier_effect_replaces_the_one_that_was_added(taken: str) -> None:
     """All fit a pendulum whose torque is sin x; the prior knows that it is."""
     step, own, mates, found = led(scanned("circular-error"), taken)
@@ -311,12 +319,14 @@ def test_a_likelier_effect_replaces_the_one_that_was_added(taken: str) -> None:
         ("sensor-cubic", "sensor-cubic"),
     ],
 )
+@pytest.mark.structure
 def test_a_name_as_likely_as_its_rivals_stays(name: str, taken: str) -> None:
     step, own, mates, _ = led(diagnosed(name), taken)
     assert step.winner.identifier == taken
     assert 1.5 * own >= max(mates.values())
 
 
+@pytest.mark.structure
 def test_the_class_of_a_likelier_name_is_that_of_the_last_model() -> None:
     """Its rivals were refitted beside 1.4 times the noise, which is worth half of a gain."""
     found = having_taken(scanned("circular-error"), "cubic-stiffness")
@@ -348,6 +358,7 @@ def test_a_period_is_known_no_better_than_by_the_names_that_share_the_probabilit
     assert quoted.sd > spread
 
 
+@pytest.mark.structure
 def test_a_wrong_parameter_replaces_missing_physics() -> None:
     """It is fitted then, and comes out right."""
     taken = next(
@@ -381,6 +392,7 @@ def scanner_of(bank: Bank) -> Scanner:
 
 
 @pytest.mark.parametrize("number", [1, 7, 100])
+@pytest.mark.structure
 def test_the_global_p_value_of_the_smallest_of_independent_ones_is_uniform(number: int) -> None:
     smallest = np.random.default_rng(number).random((2000, number)).min(axis=1)
     found = [Trials(float(number), 0.0).global_p_value(float(local)) for local in smallest]
@@ -388,6 +400,7 @@ def test_the_global_p_value_of_the_smallest_of_independent_ones_is_uniform(numbe
 
 
 @given(st.floats(1e-300, 1.0), st.floats(1.0, 1e5), st.floats(0.0, 0.1))
+@pytest.mark.structure
 def test_looking_at_more_makes_nothing_rarer(local: float, trials: float, growth: float) -> None:
     found = Trials(trials, growth).global_p_value(local)
     assert local * (1.0 - 1e-9) <= found <= 1.0
@@ -443,6 +456,7 @@ def test_false_alarms_of_the_whole_catalogue_are_as_frequent_as_the_p_value() ->
 
 
 @pytest.mark.parametrize("name", ["equilibrium-step", "offset-drift"])
+@pytest.mark.structure
 def test_a_gain_too_large_for_p_values_is_worth_as_much_more_as_it_is_larger(name: str) -> None:
     """P-values underflow at a chi^2 of 1331; the rarer, the more trials are charged beyond it."""
     fit, _, _ = null_fit()
@@ -452,6 +466,7 @@ def test_a_gain_too_large_for_p_values_is_worth_as_much_more_as_it_is_larger(nam
     assert above - below == pytest.approx(20.0, abs=0.3)
 
 
+@pytest.mark.structure
 def test_who_is_behind_stays_as_far_behind_whatever_else_was_left_at_first() -> None:
     """Found while fifty times the noise was left, both are refitted where none of that is."""
     fit, _, _ = null_fit()
