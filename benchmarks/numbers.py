@@ -56,6 +56,7 @@ from benchmarks.journal import answers, judge_parser
 from benchmarks.table import head, table_row
 from pendpipe.arrays import FloatArray as Array
 from pendpipe_challenge.motion import Motion
+from pendpipe_challenge.score import CONFIDENT
 from pendpipe_challenge.torques import BOOK
 from pendpipe_challenge.world import SHARE, Bench, Cause, Scene, World
 
@@ -64,8 +65,6 @@ APPARATUS: Final = {"encoder": 0.25, "camera": 0.25, "converter": 0.25, "wheel":
 QUANTITIES: Final = ("T0", "Q", "1/2", "1/e", "a", "b", "c")
 FAR: Final = 5.0
 """Errors beyond which a number is wrong."""
-NAMED: Final = 0.8
-"""Probability of a name, from which its errors are measured by the oracle's."""
 HALF_WIDTH: Final = 1.96
 """Of a 95 % interval, in standard deviations."""
 Number = dict[str, Any]
@@ -120,11 +119,6 @@ def has(motion: Motion, names: Sequence[str], laws: Sequence[int] = ()) -> bool:
     return any(motion.value(name) for name in names) or motion.value("book") in laws
 
 
-def without(motion: Motion, *names: str) -> Motion:
-    """The motion without some of what acts."""
-    return motion.changed(**dict.fromkeys(names, 0.0))
-
-
 def springs(motion: Motion, amplitude: float) -> Motion:
     """A motion with its springs alone, released at an amplitude."""
     kept = {name: motion.value(name) for name in SPRINGS}
@@ -176,7 +170,8 @@ class Decay:
     """
 
     def __init__(self, motion: Motion, start_s: float, duration_s: float, smallest: float) -> None:
-        self.motion = without(replace(motion, kicks_rad_s=np.empty(0)), *PUSHES)
+        free = replace(motion, kicks_rad_s=np.empty(0))
+        self.motion = free.changed(**dict.fromkeys(PUSHES, 0.0))
         span, amplitudes = duration_s, np.ones(1)
         while amplitudes[-1] > smallest and span < PATIENCE * duration_s:
             span *= 2
@@ -286,8 +281,7 @@ def oracle(bench: Bench, known: int, asked: Sequence[tuple[str, float]]) -> Arra
 
 ALLOWED: Final = {"T0": "period", "Q": "Q", "1/2": "Q", "1/e": "Q"}
 """By quantity: what `quotable` of a fit calls it."""
-TIMES: Final = {"half_life_s": "1/2", "damping_time_s": "1/e"}
-CALLED: Final = {"period": "T0", "half_life": "1/2", "damping_time": "1/e"}
+CALLED: Final = {"period": "T0", "half_life_s": "1/2", "damping_time_s": "1/e"}
 
 
 def quoted_by_fit(fit: Mapping[str, Any]) -> Iterator[Number]:
@@ -297,7 +291,7 @@ def quoted_by_fit(fit: Mapping[str, Any]) -> Iterator[Number]:
     numbers += [(name, 0.0, fit["parameters"][name]) for name in "abc"]
     if damping := fit.get("damping"):
         y = damping["amplitude_rad"]["value"]
-        numbers += [(TIMES[name], y, damping[name]) for name in TIMES if damping.get(name)]
+        numbers += [(CALLED[name], y, damping[name]) for name in CALLED if damping.get(name)]
     lawless = fit["light"] == "red" or "quote a, b, c" in fit["light_reason"]
     for quantity, y, number in numbers:
         withheld = lawless if quantity in "abc" else ALLOWED[quantity] not in fit["quotable"]
@@ -341,34 +335,28 @@ def answer(key: tuple[str, int]) -> dict[str, Any]:
         try:
             recording = pp.read(path)
             fit = pp.fit(recording).to_dict()
-            said["fit"] = said["diagnose"] = list(quoted_by_fit(fit))
+            said["fit"] = list(quoted_by_fit(fit))
             kept["said"]["fit"] = f"{fit['light']}: {fit['light_reason']}"
             content = pp.diagnose(recording).to_dict()
             said["diagnose"] = list(quoted_by_diagnosis(content)) or said["fit"]
             kept["said"]["diagnose"] = content["summary"]["headline"]
             kept["named"] = {each["id"]: each["probability"] for each in content["effects"]}
         except Exception as error:
-            kept["said"] |= {
-                by: repr(error) for by in ("fit", "diagnose") if by not in kept["said"]
-            }
+            kept["said"] = {"fit": repr(error), "diagnose": repr(error)} | kept["said"]
     refused = [_number(each, 0.0, None, withheld=True) for each in ("T0", "Q", *"abc")]
     kept["numbers"] = [
         number | {"by": by} for by in ("fit", "diagnose") for number in said.get(by, refused)
     ]
     asked = [(each["quantity"], each["y"]) for each in kept["numbers"]]
-    true, foreign = truths(item.bench.scene, item.bench.causes, asked), "coloured-noise"
-    known = len(item.truth["present"])
-    sds = np.full(len(asked), math.nan)
-    if item.truth["family"] in ("null", "single") and foreign not in item.truth["allowed"]:
-        sds = oracle(item.bench, known, asked)
+    true, sds = truths(item.bench.scene, item.bench.causes, asked), np.full(len(asked), math.nan)
+    if "coloured-noise" not in item.truth["allowed"]:
+        sds = oracle(item.bench, len(item.truth["present"]), asked)
     motion = item.bench.scene.world(item.bench.causes).motion
     for number, truth, sd in zip(kept["numbers"], true.tolist(), sds.tolist(), strict=True):
         if number["quantity"] in "abc" and has(motion, LOSSES, LOSSY):
-            named = number["by"] == "diagnose" and all(
-                map(partial(sure, kept), item.truth["effects"])
-            )
+            named = all(map(partial(sure, kept), item.truth["effects"]))
             drifts = number["quantity"] == "b" and has(motion, IN_TIME[:3])
-            truth = math.nan if drifts or not named else truth
+            truth = truth if named and number["by"] == "diagnose" and not drifts else math.nan
         number |= {"truth": truth, "oracle": sd}
     return kept
 
@@ -376,7 +364,7 @@ def answer(key: tuple[str, int]) -> dict[str, Any]:
 def sure(kept: Mapping[str, Any], hidden: Mapping[str, Any]) -> bool:
     """Whether an effect that acts by the catalogue's law is named without doubt."""
     names = (hidden["effect"], *hidden["also"])
-    return hidden["own_form"] and max(kept["named"].get(each, 0.0) for each in names) >= NAMED
+    return hidden["own_form"] and max(kept["named"].get(each, 0.0) for each in names) >= CONFIDENT
 
 
 # ---------------------------------------------------------------- what is counted
@@ -461,13 +449,12 @@ def main() -> int:
     numbers = []
     keys = [(told.set, number) for number in range(told.number)]
     for kept in answers(told, keys, answer, (*SOURCES, "benchmarks/numbers.py")):
-        truth = kept["truth"]
-        single = truth["family"] == "single"
+        hidden = kept["truth"]["effects"]
         about = {
             "number": kept["number"],
-            "group": GROUPS[truth["family"]],
-            "laws": "; ".join(each["law"] for each in truth["effects"]),
-            "sure": not single or sure(kept | {}, truth["effects"][0] | {"own_form": True}),
+            "group": GROUPS[kept["truth"]["family"]],
+            "laws": "; ".join(each["law"] for each in hidden),
+            "sure": all(sure(kept, each | {"own_form": True}) for each in hidden),
         }
         numbers += [each | about | {"said": kept["said"][each["by"]]} for each in kept["numbers"]]
 
@@ -484,14 +471,8 @@ def main() -> int:
                 print(table_row(f"{by}, {group}, {name}", cells))
     known = [each for each in numbers if not (each["withheld"] or _unknown(each))]
     known.sort(key=lambda each: -abs(pull(each)))
-    print(
-        "",
-        *map(
-            line,
-            [e for e in known if not told.list or abs(pull(e)) > 2][: None if told.list else 10],
-        ),
-        sep="\n",
-    )
+    shown = [each for each in known if abs(pull(each)) > 2] if told.list else known[:10]
+    print("", *map(line, shown), sep="\n")
     found = list(wanted(count))
     for title, met in (("met", True), ("missed", False)):
         print(
