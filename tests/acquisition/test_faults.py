@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import pytest
+from benchmarks.acquisition import RATES, one_swing, session
 from benchmarks.faulty_device import Fault, acquire_faulty
 from hypothesis import given, strategies as st
 from scipy.stats import binom, t
@@ -16,11 +17,17 @@ from scipy.stats import binom, t
 import pendpipe.acquisition.recorder
 from pendpipe.acquisition import decode
 from pendpipe.acquisition.clock import ScaledClock
-from pendpipe.acquisition.decode import decode_recording, find_delays, measure_rate
+from pendpipe.acquisition.decode import (
+    decode_recording,
+    find_changes,
+    find_delays,
+    measure_rate,
+)
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.devices.simulated import SimulatedDevice
 from pendpipe.acquisition.drivers import find_driver, identify
 from pendpipe.acquisition.drivers.letters import DI154RS, DI245
+from pendpipe.acquisition.drivers.streams import exchanged, out_of_line
 from pendpipe.acquisition.drivers.text import DI2108
 from pendpipe.acquisition.line import Line, check_port
 from pendpipe.acquisition.raw import RawWriter
@@ -139,7 +146,7 @@ def test_a_lost_byte_of_the_unmarked_family_makes_what_follows_suspect(
 ) -> None:
     """No mark tells it; the words are cut across from there on, and nothing is moved."""
     recording = recorded("di2108", Fault("drop", at=1001), 15.0)
-    assert any("bytes were lost without a mark" in note for note in recording.notes)
+    assert any("bytes were lost or doubled without a mark" in note for note in recording.notes)
     assert np.all(recording.quality[500:] == SUSPECT)
     assert np.all(recording.quality[:400] == GOOD)
     assert error_steps(recording) <= 0.51
@@ -577,3 +584,62 @@ def test_a_loss_is_a_step_of_more_than_eight_spreads_of_the_others(
     delay_s = np.repeat(np.resize([0.0, 0.1, 0.1], 256), 8)
     arrival_s = scans / 100.0 + delay_s + height_s * (scans > 1024)
     assert len(find_delays(arrival_s, scans, 100.0)[0]) == lost
+
+
+# --- rates that change, and words that are lost ---------------------------------------------------
+@pytest.mark.parametrize("name", RATES)
+def test_a_rate_that_changes_is_dated_and_followed(name: str) -> None:
+    """The recorder's clock shows it, but for the 20 ms after which a host takes bytes."""
+    content, made_s = session(np.random.default_rng(3), *RATES[name])
+    found = decode_recording(content)
+    said = [note for note in found.notes if "the scan rate changes" in note]
+    assert len(said) == len(RATES[name]) - 1
+    assert np.abs(found.time_s - made_s).max() < 0.02
+    dates_s = [float(note.partition(" Hz at ")[2].split()[0]) for note in said]
+    true_s = np.cumsum([span_s for _, span_s in RATES[name]])[:-1]
+    # A date is known to a stretch, a 256th of the recording.
+    assert dates_s == pytest.approx(true_s.tolist(), abs=450.0 / 256.0)
+
+
+@pytest.mark.parametrize("lost", [1, 5, 500])
+def test_lost_scans_are_no_change_of_the_rate(lost: int) -> None:
+    found = decode_recording(session(np.random.default_rng(4), (60.0, 450.0), lost=lost)[0])
+    assert not any("the scan rate changes" in note for note in found.notes)
+    assert any("come late for good" in note for note in found.notes) == (lost > 1)
+
+
+def test_a_clock_that_is_set_right_slowly_is_no_change_of_the_rate() -> None:
+    """Systems slew theirs by up to 500 ppm."""
+    scans = np.arange(1.0, 27_001.0)
+    for ppm, found in ((400.0, 0), (700.0, 1)):
+        arrival_s = scans / 60.0 + 1e-6 * ppm * np.maximum(scans / 60.0 - 225.0, 0.0)
+        assert len(find_changes(arrival_s, scans, 60.0)) == found
+
+
+def test_delays_that_wander_are_no_change_of_the_rate() -> None:
+    generator, scans, found = np.random.default_rng(5), np.arange(1.0, 6001.0), 0
+    for _ in range(100):
+        walk_s = np.repeat(np.cumsum(generator.normal(0.0, 0.02, 261)), 23)[: len(scans)]
+        found += len(find_changes(scans / 100.0 + walk_s, scans, 100.0)) > 0
+    assert found <= 2
+
+
+@pytest.mark.parametrize("model", ["di154", "di2108"])
+@pytest.mark.parametrize("channels", [1, 2, 4])
+@pytest.mark.parametrize("bytes_", [2, -2], ids=["lost", "twice"])
+def test_no_reading_made_of_two_halves_and_no_place_of_another_channel_is_called_good(
+    model: str, channels: int, bytes_: int
+) -> None:
+    """Readings that swing show by themselves what does not belong to them."""
+    generator = np.random.default_rng(6)
+    assert not any(one_swing(generator, model, channels, bytes_) for _ in range(20))
+
+
+@pytest.mark.parametrize("per_cycle", [4, 10, 60, 1000])
+@pytest.mark.parametrize("noise", [0.0, 1.0, 30.0])
+def test_swings_without_a_fault_are_in_line(per_cycle: int, noise: float) -> None:
+    scan = np.arange(20_000)[:, None]
+    swing = 2e4 * np.exp(-scan / 5000.0) * np.cos(2.0 * np.pi * scan / per_cycle + [0.0, 1.0])
+    counts = np.rint(swing + np.random.default_rng(7).normal(0.0, noise, swing.shape))
+    assert not out_of_line(counts.astype(np.int16)).any()
+    assert exchanged(counts.astype(np.int16)) is None

@@ -24,7 +24,7 @@ from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.drivers.streams import Scans, plain_scans
 from pendpipe.acquisition.line import LineLostError
-from pendpipe.acquisition.raw import Frame, RawWriter, append_event, lock, read_raw
+from pendpipe.acquisition.raw import Frame, RawReader, RawWriter, append_event, lock, read_raw
 from pendpipe.acquisition.recorder import ProgressLine, acquire_simulated
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
@@ -429,3 +429,27 @@ def test_what_is_being_recorded_is_left_alone(tmp_path: Path) -> None:
         with pytest.raises(InputError, match="another process is recording into it"):
             read_attempts([path])
     assert len(read_attempts([path])) == 1
+
+
+def test_a_clock_that_was_set_back_makes_no_attempt_the_older_one(tmp_path: Path) -> None:
+    """The new one is newer by its name, whatever the clock says."""
+    first = kept(tmp_path, 30, 100, "time")
+    ahead = first.with_name(f"29991231T235959.999999Z{first.name[-13:]}")
+    first.rename(ahead)
+    second = kept(tmp_path, 0, 100, "time")
+    assert choose(read_attempts(tmp_path.glob("*.raw"))).path == second
+
+
+def test_a_file_that_grows_is_read_on_where_it_ended(tmp_path: Path) -> None:
+    content = written(*(bytes([number]) * 7 for number in range(50)))
+    growing, whole = tmp_path / "a.raw", read_raw(content)
+    growing.write_bytes(content[:500])
+    reader = RawReader(growing)
+    for end in range(500, len(content), 97):
+        growing.write_bytes(content[:end])
+        assert whole.data.startswith(reader.read().data)
+    growing.write_bytes(content)
+    again = reader.read()
+    assert again.data == whole.data
+    assert again.arrived_bytes.tolist() == whole.arrived_bytes.tolist()
+    assert (again.events, again.damaged_bytes) == (whole.events, 0)

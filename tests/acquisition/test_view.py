@@ -21,7 +21,7 @@ import pytest
 from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.raw import read_raw
 from pendpipe.acquisition.recorder import acquire_simulated, example_signal
-from pendpipe.acquisition.view import state
+from pendpipe.acquisition.view import Shown
 from pendpipe.recording import read_plain
 
 SCALE = 20.0
@@ -120,13 +120,14 @@ def test_a_growing_file_is_shown_as_far_as_it_has_come(tmp_path: Path) -> None:
     options = {"channels": (1,), "rate_hz": 110.0, "duration_s": 90.0, "raw_path": raw}
     acquire_simulated("di2108", example_signal(1, 3.85), clock_scale=200.0, **options)
     recording, content = decode_recording(raw), raw.read_bytes()
-    assert state(growing) == {"scans": 0}
+    page = Shown(growing)
+    assert page.state() == {"scans": 0}
     growing.write_bytes(content[: len(content) // 2])
-    half = state(growing)
+    half = page.state()
     assert 0.3 * len(recording) < half["scans"] < 0.7 * len(recording)
     assert half["reason"] == ""
     growing.write_bytes(content)
-    whole = state(growing)
+    whole = page.state()
     assert (whole["scans"], whole["lost"]) == (len(recording), 0)
     assert (whole["reason"], whole["duration_s"]) == ("scans", 90.0)
     time_s, volts = np.array(whole["last"]).T

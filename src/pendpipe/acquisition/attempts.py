@@ -9,7 +9,7 @@ import secrets
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Final
 
@@ -26,6 +26,7 @@ from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import is_stream
 from pendpipe.recording import Recording
 
+_FORM: Final = "%Y%m%dT%H%M%S.%f"
 _STAMP: Final = r"\d{8}T\d{6}\.\d{6}Z-[0-9a-f]{8}"
 
 
@@ -37,7 +38,16 @@ def new_path(start: str | Path) -> Path:
     >>> re.sub(r"\d", "0", new_path("raw/").name[:23])
     '00000000T000000.000000Z'
     """
-    stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
+    first = Path(f"{start}x")
+    names = first.parent.glob("*.raw") if first.parent.is_dir() else ()
+    known = [
+        re.search(_STAMP, path.name) for path in names if path.name.startswith(first.name[:-1])
+    ]
+    last = max((found[0].split("Z")[0] for found in known if found), default="")
+    now = datetime.now(UTC)
+    if last >= now.strftime(_FORM):
+        now = datetime.strptime(last, _FORM) + timedelta(microseconds=1)
+    stamp = now.strftime(f"{_FORM}Z")
     return Path(f"{start}{stamp}-{secrets.token_hex(4)}.raw")
 
 
@@ -48,7 +58,7 @@ def new_path_beside(out: Path) -> Path:
     """
     out = _file_of(out)
     first = out.with_suffix(".raw")
-    return new_path(f"{out.with_suffix('')}.") if first.exists() else first
+    return new_path(f"{out.with_suffix('')}.") if paths_beside(out) else first
 
 
 def _file_of(out: Path) -> Path:
@@ -91,10 +101,8 @@ def read_attempts(paths: Iterable[Path]) -> list[RawRecording]:
             found.append(raw)
     if damages and not found:
         raise damages[0]
-    # A name has its time stamp down to microseconds; OUT.raw, the first of all, has none.
-    return sorted(
-        found, key=lambda raw: (str(raw.header["recorded_at"]), *re.findall(_STAMP, raw.path.name))
-    )
+    # The order of the names; OUT.raw, the first of all, has no stamp. The clock may have been set.
+    return sorted(found, key=lambda raw: re.findall(_STAMP, raw.path.name))
 
 
 def choose(attempts: Sequence[RawRecording]) -> RawRecording:

@@ -3,9 +3,10 @@
 Where a device marks a loss, the scans that are missing are rows of quality 2. Where it does not,
 nothing is moved: the stretch in which something was lost has quality 1, and it is said. Two things
 show such a loss. Plain words that are cut across are rough where they were smooth
-(`drivers.streams.out_of_step`). And whole scans that are missing make everything after them late by
+(`drivers.streams`). And whole scans that are missing make everything after them late by
 the recorder's clock: bytes come late, never early, by how much changes with every piece, and other
-delays (a busy host) pass.
+delays (a busy host) pass. A rate that changes makes them later and later, or earlier and earlier:
+the times then follow the recorder's clock on both sides.
 """
 
 import math
@@ -58,6 +59,8 @@ class Segment:
         Where whole scans seem to be missing.
     limit_s
         Scans missing for less than this leave no trace.
+    changes
+        Scans, of those made, at which the rate changes, shape (k,).
     """
 
     scans: Scans
@@ -65,6 +68,21 @@ class Segment:
     made: FloatArray
     delays: Sequence[Delay]
     limit_s: float
+    changes: FloatArray
+
+    def rates_hz(self, raw: RawRecording, usual_hz: float) -> list[float]:
+        """Scan rate before, between and behind the changes; `usual_hz` where there are none."""
+        pieces = np.split(np.arange(len(self.made)), np.searchsorted(self.made, self.changes))
+        if len(pieces) == 1:
+            return [usual_hz]
+        return [_measured(raw, self.arrival_s[each], self.made[each]).rate_hz for each in pieces]
+
+    def time_s(self, scan: FloatArray, rates_hz: Sequence[float]) -> FloatArray:
+        """When scans were made since the first one, by the rates on both sides of the changes."""
+        knots = np.concatenate(([0.0], self.changes))
+        begin_s = np.concatenate(([0.0], np.cumsum(np.diff(knots) / rates_hz[:-1])))
+        piece = np.searchsorted(self.changes, scan, "right")
+        return np.asarray(begin_s[piece] + (scan - knots[piece]) / np.array(rates_hz)[piece])
 
 
 @dataclass(frozen=True)
@@ -151,7 +169,8 @@ def decode_recording(
     time_base = _time_base(raw, segments)
     high = float(header.get("range_volts", driver.range_volts))
     step = high / 2 ** (driver.bits - 1)
-    time_s, values, quality = _rows(segments, time_base.rate_hz, channels.index(chosen), step)
+    rates_hz = [segment.rates_hz(raw, time_base.rate_hz) for segment in segments]
+    time_s, values, quality = _rows(segments, rates_hz, channels.index(chosen), step)
     kept = ("firmware", "serial_number", "clock_scale", "volts_per_radian")
     return Recording(
         time_s=time_s,
@@ -174,7 +193,7 @@ def decode_recording(
         }
         | {key: str(header[key]) for key in kept if header.get(key)},
         resolution=step,
-        notes=_notes(raw, segments, time_base, time_s),
+        notes=_notes(raw, segments, time_base, time_s, rates_hz),
     )
 
 
@@ -191,8 +210,19 @@ def _segments(raw: RawRecording, driver: type[Driver]) -> list[Segment]:
         arrival_s = raw.arrival_s[inside]
         made = _made(raw.arrived_bytes[inside] - begin, scans.losses, 2 * channels)
         if len(scans.counts):
-            delays, limit_s = find_delays(arrival_s, made, rate_hz, scale)
-            found.append(Segment(scans, arrival_s, made, delays, limit_s))
+            changes = find_changes(arrival_s, made, rate_hz, scale)
+            ends = [0, *np.searchsorted(made, changes).tolist(), len(made)]
+            pieces = [
+                (first, *find_delays(arrival_s[first:last], made[first:last], rate_hz, scale))
+                for first, last in pairwise(ends)
+            ]
+            delays = [
+                Delay(first + each.begin, first + each.end, each.late_s)
+                for first, delays, _ in pieces
+                for each in delays
+            ]
+            limit_s = max(limit for *_, limit in pieces)
+            found.append(Segment(scans, arrival_s, made, delays, limit_s, changes))
     kept = raw.event("stopped").get("keep_scans")
     if kept is not None and len(found) == 1:
         # What arrived beyond the number of scans that was asked for.
@@ -235,12 +265,14 @@ def _made(arrived_bytes: IntArray, losses: Sequence[Loss], size: int) -> FloatAr
 
 
 def _rows(
-    segments: Sequence[Segment], rate_hz: float, column: int, step: float
+    segments: Sequence[Segment], rates_hz: Sequence[Sequence[float]], column: int, step: float
 ) -> tuple[FloatArray, FloatArray, ByteArray]:
     """Put the streams one after the other, with rows for what is missing in and between them."""
     parts: list[tuple[AnyArray, AnyArray, AnyArray]] = []
-    for segment, begin_s in zip(segments, offsets_s(segments, rate_hz), strict=True):
-        scans = segment.scans
+    for segment, rates, begin_s in zip(
+        segments, rates_hz, offsets_s(segments, rates_hz), strict=True
+    ):
+        scans, rate_hz = segment.scans, rates[0]
         count = len(scans.counts)
         if parts:
             last_s = float(parts[-1][0][-1])
@@ -264,7 +296,7 @@ def _rows(
         values, quality = np.full(len(every), np.nan), np.full(len(every), MISSING, "u1")
         values[number] = scans.counts[:, column] * step
         quality[number] = np.where(doubt, SUSPECT, GOOD)
-        parts.append((begin_s + every / rate_hz, values, quality))
+        parts.append((begin_s + segment.time_s(every.astype(np.float64), rates), values, quality))
     times, readings, qualities = (np.concatenate(each) for each in zip(*parts, strict=True))
     return times, readings, qualities
 
@@ -274,7 +306,11 @@ SHORT: Final = ("the recording was cut short", "ended early")
 
 
 def _notes(
-    raw: RawRecording, segments: Sequence[Segment], time_base: TimeBase, time_s: FloatArray
+    raw: RawRecording,
+    segments: Sequence[Segment],
+    time_base: TimeBase,
+    time_s: FloatArray,
+    rates_hz: Sequence[Sequence[float]],
 ) -> tuple[str, ...]:
     """What a user should know about the session, one clause each."""
     losses = [loss for segment in segments for loss in segment.scans.losses]
@@ -303,7 +339,8 @@ def _notes(
         ),
         (
             doubtful,
-            f"bytes were lost without a mark: {doubtful} scans are out of step (quality 1)",
+            f"bytes were lost or doubled without a mark: {doubtful} scans are out of step or out"
+            " of line (quality 1)",
         ),
         *(
             (loss.reason.startswith("stop"), f"the device's buffer overflowed ('{loss.reason}')")
@@ -314,8 +351,20 @@ def _notes(
             for event in raw.events
         ),
         (len(segments) > 1, f"{len(segments)} pieces ({pieces}) in {time_s[-1]:.6g} s"),
+        *(
+            (
+                True,
+                f"the scan rate changes from {before:.6g} to {after:.6g} Hz at"
+                f" {begin_s + segment.time_s(np.array([scan]), rates)[0]:.4g} s: times follow the"
+                " recorder's clock",
+            )
+            for segment, rates, begin_s in zip(
+                segments, rates_hz, offsets_s(segments, rates_hz), strict=True
+            )
+            for scan, (before, after) in zip(segment.changes, pairwise(rates), strict=True)
+        ),
         (
-            time_base.chosen == "measured",
+            time_base.chosen == "measured" and not any(len(each.changes) for each in segments),
             f"the device scans at {time_base.measured_hz:.6g} Hz, "
             f"not at {time_base.nominal_hz:.6g} Hz as it should: times follow the recorder's clock",
         ),
@@ -336,13 +385,16 @@ _NEAR: Final = 64
 """Arrivals on either side of a break that fix its extent."""
 
 
-def offsets_s(segments: Sequence[Segment], rate_hz: float) -> list[float]:
+def offsets_s(segments: Sequence[Segment], rates_hz: Sequence[Sequence[float]]) -> list[float]:
     """Return when each stream began, by the recorder's clock, since the first did.
 
     The least late arrivals on either side of a break count, so that a delay that is alike
     on both sides does not matter.
     """
-    late = [segment.arrival_s - segment.made / rate_hz for segment in segments]
+    late = [
+        segment.arrival_s - segment.time_s(segment.made, rates)
+        for segment, rates in zip(segments, rates_hz, strict=True)
+    ]
     steps = [float(new[:_NEAR].min() - old[-_NEAR:].min()) for old, new in pairwise(late)]
     return [0.0, *np.cumsum(steps).tolist()]
 
@@ -362,10 +414,19 @@ def _time_base(raw: RawRecording, segments: Sequence[Segment]) -> TimeBase:
         (segment.arrival_s[begin:end], segment.made[begin:end])
         for segment in segments
         for begin, end in pairwise(
-            [0, *(delay.end for delay in segment.delays), len(segment.arrival_s)]
+            sorted(
+                [
+                    *(0, len(segment.arrival_s)),
+                    *(delay.end for delay in segment.delays),
+                    *np.searchsorted(segment.made, segment.changes).tolist(),
+                ]
+            )
         )
     ]
-    arrival_s, made = max(runs, key=lambda run: len(run[0]))
+    return _measured(raw, *max(runs, key=lambda run: len(run[0])))
+
+
+def _measured(raw: RawRecording, arrival_s: FloatArray, made: FloatArray) -> TimeBase:
     scale = float(raw.header.get("clock_scale", 1.0))
     return measure_rate(arrival_s, made, float(raw.header["rate_hz"]), scale)
 
@@ -415,6 +476,109 @@ def measure_rate(
     floor = math.hypot(interval / math.sqrt(12.0), _HOST_S / _RATE_TRUST * clock_scale)
     sd = math.hypot(math.sqrt(covariance[0, 0]), floor / (scans[-1] - scans[0]))
     return TimeBase(nominal_hz, float(1.0 / interval), float(sd / interval**2))
+
+
+_SLEWED: Final = 5e-4
+"""By what part a system lets its clock run fast or slow to set it right (500 ppm): a change of the
+rate by less need not be the device's."""
+_BETWEEN_CHANGES: Final = 5
+"""Stretches of a rate: 40 arrivals, of which it can be measured."""
+_WANDERING: Final = 1.5
+"""Spread about straight pieces over that between neighbours: 1 of independent delays, and 2 or
+more of a random walk."""
+_SQUARES_OF_A_BEND: Final = 48.0
+"""A line through a bend that ends 1 off leaves a mean square of 1/48."""
+
+
+def find_changes(
+    arrival_s: FloatArray, scans: FloatArray, nominal_hz: float, clock_scale: float = 1.0
+) -> FloatArray:
+    """Find where the scan rate changes.
+
+    Parameters
+    ----------
+    arrival_s, scans, nominal_hz, clock_scale
+        As for `find_delays`.
+
+    Returns
+    -------
+    FloatArray
+        The scans at which it does, in order, shape (k,).
+
+    Notes
+    -----
+    The least late arrivals of the stretches are cut into straight pieces by least squares, each of
+    which must save 36 variances of the noise (seen by neighbours, so that a drift is none). Where
+    neighbouring pieces meet, the rate changes if their slopes differ by more than six standard
+    deviations and 500 ppm, and if that puts the end of the shorter one off by more than 10 ms of
+    the host and 1.5 scans. If no such pieces leave white noise, the delays wander, and nothing is
+    found.
+    """
+    stretches = min(_STRETCHES, len(scans) // _IN_STRETCH)
+    if stretches < 2 * _BETWEEN_CHANGES:
+        return np.empty(0)
+    first = _least_late(arrival_s - scans / nominal_hz, stretches)
+    scan, time_s = scans[first], arrival_s[first]
+    middle = np.interp(scan[1:-1], scan[::2], time_s[::2]) - time_s[1:-1]
+    middle[1::2] = np.interp(scan[2:-1:2], scan[1::2], time_s[1::2]) - time_s[2:-1:2]
+    noise_s = _spread(middle) / math.sqrt(1.5)
+    noise_s = math.hypot(noise_s, 1.0 / (nominal_hz * math.sqrt(12.0)))
+    price = max(_RATE_TRUST**2, stretches * _SPREADS**2 / _SQUARES_OF_A_BEND) * noise_s**2
+    ends = _straight_pieces(scan, time_s, price)
+    lines, left = [], []
+    for piece in (slice(*pair) for pair in pairwise(ends)):
+        slope, level = np.polyfit(scan[piece], time_s[piece], 1)
+        weight = float(np.sum((scan[piece] - scan[piece].mean()) ** 2))
+        left.append(time_s[piece] - level - slope * scan[piece])
+        lines.append((slope, level, weight, scan[piece][0], scan[piece][-1]))
+    if _spread(np.concatenate(left)) > _WANDERING * noise_s:
+        return np.empty(0)
+    least_s = max(_FEWEST_SCANS / nominal_hz, _HOST_S * clock_scale)
+    found: list[float] = []
+    (slope, level, weight, begin, end), *rest = lines
+    for slope_after, level_after, more, begin_after, end_after in rest:
+        change = slope_after - slope
+        sd = noise_s * math.sqrt(1.0 / weight + 1.0 / more)
+        shorter = min(end - begin, end_after - begin_after)
+        if abs(change) > max(_RATE_TRUST * sd, _SLEWED * slope) and abs(change) * shorter > least_s:
+            found.append(float(np.clip((level - level_after) / change, end, begin_after)))
+            slope, weight, begin = slope_after, more, begin_after
+        else:  # the same rate, and what is between them was lost
+            slope = (weight * slope + more * slope_after) / (weight + more)
+            weight += more
+        level, end = level_after, end_after
+    return np.array(found)
+
+
+def _spread(values: FloatArray) -> float:
+    """Standard deviation of the middle of some values; that of noise without the odd ones."""
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+
+
+def _straight_pieces(x: FloatArray, y: FloatArray, price: float) -> list[int]:
+    """Cut points into straight pieces whose squares and prices add up to the least.
+
+    Returns where the pieces begin, and the number of points.
+    """
+    count = len(x)
+    x = (x - x[0]) / (x[-1] - x[0])
+    y = y - np.polyval(np.polyfit(x, y, 1), x)
+    powers = np.stack([np.ones(count), x, y, x * x, x * y, y * y])
+    sums = np.concatenate([np.zeros((6, 1)), np.cumsum(powers, axis=1)], axis=1)
+    best, before = np.full(count + 1, np.inf), np.zeros(count + 1, dtype=int)
+    best[0] = 0.0
+    for end in range(_BETWEEN_CHANGES, count + 1):
+        begin = np.arange(end - _BETWEEN_CHANGES + 1)
+        n, sx, sy, sxx, sxy, syy = sums[:, end, None] - sums[:, begin]
+        across, along = sxx - sx * sx / n, sxy - sx * sy / n
+        squares = np.maximum(syy - sy * sy / n - along**2 / across, 0.0)
+        total = best[begin] + squares + price
+        before[end] = begin[np.argmin(total)]
+        best[end] = total.min()
+    ends = [count]
+    while ends[-1]:
+        ends.append(int(before[ends[-1]]))
+    return ends[::-1]
 
 
 _IN_STRETCH: Final = 8
@@ -470,7 +634,7 @@ def find_delays(
     late = late - slope * scans
     level = late[first]
     steps = np.diff(level)
-    spread = 1.4826 * float(np.median(np.abs(steps - np.median(steps))))
+    spread = _spread(steps)
     fewest_s = _FEWEST_SCANS * (slope + 1.0 / nominal_hz)
     limit_s = max(fewest_s, _HOST_S * clock_scale, _SPREADS * spread)
     before = np.maximum.accumulate(level)

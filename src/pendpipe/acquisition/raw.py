@@ -18,12 +18,14 @@ at_byte and the description no check sum; it is read up to the first damage.
 """
 
 import json
+import mmap
 import os
 import struct
 import time
 import zlib
+from array import array
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any, Final, NamedTuple
 
@@ -243,6 +245,31 @@ class RawRecording:
         last = [e for e in self.events if e.get("event") in ("broken", "restarted")][-1:]
         return "".join(str(e.get("reason")) for e in last if e["event"] == "broken")
 
+    def since(self, time_s: float) -> "RawRecording":
+        """Return what has arrived since `time_s` of the recorder's clock."""
+        first = int(np.searchsorted(self.arrival_s, time_s))
+        before = int(self.arrived_bytes[first - 1]) if first else 0
+        begin = [0, *(int(e["at_byte"]) for e in self.events if e.get("event") == "restarted")]
+        begin = [at for at in begin if at <= before]
+        # From a whole scan on.
+        size = 2 * len(self.header["channels"])
+        before -= (before - begin[-1]) % size
+        events = [
+            {**e, "at_byte": e["at_byte"] - before}
+            | ({"keep_scans": e["keep_scans"] - before // size} if e.get("keep_scans") else {})
+            for e in self.events
+            if e["at_byte"] > before
+        ]
+        holes = [each for each in self.holes if each.at_byte >= before]
+        return replace(
+            self,
+            data=self.data[before:],
+            arrival_s=self.arrival_s[first:],
+            arrived_bytes=self.arrived_bytes[first:] - before,
+            events=tuple(events),
+            holes=tuple(Hole(h.stream - len(begin) + 1, h.at_byte - before, *h[2:]) for h in holes),
+        )
+
     def event(self, kind: str) -> Mapping[str, Any]:
         """Return the last event of a kind; empty when there was none."""
         return next((e for e in reversed(self.events) if e.get("event") == kind), {})
@@ -257,54 +284,92 @@ def read_raw(source: str | Path | bytes) -> RawRecording:
         If there is no such file, it is no raw recording, or its description is damaged in both
         places.
     """
-    place = "raw recording" if isinstance(source, bytes) else str(source)
-    try:
-        content = source if isinstance(source, bytes) else Path(source).read_bytes()
-    except OSError as fault:
-        raise InputError(place, f"can't be read ({fault.strerror})", "check the path") from None
-    header, begin = _header(place, content)
-    pieces: list[bytes] = []
-    stamps: list[tuple[float, int]] = []
-    events: list[Mapping[str, Any]] = []
-    holes: list[Hole] = []
-    arrival: tuple[int, float] | None = None
-    total = missing = starts = sound = 0
-    for size, frame in _frames(content, begin, _HEAD if header["version"] > 1 else _HEAD_1):
-        hole = frame.at_byte - total - missing
+    return RawReader(source).read()
+
+
+class RawReader:
+    """Read a raw file that grows: each `read` goes on behind the last sound frame.
+
+    Parameters
+    ----------
+    source
+        A file, or its content.
+    """
+
+    def __init__(self, source: str | Path | bytes) -> None:
+        self._source = source
+        self._header: Mapping[str, Any] = {}
+        # Days of frames: no object is kept of any.
+        self._data, self._arrival_s, self._arrived_bytes = bytearray(), array("d"), array("q")
+        self._events: list[Mapping[str, Any]] = []
+        self._holes: list[Hole] = []
+        self._arrival: tuple[int, float] | None = None
+        self._begin = self._end = self._missing = self._starts = self._sound = 0
+
+    def read(self) -> RawRecording:
+        """Return what has been written so far; errors as of `read_raw`."""
+        source = self._source
+        place = "raw recording" if isinstance(source, bytes) else str(source)
+        try:
+            content = source if isinstance(source, bytes) else _content(Path(source))
+        except OSError as fault:
+            raise InputError(place, f"can't be read ({fault.strerror})", "check the path") from None
+        if not self._header:
+            self._header, self._begin = _header(place, content)
+            self._end = self._begin
+        form = _HEAD if self._header["version"] > 1 else _HEAD_1
+        for end, size, frame in _frames(content, self._end, form):
+            self._take(place, size, frame)
+            self._end = end
+        return RawRecording(
+            self._header,
+            bytes(self._data),
+            np.array(self._arrival_s, dtype=np.float64),
+            np.array(self._arrived_bytes, dtype=np.int64),
+            tuple(self._events),
+            len(content) - self._begin - self._sound,
+            tuple(self._holes),
+            Path() if isinstance(source, bytes) else Path(source),
+        )
+
+    def _take(self, place: str, size: int, frame: Frame) -> None:
+        """Add a sound frame that takes so many bytes."""
+        total = len(self._data)
+        hole = frame.at_byte - total - self._missing
         if hole > _LARGEST_HOLE:
-            continue
-        sound += size
-        if frame.kind == b"D" and frame.stream > starts:
+            return
+        self._sound += size
+        if frame.kind == b"D" and frame.stream > self._starts:
             # The event that recorded the restart is damaged.
-            starts = frame.stream
+            self._starts = frame.stream
             reason = "the raw file is damaged here"
-            events.append(
-                {"event": "restarted", "reason": reason, "time_s": frame.time_s, "at_byte": total}
-            )
+            found = {"event": "restarted", "reason": reason}
+            self._events.append({**found, "time_s": frame.time_s, "at_byte": total})
         if hole > 0:
-            holes.append(Hole(starts, total, hole))
-            missing += hole
+            self._holes.append(Hole(self._starts, total, hole))
+            self._missing += hole
         if frame.kind == b"D":
-            total += len(frame.content)
-            pieces.append(frame.content)
-            if arrival == (arrival := (starts, frame.time_s)):
-                stamps.pop()  # what arrived at once may fill several frames
-            stamps.append((frame.time_s, total))
+            self._data += frame.content
+            if self._arrival == (arrival := (self._starts, frame.time_s)):
+                # What arrived at once may fill several frames.
+                self._arrived_bytes[-1] = len(self._data)
+            else:
+                self._arrival_s.append(frame.time_s)
+                self._arrived_bytes.append(len(self._data))
+            self._arrival = arrival
         elif frame.kind == b"E":
             event = _json(frame.content) or {}
             refuse_if(not event, place, "an event in it is damaged", "give another copy")
-            starts += event.get("event") == "restarted"
-            events.append({**event, "time_s": frame.time_s, "at_byte": total})
-    return RawRecording(
-        header,
-        b"".join(pieces),
-        np.array([time_s for time_s, _ in stamps], dtype=np.float64),
-        np.array([count for _, count in stamps], dtype=np.int64),
-        tuple(events),
-        len(content) - begin - sound,
-        tuple(holes),
-        Path() if isinstance(source, bytes) else Path(source),
-    )
+            self._starts += event.get("event") == "restarted"
+            self._events.append({**event, "time_s": frame.time_s, "at_byte": total})
+
+
+def _content(path: Path) -> "bytes | mmap.mmap":
+    """Map a file, so that it need not be in memory as a whole."""
+    with path.open("rb") as stream:
+        if not os.fstat(stream.fileno()).st_size:
+            return b""
+        return mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
 
 
 _NUMBERS: Final[Mapping[str, tuple[float, float]]] = {
@@ -360,20 +425,21 @@ def check_description(place: str, raw: RawRecording) -> None:
         )
 
 
-def _header(place: str, content: bytes) -> tuple[Mapping[str, Any], int]:
+def _header(place: str, content: "bytes | mmap.mmap") -> tuple[Mapping[str, Any], int]:
     """Return the description, from the first line or its copy, and where the frames begin."""
     end = content.find(b"\n", 0, _LONGEST_HEADER)
-    if end < 0 and (content.startswith(_BEGINNING) or _BEGINNING.startswith(content)):
+    first = content[: len(_BEGINNING)]
+    if end < 0 and _BEGINNING.startswith(first):
         problem = "this is not a raw recording of pendpipe, or only its beginning"
         raise NothingRecordedError(place, problem, "give another file")
     header = _description(content[: max(end, 0)])
     if header is None:
-        copies = (frame.content for _, frame in _frames(content, 0) if frame.kind == b"H")
+        copies = (frame.content for *_, frame in _frames(content, 0) if frame.kind == b"H")
         header, end = _description(next(copies, b"")), -1
     if header is None:
         problem = (
             "the description of the recording is damaged"
-            if content.startswith(_BEGINNING)
+            if first == _BEGINNING
             else "this is not a raw recording of pendpipe"
         )
         raise InputError(place, problem, "give another copy")
@@ -406,8 +472,12 @@ def _json(body: bytes) -> dict[str, Any] | None:
     return content if isinstance(content, dict) else None
 
 
-def _frames(content: bytes, begin: int, form: struct.Struct = _HEAD) -> Iterator[tuple[int, Frame]]:
-    """Find the sound frames and how many bytes they take, whatever stands between them.
+def _frames(
+    content: "bytes | mmap.mmap", begin: int, form: struct.Struct = _HEAD
+) -> Iterator[tuple[int, int, Frame]]:
+    """Find where sound frames end, how many bytes they take, and what they are.
+
+    Whatever may stand between them.
 
     Those of version 1 have no mark by which the next one could be found behind a damaged one.
     """
@@ -417,10 +487,11 @@ def _frames(content: bytes, begin: int, form: struct.Struct = _HEAD) -> Iterator
         body = content[start : start + min(length, _LONGEST_FRAME)]
         known = zlib.crc32(content[begin + len(mark) : begin + form.size])
         check = _CHECK.pack(zlib.crc32(body, known))
-        if len(body) == length and content.startswith(check, begin + form.size):
+        if len(body) == length and content[start - len(check) : start] == check:
             # A damaged mark does no harm, but is noticed.
             unmarked = 0 if mark == _MARK else len(mark)
-            yield start + length - begin - unmarked, Frame(kind, time_s, body, *place)
-            begin = start + length
+            end = start + length
+            yield end, end - begin - unmarked, Frame(kind, time_s, body, *place)
+            begin = end
         else:
             begin = content.find(_MARK, begin + 1) if mark else -1

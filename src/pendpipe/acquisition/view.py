@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe.acquisition.decode import decode_recording
-from pendpipe.acquisition.raw import read_raw
+from pendpipe.acquisition.raw import RawReader
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.templates import render
@@ -50,32 +50,57 @@ def shown(raw: Path) -> Iterator[None]:
             viewer.wait()
 
 
-def state(path: Path) -> dict[str, Any]:
-    """Return what the page draws of a raw file so far: times in s, readings in V."""
-    try:
-        raw = read_raw(path)
-        recording = decode_recording(raw)
-    except InputError:
-        return {"scans": 0}
-    read = np.isfinite(recording.values)
-    time_s, volts = recording.time_s[read], recording.values[read]
-    duration_s = float(raw.header["duration_s"])
-    # Whole stretches alone: the last one is still growing.
-    stretch_s = max(_SHORTEST_STRETCH_S, duration_s / _STRETCHES)
-    number, first = np.unique(time_s // stretch_s, return_index=True)
-    extent = np.maximum.reduceat(volts, first) - np.minimum.reduceat(volts, first)
-    recent = time_s > time_s[-1] - _LAST_S
-    return {
-        "elapsed_s": float(raw.arrival_s[-1]),
-        "duration_s": duration_s,
-        "model": raw.header["model"],
-        "scans": len(time_s),
-        "lost": len(recording) - len(time_s),
-        "bytes": len(raw.data),
-        "reason": (raw.event("stopped") or raw.event("broken")).get("reason", ""),
-        "last": thinned(time_s[recent], volts[recent]),
-        "amplitude": np.stack([(number + 0.5) * stretch_s, 0.5 * extent], axis=1)[:-1].tolist(),
-    }
+class Shown:
+    """What the page draws of a raw file: only what is new is read and decoded.
+
+    Parameters
+    ----------
+    path
+        The raw file, to which somebody writes.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._reader = RawReader(path)
+        self._since_s = 0.0
+        self._amplitude: list[tuple[float, float]] = []
+        self._lost = 0
+
+    def state(self) -> dict[str, Any]:
+        """Return the readings so far: times in s, readings in V."""
+        try:
+            raw = self._reader.read()
+            last_s = float(raw.arrival_s[-1]) if len(raw.arrival_s) else 0.0
+            # Some of what arrived later was read before.
+            recording = decode_recording(raw.since(min(self._since_s, last_s - _LAST_S) - _LAST_S))
+        except InputError:
+            return {"scans": 0}
+        duration_s = float(raw.header["duration_s"])
+        read = np.isfinite(recording.values)
+        all_s = last_s - recording.time_s[-1] + recording.time_s
+        time_s, volts = all_s[read], recording.values[read]
+        # Whole stretches alone: the last one is still growing.
+        stretch_s = max(_SHORTEST_STRETCH_S, duration_s / _STRETCHES)
+        new = time_s >= self._since_s
+        number, first = np.unique(time_s[new] // stretch_s, return_index=True)
+        extent = np.maximum.reduceat(volts[new], first) - np.minimum.reduceat(volts[new], first)
+        middle = ((number + 0.5) * stretch_s).tolist()
+        self._amplitude += list(zip(middle, (0.5 * extent).tolist(), strict=True))[:-1]
+        done_s = max(float(number[-1]) * stretch_s, self._since_s) if len(number) else 0.0
+        self._lost += int(np.sum((all_s >= self._since_s) & (all_s < done_s) & ~read))
+        self._since_s = done_s
+        recent = time_s > time_s[-1] - _LAST_S
+        scans = len(raw.data) // (2 * len(raw.header["channels"]))
+        return {
+            "elapsed_s": last_s,
+            "duration_s": duration_s,
+            "model": raw.header["model"],
+            "scans": min(scans, int(raw.event("stopped").get("keep_scans") or scans)),
+            "lost": self._lost + int(np.sum((all_s >= done_s) & ~read)),
+            "bytes": len(raw.data),
+            "reason": (raw.event("stopped") or raw.event("broken")).get("reason", ""),
+            "last": thinned(time_s[recent], volts[recent]),
+            "amplitude": self._amplitude,
+        }
 
 
 def thinned(time_s: FloatArray, values: FloatArray) -> list[tuple[float, float]]:
@@ -91,7 +116,7 @@ def thinned(time_s: FloatArray, values: FloatArray) -> list[tuple[float, float]]
 
 
 class _Handler(BaseHTTPRequestHandler):
-    raw: Path
+    shown: Shown
     page: bytes
     lock = threading.Lock()
 
@@ -104,7 +129,7 @@ class _Handler(BaseHTTPRequestHandler):
         kind, content = "text/html; charset=utf-8", self.page
         if self.path == "/data":
             with self.lock:
-                kind, content = "application/json", json.dumps(state(self.raw)).encode()
+                kind, content = "application/json", json.dumps(self.shown.state()).encode()
         self.send_response(200)
         self.send_header("Content-Type", kind)
         self.send_header("Cache-Control", "no-store")
@@ -117,7 +142,7 @@ class _Handler(BaseHTTPRequestHandler):
 
 def main(raw: str) -> None:
     """Serve the page of a raw file until standard input ends."""
-    _Handler.raw = Path(raw)
+    _Handler.shown = Shown(Path(raw))
     _Handler.page = render("pendpipe.acquisition", "view.html", file=Path(raw).name).encode()
     with ThreadingHTTPServer(("127.0.0.1", 0), _Handler) as server:
         server.daemon_threads = True

@@ -8,11 +8,11 @@ into `DRIVERS` where its class is defined.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final
 
 from pendpipe.acquisition.clock import ScaledClock
-from pendpipe.acquisition.drivers.streams import Scans, marked_scans
+from pendpipe.acquisition.drivers.streams import Scans, marked_scans, out_of_line
 from pendpipe.acquisition.line import Line
 from pendpipe.errors import InputError, refuse_if
 
@@ -207,7 +207,8 @@ class Driver(ABC):
     @classmethod
     def decode(cls, data: bytes, channels: int) -> Scans:
         """Turn bytes of the stream into scans of so many channels."""
-        return cls.scans_of(data, channels, cls.bits)
+        scans = cls.scans_of(data, channels, cls.bits)
+        return replace(scans, suspect=scans.suspect | out_of_line(scans.counts))
 
     def _send_line(self, text: str, needed: bool = True) -> str:
         """Send a command of text and return what follows it in the echo.

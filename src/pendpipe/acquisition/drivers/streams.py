@@ -10,16 +10,23 @@ for 14); the code is offset binary.
 
 The CDC family sends little-endian 16-bit words, and nothing between them (dataq-facts A8). A device
 whose buffer has overflowed sends ``stop 01`` among the words, and nothing after it. A lost byte
-shifts all that follows; in such a stretch nothing can be told but that it is suspect.
+shifts all that follows; in such a stretch nothing can be told but that it is suspect. After a lost
+word the channels change places, which smooth signals show (`exchanged`).
+
+In either form a reading may be made of two halves of others; it is suspect where it is out of line
+(`out_of_line`).
 """
 
+import math
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-from pendpipe.arrays import AnyArray, BoolArray
+from pendpipe.arrays import AnyArray, BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -129,10 +136,154 @@ def plain_scans(data: bytes, channels: int, bits: int = 16) -> Scans:
     stop = STOP_CODE.search(data)
     end = stop.start() if stop else len(data)
     end -= end % (2 * channels)
-    words: AnyArray = np.frombuffer(data[:end], dtype="<i2").reshape(-1, channels)
-    message = Loss(len(words), len(data) - end, 0, stop.group().decode()) if stop else None
-    losses = (message,) if message else ()
-    return Scans(words >> (16 - bits), out_of_step(data[:end], channels), losses)
+    parts, losses, begin = [], [], 0
+    suspect = out_of_step(data[:end], channels)
+    words: AnyArray = np.frombuffer(data[:end], dtype="<i2")
+    while place := exchanged(words[begin:].reshape(-1, channels)):
+        scan, spoilt = place
+        parts.append(np.arange(begin, begin + scan * channels).reshape(-1, channels))
+        losses.append(Loss(sum(map(len, parts)), 2 * spoilt, 1))
+        begin += scan * channels + spoilt
+        words = words[: begin + (len(words) - begin) // channels * channels]
+    parts.append(np.arange(begin, len(words)).reshape(-1, channels))
+    kept = np.concatenate(parts)
+    if stop:
+        losses.append(Loss(len(kept), len(data) - end, 0, stop.group().decode()))
+    doubt = suspect[kept[:, 0] // channels]
+    for loss in losses[: len(parts) - 1]:
+        doubt[max(loss.after_scan - _NEAR, 0) : loss.after_scan + _NEAR] = True
+    return Scans(words[kept] >> (16 - bits), doubt, tuple(losses))
+
+
+_NEAR: Final = 2
+"""Scans on either side of a lost word that may hold it."""
+
+
+def exchanged(words: AnyArray) -> tuple[int, int] | None:
+    """Find the first scan, of shape (scans, channels), behind which channels have changed places.
+
+    Returns
+    -------
+    tuple of int, or None
+        The scan in which words are missing or doubled, and how many words belong to it.
+
+    Notes
+    -----
+    A cubic goes through four scans before one and four behind. Where it leaves more than eight
+    times its median in at least two channels, and at most four times in all of them (3.4 is the
+    most of a million by chance) if those behind are read so many channels on, words were lost or
+    doubled. If they were lost, the channels that went over the end of a scan are of the next one;
+    if doubled, the others are of the last.
+    Where two channels read the same, within the noise, nothing shows it.
+    """
+    channels = words.shape[1]
+    for begin, read in _pieces(words if channels > 1 else words[:0]):
+        left, before, behind = _about(read)
+        usual = np.maximum(np.median(left, axis=0), 1.0)
+        here = np.flatnonzero((left > _CLEARLY * usual).sum(axis=1) > 1)
+        found: list[tuple[int, int]] = []
+        for moved in range(1, channels):
+            turned = np.roll(behind[here], moved, axis=2)
+            over = (np.arange(channels) < moved).astype(int)
+            for late, spoilt in ((over, channels - moved), (over - 1, 2 * channels - moved)):
+                good = (_left(before[here], turned, late) < 0.5 * _CLEARLY * usual).all(axis=1)
+                found += [(begin + int(scan), spoilt) for scan in here[good][:1]]
+        if found:
+            return min(found)
+    return None
+
+
+_PIECE: Final = 1 << 15
+"""Scans that are looked at together: those of days take no more memory than those of an hour."""
+
+
+def _pieces(counts: AnyArray) -> Iterator[tuple[int, FloatArray]]:
+    """Yield pieces, and the number of the first scan that has four before it in the piece."""
+    ends = len(_BEFORE)
+    for begin in range(0, max(len(counts) - _BLOCK - 2 * ends + 1, 0), _PIECE):
+        yield begin + ends, counts[begin : begin + _PIECE + 2 * ends].astype(np.float64)
+
+
+def _about(read: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """What a cubic leaves about each scan, (n, channels), and the four before and behind each."""
+    each = _around(read)
+    squares = np.zeros_like(each[0])
+    for row in _OFF_CUBIC[0]:
+        squares += sum(factor * one for factor, one in zip(row, each, strict=True)) ** 2
+    window = sliding_window_view(read, 9, axis=0).transpose(0, 2, 1)
+    return np.sqrt(squares / 8.0), window[:, :4], window[:, 5:]
+
+
+def _around(read: FloatArray) -> list[FloatArray]:
+    """The four scans before and the four behind each that has them, (n, channels) each."""
+    return [read[at : at + len(read) - 8] for at in (*range(4), *range(5, 9))]
+
+
+def _left(before: AnyArray, behind: AnyArray, late: IntArray) -> AnyArray:
+    """What a cubic through four scans before one, and four behind, leaves: shape (n, channels).
+
+    Those behind are so many scans late, by channel.
+    """
+    together = np.concatenate([before, behind], axis=1)
+    off = np.stack([_OFF_CUBIC[number] for number in late.tolist()], axis=2)
+    return np.asarray(np.sqrt(np.sum(np.einsum("ijc,njc->nic", off, together) ** 2, axis=1) / 8.0))
+
+
+def _off_cubic(late: int) -> AnyArray:
+    """Four directions of eight readings that no cubic has, shape (4, 8)."""
+    powers = np.vander(np.concatenate([_BEFORE, _BEHIND + late]).astype(np.float64), 4)
+    return np.linalg.qr(powers, mode="complete")[0][:, 4:].T
+
+
+_BEFORE: Final = np.arange(-4, 0)
+_BEHIND: Final = np.arange(1, 5)
+_AT_THE_SCAN: Final = np.linalg.pinv(
+    np.vander(np.concatenate([_BEFORE, _BEHIND]).astype(np.float64), 4)
+)[-1]
+"""By which eight readings give the cubic's at the scan between them."""
+_OFF_CUBIC: Final = {late: _off_cubic(late) for late in (-1, 0, 1)}
+
+
+def out_of_line(counts: AnyArray) -> BoolArray:
+    """Find scans with a reading that may be made of two halves of others, shape (scans,).
+
+    Two bytes lost or doubled leave such a reading, and move those behind by a scan. A cubic goes
+    through the four scans before one and the four behind, as they stand, or late by one or by minus
+    one. Suspect is a scan if one of these leaves less than four times the usual, and the reading is
+    more than eight times the usual off it, or the cubic of those as they stand leaves more than
+    eight times its usual. Usual is the median of 48 scans. What is no more than the noise can't be
+    seen, nor what is about equal readings, where a signal is cut off.
+    """
+    odd = np.zeros(len(counts), dtype=bool)
+    as_it_stands = np.zeros(counts.shape[1], dtype=int)
+    for begin, read in _pieces(counts):
+        left, before, behind = _about(read)
+        usual = np.maximum(_usual(left), _ROUNDED)
+        seen = sum(part * one for part, one in zip(_AT_THE_SCAN, _around(read), strict=True))
+        off = np.abs(read[4:-4] - seen)
+        outlying = off > _CLEARLY * np.maximum(_usual(off), 1.0)
+        level = np.zeros(left.shape, dtype=bool)
+        for three in (before[:, :3], before[:, 1:], behind[:, :3], behind[:, 1:]):
+            level |= np.ptp(three, axis=1) == 0.0
+        moved = left > _CLEARLY * usual
+        here = np.flatnonzero(((outlying | moved) & ~level).any(axis=1))
+        for late in (-1, 0, 1):
+            rest = _left(before[here], behind[here], as_it_stands + late)
+            good = (rest < 0.5 * _CLEARLY * usual[here]).all(axis=1)
+            odd[begin + here[good]] = True
+    return odd
+
+
+def _usual(left: AnyArray) -> AnyArray:
+    """Median of the block that each scan is in, as a standard deviation; shape as given."""
+    blocks = len(left) // _BLOCK
+    inside = left[: blocks * _BLOCK].reshape(blocks, _BLOCK, -1)
+    usual = 1.4826 * np.median(inside, axis=1)
+    return np.asarray(usual[np.minimum(np.arange(len(left)) // _BLOCK, blocks - 1)])
+
+
+_ROUNDED: Final = math.sqrt(0.5 / 12.0)
+"""What such a cubic leaves of numbers that are rounded alone: four directions of eight."""
 
 
 _BLOCK: Final = 48
