@@ -193,6 +193,19 @@ def test_a_page_takes_the_options_of_the_fit(
     assert with_error(fit["g"].value, fit["g"].sd, "m/s^2", short=True) in out.read_text("utf-8")
 
 
+@pytest.mark.parametrize("period", [[], ["--period", "1.7"]])
+def test_a_ruler_s_amplitudes_make_a_page(
+    of_a_class: list[str], period: list[str], tmp_path: Path, answer_of: Any
+) -> None:
+    """Their curve is that of the pendulum that was fitted."""
+    out = tmp_path / "ruler.html"
+    answer_of(["page", of_a_class[3], "--length", "0.6", *period, "--out", str(out)])
+    assert "viscous or internal" in out.read_text("utf-8")
+    fit = pp.fit(of_a_class[3], length_m=0.6)
+    left = fit.points.angle_rad - fit.predict(fit.points.time_s)
+    assert np.sqrt(np.mean(left**2)) < 1.1 * fit.residual_rms_rad
+
+
 def test_a_length_with_its_error_makes_g_with_its_error(
     answer_of: Any,
 ) -> None:

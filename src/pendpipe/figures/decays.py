@@ -117,6 +117,12 @@ class Decay:
             y = physics.amplitude(elapsed_s, start, *rates)
             with np.errstate(divide="ignore", invalid="ignore"):
                 return y, physics.quality_factor(y, frequency, *rates)
+        if self.fit.method == "amplitudes":
+            y = self.fit.predict(self.points.time_s[0] + elapsed_s)
+            # Without a period there is no Q.
+            timeless = not math.isfinite(frequency)
+            q = [math.nan if timeless else self.fit.quality_factor(each).value for each in y]
+            return y, np.array(q)
         until_s = float(elapsed_s[-1]) + 2.0 / frequency
         turned = turning_points(self.fit.law, Release(0.0, start), until_s=until_s)
         if len(turned.time_s) < 4:

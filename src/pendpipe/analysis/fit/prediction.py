@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pendpipe.analysis.fit.by_amplitudes import pendulum_decay
 from pendpipe.analysis.fit.decrement import loss_of
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Release, sample
@@ -22,7 +23,10 @@ def predicted(result: FitResult, time_s: FloatArray) -> FloatArray:
     assert points is not None
     omega, y0 = 2.0 * math.pi * result.value("frequency"), result.value("amplitude")
     if result.method == "amplitudes":
-        return amplitude(time_s - points.time_s[0], y0, *map(result.value, "abc"))
+        since, rates = time_s - points.time_s[0], map(result.value, "abc")
+        if result.restoring == "linear":
+            return amplitude(since, y0, *rates)
+        return pendulum_decay(result.hysteretic_share, result.drag, since, y0, *rates)[0]
     side = float(points.side[0])
     # The phase at the first reading counts from a turning point on the positive side.
     late = result.value("phase") - (0.0 if side > 0.0 else math.pi)
