@@ -484,6 +484,7 @@ def test_a_diagnosis_is_not_advised_where_it_refuses() -> None:
     assert str(fit).endswith("Next: --accept prints the law")
 
 
+@pytest.mark.slow
 def test_the_errors_of_a_b_and_the_half_life_cover_the_truth() -> None:
     """Fourteen amplitudes with all three losses, read to 0.5 % of the first, 120 times."""
     a, b, c = 0.01, 0.004, 1e-4

@@ -447,7 +447,7 @@ def slowing_spring(time_s: FloatArray) -> FloatArray:
         (eq8_decay, 1e-4, "waveform"),
         (eq8_decay, 2e-3, "waveform"),
         # All readings have lost the phase; the turning points, which are counted, have not.
-        (slowing_spring, 1e-4, "turning-points"),
+        pytest.param(slowing_spring, 1e-4, "turning-points", marks=pytest.mark.slow),
     ],
 )
 def test_fit_and_diagnosis_print_the_same_baseline(

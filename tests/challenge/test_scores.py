@@ -227,6 +227,7 @@ def test_a_cancelling_pair_hides_itself() -> None:
     assert all(e["delta_chi2"] < e["alone_delta_chi2"] for e in pair["effects"])
 
 
+@pytest.mark.slow
 def test_what_is_outside_leaves_something_to_every_catalogue_entry() -> None:
     (effect,) = truth_of(1, "cogging", sizes=(100.0,), family="outside")["effects"]
     assert effect["left_by_catalogue"] == pytest.approx(100.0, rel=0.5)

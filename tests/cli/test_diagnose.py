@@ -154,6 +154,7 @@ def test_a_pendulum_lacks_nothing_and_its_sin_x_is_presumed(sine: Path, tmp_path
     ]
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_named_and_the_fit_improves_to_the_noise(
     sine: Path, tmp_path: Path
 ) -> None:

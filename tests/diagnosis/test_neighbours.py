@@ -161,6 +161,7 @@ def test_no_name_for_a_part_of_a_misfit_is_confident() -> None:
     assert all(effect.probability < 0.5 for effect in others)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first_hz", [0.86, 1.76])
 def test_what_chance_does_not_explain_is_never_called_consistent(first_hz: float) -> None:
     """A line that sweeps by the fundamental, or the second harmonic, and is in no catalogue."""
@@ -291,6 +292,7 @@ def test_a_random_cause_pays_the_price_of_a_name(name: str, names: tuple[str, ..
         ] * told
 
 
+@pytest.mark.slow
 def test_two_laws_that_share_a_misfit_are_both_found() -> None:
     """Each takes half of it, which is not worth the price of a name before the other is there."""
     step, sensor = VALUES["equilibrium-step"], VALUES["sensor-quadratic"]
@@ -384,6 +386,7 @@ def test_coloured_noise_is_predicted_from_what_is_known() -> None:
     np.testing.assert_allclose(filled[~out], walk[~out])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sizes", [(14.0, -10.0, 12.0), (12.0, 8.0), (120.0, 80.0)])
 def test_several_jumps_of_the_zero_are_found_each_and_are_no_glitches(
     sizes: tuple[float, ...],

@@ -353,6 +353,7 @@ def named(readings: FloatArray, seed: int) -> set[str]:
     }
 
 
+@pytest.mark.slow
 def test_weak_drifts_of_the_offset_in_white_noise_are_distinguished_from_red_noise() -> None:
     """Delta chi^2 = (slope/sigma)^2 sum (t - mean t)^2 = 196; found in most of six."""
     centred = TIME_S - TIME_S.mean()
@@ -361,6 +362,7 @@ def test_weak_drifts_of_the_offset_in_white_noise_are_distinguished_from_red_noi
     assert np.mean(found) > 0.5
 
 
+@pytest.mark.slow
 def test_red_noise_is_not_reported_as_a_drift() -> None:
     """Twice the white density at 0.05 Hz, as 1/f below; three of ten are one in 10,000."""
     frequency = np.arange(len(TIME_S)) / (2.0 * len(TIME_S) * INTERVAL_S)

@@ -88,6 +88,7 @@ def test_a_ships_righting_moment_hardens() -> None:
     assert -0.375 * k3 == pytest.approx(-0.27, abs=0.08)
 
 
+@pytest.mark.slow
 def test_a_ship_hardens_rather_than_drifts() -> None:
     """A clock that drifts by 0.7 % would fit as well, and has a lower prior."""
     named = diagnose_recording(whole(SHIP)).missing

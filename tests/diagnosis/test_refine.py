@@ -498,6 +498,7 @@ def holds(estimates: dict[str, Estimate], truth: FloatArray) -> list[bool]:
     return inside
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("identifier", "size"), [("equilibrium-step", 4e-5), ("impulse", 2.5e-4)])
 def test_weak_steps_and_knocks_lie_within_their_intervals(identifier: str, size: float) -> None:
     """At Delta chi^2 of some 40, chi^2 has minima in several half cycles."""

@@ -331,6 +331,7 @@ def test_four_swings_at_uneven_times_are_answered() -> None:
     assert found.verdict == "consistent"
 
 
+@pytest.mark.slow
 def test_the_answer_does_not_depend_on_the_unit() -> None:
     """Two modes, in radians and in counts of a thousandth: the bounds of sizes go with it."""
     time_s = np.arange(0.0, 35.0, 0.05)
