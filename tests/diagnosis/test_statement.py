@@ -12,7 +12,7 @@ import pytest
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.held_out import HeldOut
-from pendpipe.diagnosis.location import locate
+from pendpipe.diagnosis.location import curve_told, locate
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import Remainder, remainder_of, with_errors
@@ -20,9 +20,19 @@ from pendpipe.diagnosis.result import Diagnosis, FittedModel, FoundEffect, Locat
 from pendpipe.diagnosis.rivals import near_harmonic_by_chance
 from pendpipe.diagnosis.summary import numbers_of, statement
 from pendpipe.diagnosis.values import constants_of, curve_values
+from pendpipe.diagnosis.weighing import curve_of
 from pendpipe.effects.baseline import OMEGA, TIME, A, B, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
-from pendpipe.effects.curves import CURVES, Curve, damping_curve, drive_curve
+from pendpipe.effects.curves import (
+    CURVES,
+    Curve,
+    damping_curve,
+    drive_curve,
+    friction_curve,
+    offset_curve,
+    reading_curve,
+    restoring_curve,
+)
 from pendpipe.effects.effect import STRAIGHT_S, Effect
 from pendpipe.effects.model import Model
 from pendpipe.estimate import Z95, Estimate
@@ -37,6 +47,7 @@ from .records import (
     TONE_HZ,
     TRUTH,
     diagnosed,
+    hypothesis_of,
     null_fit,
     other_engine,
     prepared,
@@ -414,6 +425,80 @@ def test_a_loss_curve_is_the_missing_loss() -> None:
     exponent = 1.0 + expected / (LINEAR + expected)
     assert found["local_exponent"][inside] == pytest.approx(exponent[inside], abs=0.15)
     assert np.all(found["local_exponent_sd"] > 0.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "height", "unit", "says"),
+    [
+        (restoring_curve, 0.05, "rad", "the torque is stiffer by 5 % within 0.291° of the lowest"),
+        (restoring_curve, -0.05, "m", "the torque is softer by 5 % within 5.08 mm of the lowest"),
+        (friction_curve, 0.5, "rad", "the friction is larger by 4.77 mrad/s² within 1.16° of the"),
+        (reading_curve, -0.05, "rad/s", "the reading is lower by 342 µrad/s from -20.3 mrad/s to"),
+        (damping_curve, 0.3, "rad", "the loss is larger by 0.00338 s⁻¹ from 2.88° to 3.73° (ampl"),
+        (offset_curve, 0.02, "rad", "the offset is higher by 136 µrad from 11.7 s to 33.3 s (time"),
+        (drive_curve, 0.0, "rad", ""),
+    ],
+)
+def test_a_curve_says_where_and_how_large_it_is(
+    kind: type[Curve], height: float, unit: str, says: str
+) -> None:
+    """Beside the lowest point, or between the second knot and the sixth, the middle three alike."""
+    model = Model(TIME_S, INTERVAL_S)
+    whole = kind(model.evaluate(TRUTH).span)
+    shape, middle = np.zeros((whole.basis_size, 1)), len(whole.knots) // 2
+    near = slice(middle - 2, middle + 3) if "angle" in whole.argument else slice(2, 5)
+    shape[near, 0] = whole.knots[near] / whole.knots[near][-1] if whole.is_torque else 1.0
+    curve, faint = whole.reduced(shape), 1e-6
+    start = np.append(TRUTH, height)
+    readings = model.adding(curve).reading(start) + white(3, rms=faint)
+    fit = refine(model.adding(curve), *prepared(readings, rms=faint), start)
+    told = curve_told(fit, curve, unit)
+    assert told["summary"].startswith(says)
+    assert bool(told["summary"]) == bool(says)
+
+
+@pytest.mark.parametrize(("probability", "kept"), [(0.78, True), (0.21, True), (0.1, False)])
+def test_a_curve_is_kept_where_it_is_a_rival_of_a_name(probability: float, kept: bool) -> None:
+    fit, data, noise = null_fit()
+    curve = friction_curve(fit.at.span).reduced(np.ones((15, 1)))
+    start = np.append(fit.value, 0.0)
+    with_it = refine(fit.model.adding(curve), data, noise, start)
+    drift = by_identifier("damping-drift")
+    found = curve_of(
+        hypothesis_of(fit, data, noise, (), fit), [(1.0, drift, fit), (probability, curve, with_it)]
+    )
+    assert (found is not None) is kept
+    assert found is None or found["name"] == friction_curve.name
+
+
+@pytest.mark.parametrize(
+    ("kind", "unit", "axes"),
+    [
+        (restoring_curve, "rad/s", ("angle, rad", "extra restoring torque over omega^2, rad")),
+        (reading_curve, "rad/s", ("rate, rad/s", "reading minus rate, rad/s")),
+        (damping_curve, "rad/s", ("amplitude, rad", "extra loss rate, 1/s")),
+        (restoring_curve, "m", ("angle, m", "extra restoring torque over omega^2, m")),
+    ],
+)
+def test_a_gyroscope_reads_rates_of_a_motion_in_rad(
+    kind: type[Curve], unit: str, axes: tuple[str, str]
+) -> None:
+    assert kind(null_fit()[0].at.span).axes(unit) == axes
+
+
+def test_what_acts_on_the_motion_of_a_gyroscope_has_the_units_of_an_angle() -> None:
+    units = {
+        name: [each.unit_in(effect.acts_on("rad/s")) for each in effect.parameters]
+        for name in ("cubic-stiffness", "sensor-cubic", "offset-drift", "impulse", "tone-pickup")
+        for effect in [by_identifier(name)]
+    }
+    assert units == {
+        "cubic-stiffness": ["1/rad^2"],
+        "sensor-cubic": ["s^2/rad^2"],
+        "offset-drift": ["rad/s^2", "s"],
+        "impulse": ["rad/s", "s"],
+        "tone-pickup": ["rad/s", "rad/s", "Hz"],
+    }
 
 
 def test_a_drive_has_two_curves() -> None:

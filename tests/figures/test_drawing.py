@@ -441,6 +441,8 @@ def test_the_figure_of_the_decay_is_small_at_any_length(tmp_path: Path) -> None:
 def curve(**more: Any) -> dict[str, Any]:
     at = np.geomspace(0.02, 0.2, 20)
     return {
+        "name": "a loss that depends on the amplitude in an unknown way",
+        "summary": "the loss is larger by 0.0002 s⁻¹ from 5.7° to 11.5° (amplitude)",
         "argument": "amplitude, rad",
         "ordinate": "extra loss rate, 1/s",
         "at": at,
@@ -462,6 +464,7 @@ def test_an_unnamed_effect_is_drawn_with_its_95_percent_band(outcome: Any) -> No
     assert np.ptp(band[np.isclose(band[:, 0], 20.0), 1]) == pytest.approx(2 * 1.96e-4)
     assert axes.get_xlabel() == "Amplitude (mrad)"
     assert axes.get_ylabel() == "Extra loss rate (s⁻¹)"
+    assert axes.get_title(loc="left").startswith("The loss is larger by 0.0002 s⁻¹")
 
 
 def test_a_loss_has_its_local_exponent_below(outcome: Any) -> None:

@@ -222,7 +222,8 @@ class FoundEffect:
     location
         Where it shows.
     curve
-        For an unnamed effect: the curve with its band.
+        Where it, or a rival of a probability of a fifth or more, is a curve without a name: the
+        curve with its band, its name, and a clause that says where it is how large.
     confirmed
         What a second test found that does not use the model.
     presumed

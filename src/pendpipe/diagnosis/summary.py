@@ -411,8 +411,11 @@ def _matters(diagnosis: Diagnosis, changes: Sequence[Change], unit: str) -> str:
 
 def _where(diagnosis: Diagnosis, found: Sequence[FoundEffect]) -> str:
     """Say where the most probable effect shows, and where the rest lies."""
-    first = max(found, key=lambda each: each.probability)
+    first = max(found, key=_leader)
     text = first.location.summary.removeprefix("it shows ").removeprefix("It shows ")
+    curves = [each.curve for each in (first, *found) if each.curve and each.curve["summary"]]
+    told = list({curve["name"]: curve["summary"] for curve in reversed(curves)}.values())
+    text = "; ".join(told if _is_described(first) and told else [text, *told])
     remainder = diagnosis.remainder
     if remainder is not None and remainder.systematic and remainder.shares:
         name, share = max(remainder.shares.items(), key=lambda item: item[1])
@@ -625,6 +628,7 @@ def _effect(effect: FoundEffect) -> str:
             if name in wanted and each.sd > 0.0
         ),
         effect.location.summary,
+        effect.curve["summary"] if effect.curve else "",
     ]
     if effect.confirmed is not None:
         sure = "confirmed" if effect.confirmed.p_value < _CONFIRMED else "not confirmed"

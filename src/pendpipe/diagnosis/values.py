@@ -162,11 +162,12 @@ def effect_parameters(fit: Fit, effect: Effect, unit: str = "rad") -> dict[str, 
     if position is None:
         return {}
     found, sds, (lowest, highest) = {}, _sds(fit), fit.model.bounds()
+    own = effect.acts_on(unit)
     for index, parameter in enumerate(effect.parameters, position.start + effect.parameter_free):
         value, sd = float(fit.value[index]), float(sds[index])
         low, high = Estimate(value, sd, "").bounds95
         interval = max(low, float(lowest[index])), min(high, float(highest[index]))
-        found[parameter.name] = Estimate(value, sd, parameter.unit_in(unit), interval)
+        found[parameter.name] = Estimate(value, sd, parameter.unit_in(own), interval)
     return found
 
 
@@ -189,7 +190,7 @@ def curve_values(fit: Fit, effect: Curve, unit: str = "rad") -> dict[str, Any]:
     effect
         The curve.
     unit
-        Of the readings: ``"rad"``, or ``"m"`` for a displacement.
+        Of the readings: ``"rad"``, ``"rad/s"``, or ``"m"`` for a displacement.
 
     Returns
     -------
@@ -198,29 +199,35 @@ def curve_values(fit: Fit, effect: Curve, unit: str = "rad") -> dict[str, Any]:
         and ``sd``, shape (k,). A drive has ``quadrature`` and ``quadrature_sd`` besides; a
         loss by amplitude ``local_exponent`` and ``local_exponent_sd``.
     """
-    position = next(position for other, position in fit.model.places() if other is effect)
-    covariance, by_amplitude = (
-        fit.covariance()[position, position],
-        isinstance(effect, damping_curve),
-    )
+    by_amplitude = isinstance(effect, damping_curve)
     spaced = np.geomspace if by_amplitude else np.linspace
     at = np.asarray(spaced(effect.knots[0], effect.knots[-1], _CURVE_POINTS))
-    scale = effect.scale(fit.model.pendulum(fit.value))
-    in_unit = effect.argument.replace("rad", unit)
-    found: dict[str, Any] = {
-        "argument": effect.argument if "phase" in effect.argument else in_unit,
-        "ordinate": effect.ordinate.replace(", rad", f", {unit}"),
-        "at": at,
-    }
-    each = np.stack([effect.curves(one, at) for one in np.eye(effect.sizes)], axis=2)
-    for name, columns in zip(effect.drawn, each, strict=True):
-        found[name] = scale * columns @ fit.value[position]
+    argument, ordinate = effect.axes(unit)
+    found: dict[str, Any] = {"argument": argument, "ordinate": ordinate, "at": at}
+    for name, (value, sd) in curves_of(fit, effect, at).items():
         prefix = f"{name}_" if name != "value" else ""
-        found[f"{prefix}sd"] = abs(scale) * _errors(columns, covariance)
+        found |= {name: value, f"{prefix}sd": sd}
     if by_amplitude:
         exponent = _with_errors(fit, lambda value: _local_exponent(fit, effect, value, at))
         found["local_exponent"], found["local_exponent_sd"] = exponent
     return found
+
+
+def curves_of(
+    fit: Fit, effect: Curve, at: FloatArray, *, odd: bool = False
+) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return the values and errors of each curve that is drawn, or of its odd part."""
+    position = next(position for other, position in fit.model.places() if other is effect)
+    scale = effect.scale(fit.model.pendulum(fit.value))
+    covariance = fit.covariance()[position, position]
+    each = [effect.curves(one, at) for one in np.eye(effect.sizes)]
+    if odd:
+        each = [0.5 * (one - one[:, ::-1]) for one in each]
+    drawn = np.stack(each, axis=2)
+    return {
+        name: (scale * columns @ fit.value[position], abs(scale) * _errors(columns, covariance))
+        for name, columns in zip(effect.drawn, drawn, strict=True)
+    }
 
 
 def _local_exponent(fit: Fit, effect: Curve, value: FloatArray, at: FloatArray) -> FloatArray:

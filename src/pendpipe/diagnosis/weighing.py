@@ -4,14 +4,14 @@ import math
 from collections.abc import Collection, Container, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Step, is_further, is_gross
 from pendpipe.diagnosis.instants import with_instants
-from pendpipe.diagnosis.location import locate
+from pendpipe.diagnosis.location import curve_told, locate
 from pendpipe.diagnosis.refine import SETTLED, Fit, best_fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import with_errors
@@ -27,7 +27,8 @@ from pendpipe.diagnosis.rivals import (
     probabilities,
     useful_chi2,
 )
-from pendpipe.diagnosis.values import curve_values, effect_parameters
+from pendpipe.diagnosis.summary import CANDIDATE
+from pendpipe.diagnosis.values import effect_parameters
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.curves import Curve
@@ -137,6 +138,8 @@ def effect_named(found: Hypothesis, step: Step, weighed: Weighed) -> FoundEffect
     effect = step.winner.lead.effect
     found = beside(found, effect)
     without, gain, mates, weights, _ = weighed
+    rivals = zip(weights[1:].tolist(), mates, strict=False)
+    members = [(probability, mate.lead.effect, mate.fit) for probability, mate in rivals]
     return FoundEffect(
         effect.identifier,
         effect.name,
@@ -159,8 +162,19 @@ def effect_named(found: Hypothesis, step: Step, weighed: Weighed) -> FoundEffect
         ),
         effect.discriminating_test,
         locate(without, found.fit, found.data, effect),
-        curve_values(found.fit, effect, found.data.unit) if isinstance(effect, Curve) else None,
+        curve_of(found, [(1.0, effect, found.fit), *members]),
     )
+
+
+def curve_of(
+    found: Hypothesis, members: Sequence[tuple[float, Effect, Fit]]
+) -> dict[str, Any] | None:
+    """Return the first curve among an effect and its rivals that is a candidate."""
+    for probability, effect, fit in members:
+        if isinstance(effect, Curve) and probability >= CANDIDATE:
+            fit = with_errors(fit, found.data, found.noise) if fit is not found.fit else fit
+            return curve_told(fit, effect, found.data.unit)
+    return None
 
 
 def _others_in_place(found: Hypothesis, effect: Effect) -> Fit | None:

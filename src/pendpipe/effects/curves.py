@@ -8,7 +8,7 @@ its own fitted motion (`Curve.reduced`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from operator import attrgetter
 from typing import Any, ClassVar
@@ -41,6 +41,10 @@ class Curve(Effect):
     ordinate: ClassVar[str]
     """What is drawn."""
     flavour: ClassVar[str] = ""
+    words: ClassVar[Mapping[str, tuple[str, str, str]]]
+    """By the curve's name in `drawn`: what it is of, and what that is where larger and smaller."""
+    is_torque: ClassVar[bool] = False
+    """Whether it is told as a change of the stiffness: over its argument."""
     drawn: ClassVar[tuple[str, ...]] = ("value",)
     """The curves that are drawn over the same argument."""
     over_logarithm: ClassVar[bool] = False
@@ -82,6 +86,15 @@ class Curve(Effect):
             at, knots = np.log(at), np.log(knots)
         heights = np.split(self.coefficients @ values, len(self.drawn))
         return np.array([np.interp(at, knots, height) for height in heights])
+
+    def axes(self, unit: str) -> tuple[str, str]:
+        """Return what it is drawn against, and what is drawn, with units, of readings in `unit`."""
+        on = self.acts_on(unit)
+        along, across = self.argument, self.ordinate.replace(", rad", f", {on}")
+        along = along if along.startswith("phase") else along.replace("rad", on)
+        if on == "rad/s":
+            along, across = along.replace("angle", "rate"), across.replace("angle", "rate")
+        return along, across
 
     def scale(self, pendulum: Pendulum) -> float:
         """Return the reasonable unit in that of `ordinate`."""
@@ -190,6 +203,8 @@ def share_of_swing(share: float, _: Pendulum, span: Span) -> float:
     equation=r"\omega^2 x \to \omega^2 x + F(x)",
     argument="angle, rad",
     ordinate="extra restoring torque over omega^2, rad",
+    words={"value": ("the torque is", "stiffer", "softer")},
+    is_torque=True,
     discriminating_test=(
         "measure the torque against the angle at rest, or map it with a second pendulum"
     ),
@@ -211,6 +226,7 @@ def restoring_curve(motion: Motion, pendulum: Pendulum, torque: FloatArray) -> F
     argument="amplitude, rad",
     ordinate="extra loss rate, 1/s",
     flavour="amplitude",
+    words={"value": ("the loss is", "larger", "smaller")},
     discriminating_test=(
         "release it from several amplitudes: the loss must follow the amplitude, not the time"
     ),
@@ -231,6 +247,7 @@ def damping_curve(motion: Motion, pendulum: Pendulum, rate: FloatArray) -> Float
     argument="angle, rad",
     ordinate="extra friction, rad/s^2",
     flavour="angle",
+    words={"value": ("the friction is", "larger", "smaller")},
     discriminating_test="turn the bearing by a few degrees: a rough spot goes with it",
 )
 def friction_curve(motion: Motion, pendulum: Pendulum, friction: FloatArray) -> FloatArray:
@@ -249,6 +266,7 @@ def friction_curve(motion: Motion, pendulum: Pendulum, friction: FloatArray) -> 
     argument="phase since the last turning point, rad",
     ordinate="extra friction over amplitude, 1/s^2",
     flavour="profile",
+    words={"value": ("the friction over the amplitude is", "larger", "smaller")},
     discriminating_test=(
         "sample the swing faster, and look at the velocity about the turning points"
     ),
@@ -271,6 +289,10 @@ def profile_curve(motion: Motion, pendulum: Pendulum, profile: FloatArray) -> Fl
     equation=r"\ddot x \to \ddot x + p(t)\,\omega^2 x + q(t)\,\omega \dot x",
     argument="time, s",
     ordinate="extra torque over omega^2 y",
+    words={
+        "value": ("the torque is", "softer", "stiffer"),
+        "quadrature": ("the swing is", "driven", "braked"),
+    },
     discriminating_test="repeat the run: what depends on the time of day does not come again",
 )
 def drive_curve(
@@ -292,6 +314,7 @@ def drive_curve(
     argument="angle, rad",
     ordinate="reading minus angle, rad",
     flavour="angle",
+    words={"value": ("the reading is", "higher", "lower")},
     discriminating_test="calibrate the sensor at rest over the whole range",
 )
 def reading_curve(sampled: Sampled, pendulum: Pendulum, added: FloatArray) -> FloatArray:
@@ -311,6 +334,7 @@ def reading_curve(sampled: Sampled, pendulum: Pendulum, added: FloatArray) -> Fl
     argument="time, s",
     ordinate="offset, rad",
     flavour="time",
+    words={"value": ("the offset is", "higher", "lower")},
     discriminating_test="record the pendulum at rest for as long",
 )
 def offset_curve(sampled: Sampled, pendulum: Pendulum, added: FloatArray) -> FloatArray:
@@ -351,6 +375,7 @@ def _resists_the_more(curve: Curve, values: FloatArray) -> bool:
     argument="way since the turning point, rad",
     ordinate="extra friction, rad/s^2",
     flavour="memory",
+    words={"value": ("the friction is", "larger", "smaller")},
     discriminating_test=(
         "turn it back in mid swing, by hand and slowly: the friction must start anew from there"
     ),
@@ -377,6 +402,7 @@ def memory_curve(motion: Motion, pendulum: Pendulum, friction: FloatArray) -> Fl
     argument="time, s",
     ordinate="extra loss rate, 1/s",
     flavour="time",
+    words={"value": ("the loss is", "larger", "smaller")},
     discriminating_test=(
         "release it again with the same amplitude: what depends on the time is not the same"
     ),
@@ -398,6 +424,7 @@ def damping_in_time_curve(motion: Motion, pendulum: Pendulum, rate: FloatArray) 
     argument="amplitude, rad",
     ordinate="gain less 1",
     flavour="gain",
+    words={"value": ("the gain is", "higher", "lower")},
     discriminating_test="film the swing: a second sensor must see the same amplitudes",
 )
 def gain_curve(sampled: Sampled, pendulum: Pendulum, gain: FloatArray) -> FloatArray:
@@ -417,6 +444,7 @@ def gain_curve(sampled: Sampled, pendulum: Pendulum, gain: FloatArray) -> FloatA
     argument="amplitude, rad",
     ordinate="delay, s",
     flavour="delay",
+    words={"value": ("the reading is", "later", "earlier")},
     discriminating_test=(
         "pass a light barrier at the middle: its times must show the same frequency"
     ),

@@ -26,6 +26,16 @@ How = Literal["acceleration", "kick", "reading", "delay"]
 """The methods of `Effect` by which one enters."""
 
 
+_OF_RATES: Final = {
+    "rad": "rad/s",
+    "rad/s": "rad/s^2",
+    "1/rad": "s/rad",
+    "1/rad^2": "s^2/rad^2",
+    "s/rad": "s^2/rad",
+}
+"""Units of what acts on readings in rad, and on readings in rad/s."""
+
+
 class Parameter(NamedTuple):
     """A parameter of an effect, with the bounds within which it is believed."""
 
@@ -40,8 +50,9 @@ class Parameter(NamedTuple):
     ``_sine`` are printed as one amplitude under the first one's word."""
 
     def unit_in(self, unit: str) -> str:
-        """Return its unit where displacements are in `unit` ("rad" or "m"); "" for a number."""
-        return "" if self.unit == "1" else self.unit.replace("rad", unit)
+        """Return its unit where displacements are in `unit` (rad, m, rad/s); "" for a number."""
+        own = "" if self.unit == "1" else self.unit
+        return _OF_RATES.get(own, own) if unit == "rad/s" else own.replace("rad", unit)
 
     @property
     def power(self) -> int:
@@ -200,6 +211,14 @@ class Effect:
     def key(self) -> str:
         """What distinguishes it from other entries."""
         return self.identifier
+
+    def acts_on(self, unit: str) -> str:
+        """Return the unit of what it acts on, of readings in `unit`.
+
+        A gyroscope's motion is an angle, whatever is read.
+        """
+        on_motion = type(self).reading is Effect.reading or type(self).kick is not Effect.kick
+        return "rad" if unit == "rad/s" and on_motion else unit
 
     @property
     def one_sided(self) -> bool:

@@ -451,17 +451,17 @@ def _power(values: FloatArray) -> tuple[str, float]:
 
 @styled
 def draw_curve(content: Shown) -> Figure:
-    """Draw the curve of each unnamed effect, one below the other."""
+    """Draw each curve without a name that is a candidate, one below the other."""
     unnamed = [effect for effect in content.diagnosis.missing if effect.curve is not None]
     if not unnamed:
         raise NothingToDrawError("every effect has a name")
-    below = [panel for effect in unnamed for panel in _curves(effect.name, effect.curve or {})]
+    below = [panel for effect in unnamed for panel in _curves(effect.curve or {})]
     height = 2.7 * len(below)
     margins = {"left": 0.15, "bottom": 0.5 / height, "top": 1.0 - 0.45 / height, "hspace": 0.5}
     return figure_of(height, *below, margins=margins, sharex=False)
 
 
-def _curves(effect: str, drawn: Mapping[str, Any]) -> Iterator[Panel]:
+def _curves(drawn: Mapping[str, Any]) -> Iterator[Panel]:
     """A curve, or its two parts (in phase and in quadrature); and its local exponent."""
     at, argument = _scaled(drawn["at"], drawn["argument"])
     looks = [("value", "sd", BLUE, "-", "in phase")]
@@ -479,11 +479,12 @@ def _curves(effect: str, drawn: Mapping[str, Any]) -> Iterator[Panel]:
         ]
     label = f"{name[:1].upper()}{name[1:]}" + (f" ({pretty_unit(short)})" if short else "")
     about = {"xlabel": argument, "xmargin": 0.01}
-    own = about | {"ylabel": "\n".join(textwrap.wrap(label, 30))}
+    own = about | {"ylabel": "\n".join(textwrap.wrap(label, 26))}
     if len(looks) > 1:
         yield Panel(marks, own, key=2)
     else:
-        yield Panel(marks, own | {"title": effect[:1].upper() + effect[1:]})
+        title = textwrap.fill(drawn["summary"] or drawn["name"], 70)
+        yield Panel(marks, own | {"title": title[:1].upper() + title[1:]})
     if "local_exponent" in drawn:
         # The power of the velocity that the whole loss follows, by amplitude.
         value = np.asarray(drawn["local_exponent"])
