@@ -1,10 +1,10 @@
 """Whether the tests notice when the library is wrong: mutations drawn from a commit's hash.
 
     pip install "pendpipe[mutations]"
-    python -m benchmarks.mutations [--number 30] [--commit HEAD] [--place DIR] [--all]
+    python -m benchmarks.mutations [--number 30] [--commit HEAD] [--place DIR] [--of TEXT] [--all]
 
 Of all mutations of `src/pendpipe` that cosmic-ray lists some are drawn, for one commit always the
-same. Each is tried in a clone until a test fails with the mutation and passes without: first by the
+same (with ``--of`` those of modules whose path holds a text). Each is tried in a clone until a test fails with the mutation and passes without: first by the
 test files that import the module, then by those of its folder, and with ``--all`` by the others.
 A mutation that leaves the syntax tree as it is but for annotations and texts changes no result: the
 next one replaces it, as it replaces those of ``equivalent_mutations.tsv``, which stand there with
@@ -184,6 +184,7 @@ def main() -> None:
     parser = judge_parser(__doc__, "mutations", 30)
     parser.add_argument("--commit", default="HEAD", help="whose library is mutated (%(default)s)")
     parser.add_argument("--place", type=Path, default=KEPT / "mutations", help="of the clone")
+    parser.add_argument("--of", default="", metavar="TEXT", help="in the path of the module")
     parser.add_argument("--all", action="store_true", help="try survivors by every other test")
     arguments = parser.parse_args()
     arguments.processes = 1
@@ -191,7 +192,7 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     commit = git("rev-parse", arguments.commit).decode().strip()
     tree = clone(commit, arguments.place.resolve())
-    every = listed(tree)
+    every = [each for each in listed(tree) if arguments.of in each.path]
     print(f"{len(every)} mutations of {commit[:12]}", flush=True)
     chosen: list[Mutation] = []
     for mutation, why in drawn(tree, every, commit):

@@ -300,7 +300,7 @@ class Bench:
         }
         names = list(steps)[: 4 if scene.baseline == "eq8" else 2]
         self.changes: list[Callable[[World], None]] = [
-            *(lambda world, name=name: world.add(name, steps[name]) for name in names),  # type: ignore[misc]
+            *(lambda world, name=name: world.add(name, steps[name]) for name in names),
             self._higher,
         ]
         moved = [scene.reading(causes, each)[0] - self.there for each in self.changes]
