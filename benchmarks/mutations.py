@@ -4,11 +4,12 @@
     python -m benchmarks.mutations [--number 30] [--commit HEAD] [--place DIR] [--of TEXT] [--all]
 
 Of all mutations of `src/pendpipe` that cosmic-ray lists some are drawn, for one commit always the
-same (with ``--of`` those of modules whose path holds a text). Each is tried in a clone until a test fails with the mutation and passes without: first by the
-test files that import the module, then by those of its folder, and with ``--all`` by the others.
-A mutation that leaves the syntax tree as it is but for annotations and texts changes no result: the
-next one replaces it, as it replaces those of ``equivalent_mutations.tsv``, which stand there with
-the reason. A broken run goes on where it was.
+same (with ``--of`` those of modules whose path holds a text). Each is tried in a clone until a test
+fails with the mutation and passes without: first by the test files that import the module, then by
+those of its folder, and with ``--all`` by the others. A mutation that leaves the syntax tree as it
+is but for annotations and texts changes no result: the next one replaces it, as it replaces those
+of ``equivalent_mutations.tsv``, which stand there with the reason. A broken run goes on where it
+was.
 """
 
 from __future__ import annotations
