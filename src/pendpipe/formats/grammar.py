@@ -147,7 +147,11 @@ class Layout:
 
     def is_row(self, cells: Sequence[str]) -> bool:
         """Say whether cells are a row: of its width, and at least half of them numbers."""
-        kinds = self.kinds(cells) if len(cells) == self.width else ""
+        return len(cells) == self.width and self.is_row_of(self.kinds(cells))
+
+    @staticmethod
+    def is_row_of(kinds: str) -> bool:
+        """Say whether cells of these kinds are a row: at least half of them numbers."""
         filled = len(kinds) - kinds.count("b")
         words = kinds.count("t") + kinds.count("d")
         # "Record Length,2500" belongs to a header.
@@ -221,13 +225,9 @@ def _score(sample: Sequence[str], layout: Layout, *, strict: bool) -> tuple[floa
     width = Counter(map(len, rows)).most_common(1)[0][0] if rows else 0
     if not 0 < width <= MOST_COLUMNS:
         return 0.0, 0, 0
-    layout = replace(layout, width=width)
     kinds = [layout.kinds(row) if len(row) == width else "" for row in rows]
     # A row may end early where its last cells are empty.
-    good = [
-        layout.is_row(row) and not (strict and "d" in kind)
-        for row, kind in zip(rows, kinds, strict=True)
-    ]
+    good = [layout.is_row_of(kind) and not (strict and "d" in kind) for kind in kinds]
     value, start, best, span = 0, 0, 0, (0, 0)
     for at, is_good in enumerate(good):
         gain = 1 if is_good else -3 if has_number(sample[at]) else -1
