@@ -110,6 +110,8 @@ LOSSY: Final = tuple(
 TINY: Final = 1e-6
 A_CYCLE: Final = 128
 """Samples along which a decay is followed."""
+RELEASED: Final = 0.01
+"""Relative noise of an amplitude by which it may exceed that of the release."""
 PATIENCE: Final = 64
 """Recordings after which an amplitude that is not reached is given up."""
 
@@ -228,10 +230,10 @@ class Decay:
     def _at(self, amplitude: float, first: int, of: Array) -> float:
         """Mean of both sides, which a lopsided motion lets swing unequally far."""
         sides = [(-self.logs[first:][k : len(of) : 2], of[k::2]) for k in (0, 1)]
-        if min(len(at) for at, _ in sides) < 4:
+        place, ends = -math.log(amplitude), -self.logs[[0, -1]] if len(self.logs) else (0.0, 0.0)
+        if min(len(at) for at, _ in sides) < 4 or not ends[0] - RELEASED <= place <= ends[1]:
             return math.nan
-        place = -math.log(amplitude)
-        return float(np.mean([CubicSpline(*side, extrapolate=False)(place) for side in sides]))
+        return float(np.mean([CubicSpline(*side)(place) for side in sides]))
 
 
 def truths(

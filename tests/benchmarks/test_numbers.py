@@ -54,6 +54,13 @@ def test_a_harmonic_oscillator_with_viscous_loss(quantity: str, closed: float) -
     assert true(quantity, scene(viscous=0.04), []) == pytest.approx(closed, rel=2e-5, abs=1e-12)
 
 
+@pytest.mark.parametrize("amplitude", [0.5, 0.49, 0.01])
+def test_a_decay_is_known_from_its_first_turning_point_on(amplitude: float) -> None:
+    at = scene(viscous=0.04)
+    assert true("Q", at, [], amplitude) == pytest.approx(62.5, rel=2e-5)
+    assert true("1/2", at, [], amplitude) == pytest.approx(math.log(2) / 0.04, rel=2e-5)
+
+
 def test_dry_friction_takes_as_much_of_each_half_swing() -> None:
     at = scene(c=0.002)
     assert true("c", at, []) == pytest.approx(0.002, rel=1e-9)
