@@ -40,7 +40,8 @@ _MARKS: Final = re.compile(
     rb"|/Creator \(pendpipe\)(?s:.)*%%EOF\s*\Z"  # PDF
     rb"|\0made by pendpipe [^\0]*\0\Z"  # WinDaq: behind its last comment
     rb"|\x07made_by\x18.pendpipe (?s:.)*PAR1\Z"
-    rb'|\A"record","fluid","branch","pendulum","T0_s",'  # for spreadsheets, which know no remarks
+    # For spreadsheets, which know no remarks.
+    rb'|\A"?record"?,"?fluid"?,"?branch"?,"?pendulum"?,"?T0_s"?,'
     rb"|\A(?:\xef\xbb\xbf)?file,light,T0_s,T0_sd_s,"
     rb"|\A% made_by: pendpipe "  # LaTeX
 )

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pendpipe.arrays import AnyArray, BoolArray, ByteArray, FloatArray
+from pendpipe.cells import inert, original
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import MADE_BY, MARK, RECORDED_BY, read_text, replaced
 
@@ -459,7 +460,7 @@ def table_lines(
 ) -> Iterator[str]:
     """Give the lines of a table of ours: who made it, what is told of it, header and rows."""
     yield f"# {made}: {MADE_BY}\n"
-    yield from (f"# {key}: {' '.join(str(value).split())}\n" for key, value in told)
+    yield from (inert(f"# {key}: {' '.join(str(value).split())}") + "\n" for key, value in told)
     yield ",".join(columns) + "\n"
     for row in zip(*(map(repr, values.tolist()) for values in columns.values()), strict=True):
         yield ",".join(row) + "\n"
@@ -516,7 +517,7 @@ def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
     above = list(takewhile(lambda line: line.startswith("#") or not line.strip(), lines))
     first = len(above)
     refuse_if(first == len(lines), place, "the file is empty", "record again, or give another file")
-    told = (line.lstrip("# ").partition(":") for line in above)
+    told = (original(line).lstrip("# ").partition(":") for line in above)
     metadata = {key.strip(): value.strip() for key, _, value in told if value}
     for key in (MARK, RECORDED_BY):
         metadata.pop(key, None)

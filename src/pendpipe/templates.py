@@ -5,6 +5,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from pendpipe.cells import inert
 from pendpipe.files import MADE_BY
 
 
@@ -27,7 +28,7 @@ def render(package: str, name: str, **content: Any) -> str:
 @cache
 def _environment(package: str, is_html: bool) -> Environment:
     """Kept, so that a template is compiled once for a thousand pages."""
-    return Environment(
+    environment = Environment(
         loader=PackageLoader(package),
         autoescape=is_html,
         undefined=StrictUndefined,
@@ -35,3 +36,5 @@ def _environment(package: str, is_html: bool) -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=not is_html,
     )
+    environment.filters["inert"] = inert  # of cells: a page can be opened as a table
+    return environment

@@ -4,7 +4,6 @@ Colour never carries a meaning alone: branches differ in their symbols too, curv
 dashes. Vermilion is kept for what goes wrong when something is left out.
 """
 
-import csv
 import io
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -21,6 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from pendpipe.arrays import FloatArray
+from pendpipe.cells import csv_text
 from pendpipe.files import replaced
 
 SHEET: Final = Path(__file__).with_name("pendpipe.mplstyle")
@@ -251,8 +251,7 @@ def placeholder(reason: str) -> Figure:
 
 def plotted(figure: Figure) -> str:
     """What a figure shows, as CSV; points that are drawn as pixels stand in the results."""
-    table = io.StringIO()
-    writer = csv.writer(table, lineterminator="\n")
+    table = list[tuple[str, ...]]()
     for axes in figure.axes:
         bars = [each for each in axes.containers if isinstance(each, ErrorbarContainer)]
         caps = [line for each in bars for line in each.lines[1]]
@@ -271,9 +270,8 @@ def plotted(figure: Figure) -> str:
             both = zip(points.tolist(), sd, strict=False)
             rows += [(name, f"{x:.7g}", f"{y:.7g}", error) for (x, y), error in both]
         if rows:
-            writer.writerow(("of", axes.get_xlabel() or "x", axes.get_ylabel() or "y", "sd"))
-            writer.writerows(rows)
-    return table.getvalue()
+            table += [("of", axes.get_xlabel() or "x", axes.get_ylabel() or "y", "sd"), *rows]
+    return csv_text(table)
 
 
 def save(

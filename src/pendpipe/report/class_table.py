@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 import re
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from pendpipe.analysis.fit.printed import SHORT, pendulum_of, percent, period_name, short_size
+from pendpipe.cells import csv_text, inert
 from pendpipe.errors import refuse_if
 from pendpipe.estimate import Estimate, chi_square_p_value
 from pendpipe.files import MADE_BY, is_stream, write_json, write_whole
@@ -254,13 +254,7 @@ def _quality(fit: FitResult, large: Quality) -> str:
 
 
 def _csv(fits: Sequence[Fitted]) -> str:
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows(
-        ["" if cell is None else cell for cell in record(each).values()] for each in fits
-    )
-    return out.getvalue()
+    return csv_text([COLUMNS, *(record(each).values() for each in fits)])
 
 
 def _excel(fits: Sequence[Fitted]) -> bytes:
@@ -270,18 +264,22 @@ def _excel(fits: Sequence[Fitted]) -> bytes:
     sheet = book.active
     assert sheet is not None
     sheet.title = "fits"
-    sheet.append(COLUMNS)
-    for each in fits:
-        # A name that begins with = is no formula.
-        sheet.append(list(record(each).values()))
-        sheet.cell(sheet.max_row, 1).data_type = "s"
     sheet.freeze_panes = "B2"
-    for line in together(fits):
-        sheet.append([str(line)])
+    rows = (COLUMNS, *(record(each).values() for each in fits), *zip(map(str, together(fits))))
+    for row in rows:
+        sheet.append([_NOT_IN_XML.sub("?", c) if isinstance(c, str) else c for c in row])
+        for cell in sheet[sheet.max_row]:
+            if isinstance(cell.value, str):
+                # Text, even where somebody edits the cell later.
+                cell.data_type, cell.quotePrefix = "s", inert(cell.value) != cell.value
     book.save(out)
     with zipfile.ZipFile(out, "a") as archive:
         archive.comment = f"\0made by {MADE_BY}\0".encode()
     return out.getvalue()
+
+
+_NOT_IN_XML: Final = re.compile(r"[\x00-\x08\x0b-\x1f\ud800-\udfff]")
+"""Control characters, and bytes of a name that are no text."""
 
 
 def cells_of(fits: Sequence[Fitted], *, wide: bool = True) -> list[tuple[str, ...]]:
@@ -313,6 +311,7 @@ def class_page(fits: Sequence[Fitted], links: Sequence[str | None] | None = None
 _RAISED: Final = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _TEX: Final = str.maketrans(
     {sign: "\\" + sign for sign in "&%$#_{}"}
+    | {"[": "{[}", "\n": " ", "\r": " "}  # behind \\ a bracket is its option
     | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
     | {"±": r"$\pm$", "×": r"$\times$", "°": r"\textdegree{}", "π": r"$\pi$"}
     | {"\N{MINUS SIGN}": "$-$"}

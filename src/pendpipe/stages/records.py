@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pendpipe.arguments import Arguments, command, load
+from pendpipe.cells import csv_text
 from pendpipe.configuration.load import Campaign
 from pendpipe.errors import refuse_if
 from pendpipe.files import MADE_BY, MARK, read_json, write_whole
@@ -83,12 +84,11 @@ def _row(campaign: Campaign, result: RecordResult) -> dict[str, Any]:
     return {name: row.get(name) for name in COLUMNS}
 
 
-def _in_form(table: pa.Table, form: str) -> bytes:
-    from pyarrow import csv, parquet
+def _in_form(table: pa.Table, form: str) -> bytes | str:
+    if form == ".csv":
+        return csv_text([COLUMNS, *(row.values() for row in table.to_pylist())])
+    from pyarrow import parquet
 
     stream = io.BytesIO()
-    if form == ".parquet":
-        parquet.write_table(table, stream)
-    else:
-        csv.write_csv(table, stream, csv.WriteOptions(quoting_style="needed"))
+    parquet.write_table(table, stream)
     return stream.getvalue()

@@ -10,6 +10,7 @@ from typing import Any, Final, NamedTuple, Self
 import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
+from pendpipe.cells import original
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import MARK, read_text, replaced
 from pendpipe.recording import table_lines, whole_lines
@@ -177,6 +178,7 @@ def read_turning_points(path: str | Path) -> TurningPoints:
     place = Path(path)
     lines, cut_short = whole_lines(read_text(place, "run pendpipe turning-points"))
     start = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    lines[:start] = map(original, lines[:start])
     head = [tuple(line.lstrip("# ").split(": ", 1)) for line in lines[:start] if ": " in line]
     metadata = {key: value for key, value in head if key not in ("cut", "note", MARK)}
     refuse_if(

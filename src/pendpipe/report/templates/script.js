@@ -43,7 +43,7 @@
     $("csv").onclick = () => {
       const cell = (s) => (/[",\n]/.test(s) ? `"${s.replace(/"/g, '""')}"` : s);
       // A spreadsheet runs a word that begins like a formula; an apostrophe stops it.
-      const word = (s) => s.replace(/^[=+\-@]/, "'$&");
+      const word = (s) => s.replace(/(^|[,;\t\n])(?=[ ']*[=+\-@\uff1d\uff0b\uff0d\uff20])/g, "$1'");
       const wide = (r, f) => [...r.cells].flatMap((c, i) => (heads[i].classList.contains("n") ? f(c, i) : [word(c.textContent.trim())]));
       const lines = [wide(table.tHead.rows[0], (c) => [c.textContent.trim(), "sd of " + c.textContent.trim()])];
       rows.filter((r) => !r.hidden).forEach((r) => lines.push(wide(r, (c) => [c.dataset.v, c.dataset.s])));
