@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias, TypeVar
 
 from pendpipe.errors import InputError
-from pendpipe.files import check_output, is_stream, json_text, read_json, writing
+from pendpipe.files import check_output, is_stream, json_text, read_json, sealed, writing
 from pendpipe.options import ALTERNATIVES, INPUT, Flags, flags_of, given
 from pendpipe.reading import read
 from pendpipe.version import __version__
@@ -191,4 +191,4 @@ def print_answer(arguments: Arguments, content: Any, text: str) -> None:
 
 def print_json(content: Any) -> None:
     """Print one JSON object for programs; what is not finite is null."""
-    print(json_text(content))
+    print(sealed(json_text(content) + "\n"), end="")

@@ -9,7 +9,10 @@ import csv
 import io
 import re
 from collections.abc import Iterable
+from itertools import chain, repeat
 from typing import Any, Final
+
+from pendpipe.files import MADE_BY, MARK
 
 _BEGINS: Final = (
     r"(?!(?:[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?) *(?:[,;\t\r\n]|\Z))"  # no number
@@ -39,7 +42,13 @@ def original(text: str) -> str:
     return _QUOTED.sub(r"\1", text)
 
 
-def csv_text(rows: Iterable[Iterable[Any]]) -> str:
+def csv_text(head: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
+    """Return a table for a file of ours, which says in its last column who made it."""
+    marked = zip(rows, chain([MADE_BY], repeat("")), strict=False)
+    return csv_rows([(*head, MARK), *((*row, mark) for row, mark in marked)])
+
+
+def csv_rows(rows: Iterable[Iterable[Any]]) -> str:
     """Return rows as CSV: text is inert, what is None is empty."""
     out = io.StringIO()
     csv.writer(out, lineterminator="\n").writerows(

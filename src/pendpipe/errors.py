@@ -11,8 +11,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
-NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG)
-"""Of errors of the system: those of a full disk, or of one that is only read."""
+OF_DISKS: Final = (
+    *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS),
+    *(errno.EIO, errno.ESTALE, errno.ENODEV, errno.ENXIO),
+)
+"""Of errors of the system: a disk that is full, is only read, fails, or has gone."""
 
 
 class InputError(Exception):

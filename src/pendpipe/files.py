@@ -6,47 +6,67 @@ it makes says so inside (`MADE_BY`), and that is how it is known again.
 """
 
 import hashlib
+import io
 import json
 import math
 import os
 import re
 import secrets
+import shutil
 import sys
 import tempfile
+import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import cache
 from itertools import islice
 from pathlib import Path, PurePath
-from typing import IO, Any, Final
+from typing import IO, Any, Final, NamedTuple
 
-from pendpipe.errors import NO_ROOM, DamagedError, InputError, UnwritableError, refuse_if
+from pendpipe.errors import DamagedError, InputError, UnwritableError, refuse_if
 from pendpipe.version import __version__
 
-MADE_BY: Final = f"pendpipe {__version__}"
-"""What stands in every file that can be made again."""
+_BLANK: Final = 16 * "0"
+MADE_BY: Final = f"pendpipe {__version__} sha256:{_BLANK}"
+"""What stands in every file that can be made again. In the place of the zeros `replaced` writes the
+first digits of the hash of all other bytes: so it is seen when somebody has edited the file."""
 MARK: Final = "made_by"
 """Its key in JSON and in the head of a table."""
 RECORDED_BY: Final = "recorded_by"
 """The key in a recording that an instrument has made: it is the user's own, as its raw file is."""
-_MARKS: Final = re.compile(
-    rb'\A(?:\xef\xbb\xbf)?\{\s*"made_by": ?"pendpipe '  # JSON
-    rb'|\A\{\n "schema_version": 1,\n "'  # JSON of the first versions
-    rb"|\A(?:\xef\xbb\xbf)?(?:# refused: |(?:#.*\r?\n)*# made_by: pendpipe )"  # a table
-    rb'|<meta name="generator" content="pendpipe '
-    rb"|<(?:dc:title|desc)>pendpipe\b"  # SVG
-    rb"|\A\x89PNG(?s:.){0,200}tEXtSoftware\0pendpipe"
-    rb"|/Creator \(pendpipe\)(?s:.)*%%EOF\s*\Z"  # PDF
-    rb"|\0made by pendpipe [^\0]*\0\Z"  # WinDaq: behind its last comment
-    rb"|\x07made_by\x18.pendpipe (?s:.)*PAR1\Z"
-    # For spreadsheets, which know no remarks.
-    rb'|\A"?record"?,"?fluid"?,"?branch"?,"?pendulum"?,"?T0_s"?,'
-    rb"|\A(?:\xef\xbb\xbf)?file,light,T0_s,T0_sd_s,"
-    rb"|\A% made_by: pendpipe "  # LaTeX
+_BY: Final = r'pendpipe(?: [^\s"<>)\0:]+)?(?: sha256:([0-9a-f]{16}))?'
+"""Files of earlier versions have no digest."""
+_SVG: Final = r"\A(?:<\?xml[^>]*>\s*)?(?:<!DOCTYPE svg[^>]*>\s*)?<svg[^>]*>\s*"
+_HTML: Final = (
+    r'\A<!doctype html>(?:\s*<(?:html|head|meta)[^<>]*>)*?\s*<meta name="generator" content="'
+)
+_BEGINNINGS: Final = (
+    rf'\A\ufeff?\{{\s*"made_by": ?"{_BY}"',  # JSON
+    rf"\A\ufeff?(?:#.*\r?\n)*# made_by: {_BY}",  # a table
+    # One for spreadsheets, which know no remarks: the last cell of its first row.
+    rf'\A(?:record|file),[^\n]*,made_by\n(?:"(?:[^"]|"")*"|[^"\n])*,{_BY}',
+    rf"\A% made_by: {_BY}",  # LaTeX
+    rf"{_HTML}{_BY}",
+    rf"{_SVG}<metadata>(?s:.){{0,600}}?<dc:title>{_BY}",
+    rf"\A\x89PNG(?s:.){{0,200}}?tEXtSoftware\0{_BY}",
+    # Of earlier versions alone.
+    r'\A\{\n "schema_version": 1,\n "',
+    r"\A\ufeff?# refused: ",
+    r'\A"record","fluid","branch","pendulum","T0_s",',
+    r"\A\ufeff?file,light,T0_s,T0_sd_s,[^\n]*,remark\r?\n",
+    rf"{_SVG}<desc>pendpipe\b",
+)
+_ENDINGS: Final = (
+    rf"/Creator \({_BY}\)(?s:.)*%%EOF\s*\Z",  # PDF
+    rf"\0made by {_BY}\0\Z",  # behind the last comment of WinDaq, or the remark of an archive
+    rf"\x07made_by\x18.{_BY}(?s:.)*PAR1\Z",
 )
 _ENDS: Final = 1 << 15
 """So many bytes at either end are searched for marks."""
+_BLOCK: Final = 1 << 20
+"""So many are hashed at a time."""
 _RAW: Final = re.compile(rb'\A\{"format": "pendpipe-raw"')
 _OUT: Final = ("-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
 _STREAM: Final = re.compile(r"/dev/stderr|(/dev|/proc/self)/fd/\d+")
@@ -104,23 +124,101 @@ def check_output(path: str | Path) -> None:
         "this output is one of the inputs",
         "name another file",
     )
-    with target.open("rb") as stream:
+    with _named(target), target.open("rb") as stream:
         head = stream.read(_ENDS)
-        stream.seek(-min(_ENDS, target.stat().st_size), 2)
-        tail = stream.read()
+        found = _seal(stream)
+        edited = found is not None and found.stated not in ("", _BLANK, found.digest)
     refuse_if(
         _RAW.search(head),
         target,
         "it holds the raw bytes of an instrument, which nothing replaces",
         "name another file",
     )
-    ours = _MARKS.search(head) or _MARKS.search(tail)
-    refuse_if(
-        head and not ours and not call.force,
-        target,
-        "pendpipe did not make this file",
-        "name another one, or add --force to replace it",
-    )
+    remedy = "name another one, or add --force to replace it"
+    if head and not call.force:
+        refuse_if(found is None, target, "pendpipe did not make this file", remedy)
+        refuse_if(edited, target, "it was edited since pendpipe made it", remedy)
+        if found is not None and found.stated in ("", _BLANK):
+            _tell_of_earlier_versions(target)
+
+
+_TOLD: Final = list[Path]()
+
+
+def _tell_of_earlier_versions(target: Path) -> None:
+    """Say, once a process, that what somebody may have edited in a file is replaced."""
+    if not _TOLD:
+        _TOLD.append(target)
+        problem = "an earlier version made it, which cannot tell whether it was edited since"
+        print(f"pendpipe: {target}: {problem}; it is replaced, as are others", file=sys.stderr)
+
+
+@cache
+def _compiled(patterns: tuple[str, ...]) -> re.Pattern[bytes]:
+    """Compile them as one for bytes, when a file is first looked at."""
+    return re.compile("|".join(patterns).encode().replace(rb"\ufeff", rb"(?:\xef\xbb\xbf)"))
+
+
+class _Seal(NamedTuple):
+    """The digest in a file that says who made it."""
+
+    stated: str
+    """What stands there; empty where there is no place for it."""
+    digest: str
+    """What should, by all other bytes."""
+    start: int
+    """Where."""
+    check: bytes
+    """In a PNG the checksum of the chunk, which stands behind it."""
+
+
+def _seal(stream: IO[bytes]) -> _Seal | None:
+    """Find who made a file, and hash it without that digest; None where nothing says so."""
+    size = stream.seek(0, os.SEEK_END)
+    for start, patterns in ((0, _BEGINNINGS), (max(0, size - _ENDS), _ENDINGS)):
+        stream.seek(start)
+        part = stream.read(_ENDS)
+        if (match := _compiled(patterns).search(part)) is not None:
+            break
+    else:
+        return None
+    if match.lastindex is None:
+        return _Seal("", "", 0, b"")
+    begin, end = (start + at for at in match.span(match.lastindex))
+    chunk = part[part.rindex(b"tEXt", 0, match.end()) : match.end()] if part[1:4] == b"PNG" else b""
+    summed = hashlib.sha256()
+    rest = end + (4 if chunk else 0)
+    for first, last in ((0, begin), (rest, size)):
+        stream.seek(first)
+        while block := stream.read(min(_BLOCK, last - stream.tell())):
+            summed.update(block)
+    digest = summed.hexdigest()[: len(_BLANK)]
+    sealed = chunk.removesuffix(_BLANK.encode()) + digest.encode()
+    check = zlib.crc32(sealed).to_bytes(4) if chunk else b""
+    return _Seal(match[match.lastindex].decode(), digest, begin, check)
+
+
+def _fill_in(stream: IO[bytes]) -> None:
+    """Write the digest into a file where its place is still blank."""
+    found = _seal(stream)
+    if found is not None and found.stated == _BLANK:
+        stream.seek(found.start)
+        stream.write(found.digest.encode() + found.check)
+
+
+def is_whole(content: bytes) -> bool | None:
+    """Whether a file of ours is as it was written; None where an earlier version made it."""
+    found = _seal(io.BytesIO(content))
+    if found is None:
+        return False
+    return found.stated == found.digest if found.stated else None
+
+
+def sealed(text: str) -> str:
+    """Write the digest into a text that says who made it."""
+    stream = io.BytesIO(text.encode("utf-8", "replace"))
+    _fill_in(stream)
+    return stream.getvalue().decode()
 
 
 def is_stream(path: str | Path) -> bool:
@@ -154,14 +252,21 @@ def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
         Where no file can be written: no folder, no right to it, a folder of that name, no
         room on the disk, or a file that is not ours to replace (`check_output`).
     """
+    # A name of a file may be no UTF-8; where it is quoted, the bytes that are none become "?".
+    text: dict[str, Any] = (
+        {} if "b" in mode else {"encoding": "utf-8", "errors": "replace", "newline": "\n"}
+    )
     if str(path) in _OUT:
-        with nullcontext(sys.stdout.buffer if "b" in mode else sys.stdout) as stream:
+        # Kept until its digest is known.
+        with tempfile.TemporaryFile(mode + "+", **text) as stream:
             yield stream
+            stream.flush()
+            _fill_in(getattr(stream, "buffer", stream))
+            stream.seek(0)
+            shutil.copyfileobj(stream, sys.stdout.buffer if "b" in mode else sys.stdout)
         return
     target = Path(path)
     make_folder(target.parent)
-    # A name of a file may be no UTF-8; where it is quoted, the bytes that are none become "?".
-    text = {} if "b" in mode else {"encoding": "utf-8", "errors": "replace", "newline": "\n"}
     try:
         refuse_if(target.is_dir(), target, "this is a folder", "name a file in it")
         check_output(target)
@@ -171,16 +276,19 @@ def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
                 yield stream
             return
         temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
-        beside = temporary.open(mode.replace("w", "x"), **text)  # type: ignore[call-overload]
+        beside = temporary.open(mode.replace("w", "x") + "+", **text)  # type: ignore[call-overload]
     except OSError as fault:
         raise _cannot_write(target, fault) from None
     try:
         with beside:
             yield beside
+            beside.flush()
+            _fill_in(getattr(beside, "buffer", beside))
         temporary.replace(target)
     except BaseException as fault:
-        temporary.unlink(missing_ok=True)
-        if isinstance(fault, OSError) and fault.errno in NO_ROOM:
+        with suppress(OSError):  # on a disk that has gone, say
+            temporary.unlink(missing_ok=True)
+        if isinstance(fault, OSError) and fault.filename in (None, str(temporary)):
             raise _cannot_write(target, fault) from None
         raise
 
@@ -321,8 +429,18 @@ def digest(content: Any) -> str:
 
 def sha256(path: str | Path) -> str:
     """Hash a file's content, for the provenance of what was made from it."""
-    with Path(path).open("rb") as stream:
+    with _named(path), Path(path).open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+@contextmanager
+def _named(path: str | Path) -> Iterator[None]:
+    """Let an error of reading name its file, as one of opening does."""
+    try:
+        yield
+    except OSError as fault:
+        fault.filename = fault.filename or str(path)
+        raise
 
 
 _PATH: Final = re.compile(r"(?<![\w./\\])(?:[A-Za-z]:[\\/]|~?/|\.{1,2}/)[^\s'\"(),;]+")

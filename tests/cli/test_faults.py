@@ -1,8 +1,10 @@
 """Whatever is wrong is said in one line."""
 
+import errno
 import math
 import os
 import pickle
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -331,3 +333,85 @@ def test_a_full_standard_output_is_one_line(words: list[str], tmp_path: Path) ->
     assert done.returncode == 2
     assert done.stderr.splitlines()[-1].startswith("pendpipe: standard output: it can't be written")
     assert "Traceback" not in done.stderr
+
+
+FAILING = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/types.h>
+#include <unistd.h>
+
+static int fails(int fd) {
+    char link[64], path[4096] = {0};
+    snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
+    return readlink(link, path, sizeof path - 1) > 0 && strstr(path, getenv("FAILS_AT")) != NULL;
+}
+#define CALL(name, type)                                                    \
+    ssize_t name(int fd, type buffer, size_t count) {                       \
+        static ssize_t (*own)(int, type, size_t);                           \
+        if (!own) own = dlsym(RTLD_NEXT, #name);                            \
+        if (strcmp(getenv("FAILS_IN"), #name) == 0 && fails(fd)) {          \
+            errno = atoi(getenv("FAILS_BY"));                               \
+            return -1;                                                      \
+        }                                                                   \
+        return own(fd, buffer, count);                                      \
+    }
+CALL(read, void *)
+CALL(write, const void *)
+"""
+
+
+@pytest.fixture(scope="module")
+def failing(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A library that lets reading or writing of some files fail, as a disk does."""
+    if sys.platform != "linux" or shutil.which("gcc") is None:
+        pytest.skip("no compiler of a library that the loader takes first")
+    folder = tmp_path_factory.mktemp("failing")
+    (folder / "failing.c").write_text(FAILING)
+    library = folder / "failing.so"
+    command = ["gcc", "-shared", "-fPIC", "-o", str(library), str(folder / "failing.c"), "-ldl"]
+    subprocess.run(command, check=True)
+    return library
+
+
+@pytest.mark.parametrize(
+    ("call", "at", "how", "words"),
+    [
+        ("write", "/.made.csv", "EIO", ["convert", "swing.csv", "made.csv"]),
+        ("write", "/.made.csv", "ESTALE", ["convert", "swing.csv", "made.csv"]),
+        ("write", "/.made.csv", "EDQUOT", ["convert", "swing.csv", "made.csv"]),
+        ("write", "/.made.png", "EROFS", ["fit", "swing.csv", "--figure", "made.png"]),
+        ("write", "/printed", "EIO", ["inspect", "swing.csv", "--json"]),
+        ("read", "/swing.csv", "ESTALE", ["inspect", "swing.csv"]),
+        ("read", "/there.json", "EIO", ["fit", "swing.csv", "--out", "there.json"]),
+    ],
+)
+def test_a_disk_that_fails_is_one_line(
+    failing: Path, tmp_path: Path, call: str, at: str, how: str, words: list[str]
+) -> None:
+    """And nothing half written stays, nor goes what was there."""
+    written(tmp_path / "swing.csv")
+    there = '{"made_by": "pendpipe 1"}'
+    (tmp_path / "there.json").write_text(there)
+    fails = {"FAILS_IN": call, "FAILS_AT": at, "FAILS_BY": str(getattr(errno, how))}
+    with (tmp_path / "printed").open("w") as printed:
+        done = subprocess.run(
+            [sys.executable, "-m", "pendpipe", *words],
+            cwd=tmp_path,
+            env=os.environ | fails | {"LD_PRELOAD": str(failing)},
+            stdout=printed,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    (line,) = [line for line in done.stderr.splitlines() if line.startswith("pendpipe: ")]
+    assert os.strerror(getattr(errno, how)) in line
+    assert (at.strip("/.") if at != "/printed" else "standard output") in line
+    assert (tmp_path / "there.json").read_text() == there
+    assert {path.name for path in tmp_path.iterdir()} == {"swing.csv", "there.json", "printed"}

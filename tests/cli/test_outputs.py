@@ -1,18 +1,33 @@
 """No command writes over what it was given, nor over what pendpipe did not make."""
 
+import io
 import os
+import re
 import shutil
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
+from pyarrow import parquet
 
 import pendpipe as pp
 from pendpipe.cli import main
 from pendpipe.errors import InputError
-from pendpipe.files import check_output, replaced, write_json, write_whole, writing
+from pendpipe.files import (
+    _TOLD,
+    MADE_BY,
+    MARK,
+    check_output,
+    is_whole,
+    replaced,
+    write_json,
+    write_whole,
+    writing,
+)
 from pendpipe.recording import Recording, write_plain
 
 TIME_S = np.arange(900) / 30.0
@@ -252,3 +267,103 @@ def test_all_that_is_written_says_so_and_nothing_else_is_taken_for_ours(tmp_path
         with pytest.raises(InputError, match="did not make"), replaced(mine) as stream:
             stream.write("gone")
         assert mine.read_text() == text
+
+
+FORMS = ("json", "csv", "html", "tex", "xlsx", "svg", "png", "pdf", "wdh", "points.csv", "parquet")
+
+
+def made_in(form: str, given: dict[str, Path], folder: Path) -> Path:
+    """Let pendpipe write a file in one of its forms."""
+    out, recording = folder / f"made.{form}", str(given["recording"])
+    if form == "parquet":
+        schema = pa.schema([("n", pa.int64())], metadata={MARK: MADE_BY})
+        stream = io.BytesIO()
+        parquet.write_table(pa.table({"n": [1]}, schema=schema), stream)
+        write_whole(out, stream.getvalue())
+        return out
+    words = {
+        "wdh": ["convert", recording, str(out)],
+        "points.csv": ["turning-points", recording, "--out", str(out)],
+    }
+    drawn = ["fit", recording, "--figure", str(out)]
+    table = ["fit", recording, recording, "--out", str(out)]
+    assert main(words.get(form) or (drawn if form in ("svg", "png", "pdf") else table)) == 0
+    return out
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_what_was_edited_since_is_the_persons(
+    given: dict[str, Path], tmp_path: Path, form: str
+) -> None:
+    """Any byte of it, but for those of the mark, which then is none."""
+    out = made_in(form, given, tmp_path)
+    check_output(out)
+    made = out.read_bytes()
+    assert 16 * b"0" not in made
+    random = np.random.default_rng(0)
+    for at in [0, len(made) - 1, *random.integers(0, len(made), 30).tolist()]:
+        out.write_bytes(made[:at] + bytes([made[at] ^ 1]) + made[at + 1 :])
+        with pytest.raises(InputError, match=r"edited|did not make"):
+            check_output(out)
+        with writing(force=True):
+            check_output(out)
+    for edited in (made + b"\n", made[:-1]):
+        out.write_bytes(edited)
+        with pytest.raises(InputError, match=r"edited|did not make"):
+            check_output(out)
+    out.write_bytes(made)
+    check_output(out)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_what_an_earlier_version_made_is_ours_once_more(
+    given: dict[str, Path], tmp_path: Path, form: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It kept no digest; who has edited such a file is told."""
+    out = made_in(form, given, tmp_path)
+    if form == "parquet":  # its lengths are counted
+        out.write_bytes(re.sub(rb"sha256:[0-9a-f]{16}", b"sha256:" + 16 * b"0", out.read_bytes()))
+    else:
+        out.write_bytes(re.sub(rb" sha256:[0-9a-f]{16}", b"", out.read_bytes()))
+    capsys.readouterr()
+    _TOLD.clear()
+    check_output(out)
+    check_output(out)
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "an earlier version made it" in said
+
+
+def test_a_png_with_its_digest_is_sound(given: dict[str, Path], tmp_path: Path) -> None:
+    from PIL import Image
+
+    with Image.open(made_in("png", given, tmp_path)) as picture:
+        picture.verify()
+        assert re.fullmatch(r"pendpipe \S+ sha256:[0-9a-f]{16}", picture.info["Software"])
+
+
+def test_what_quotes_our_mark_is_not_ours(given: dict[str, Path], tmp_path: Path) -> None:
+    """A thesis about a page of ours, a table with ours copied into it."""
+    page, table = made_in("html", given, tmp_path), made_in("points.csv", given, tmp_path)
+    tag = re.search(r'<meta name="generator"[^>]*>', page.read_text(encoding="utf-8"))
+    assert tag is not None
+    old = re.sub(" sha256:[0-9a-f]*", "", tag[0])
+    texts = [
+        f"<!doctype html>\n<html>\n<head>\n{tag[0]}\n<title>My thesis</title>",
+        f"<!doctype html>\n<html><body>My thesis. Its head has\n{old}\n",
+        "# my notes\n" + table.read_text(encoding="utf-8"),
+        "\\documentclass{article}\n% made_by: pendpipe 1.0\n",
+        "%PDF-1.5 /Creator (LaTeX) we read /Creator (pendpipe) in it: /Creator (me)\n",
+    ]
+    for number, text in enumerate(texts):
+        mine = tmp_path / f"thesis-{number}.txt"
+        mine.write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=r"edited|did not make"):
+            check_output(mine)
+
+
+def test_who_writes_a_file_at_once_with_others_leaves_one_that_is_whole(tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda n: write_json(path, {"n": n, "text": n * "x"}), range(200)))
+    assert is_whole(path.read_bytes())
+    check_output(path)

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -177,6 +178,14 @@ def test_a_change_of_any_byte_of_a_manifest_is_damage_and_runs_the_stage_once(
     run_fit(home)
     assert "this list of results is torn or altered; set aside" in capsys.readouterr().err
     assert (history(home), noticed(home)) == (planned, [])
+
+
+def test_a_manifest_of_an_earlier_version_is_none(home: Path) -> None:
+    """It had another check. The code is another, so its stage runs again; nothing is damaged."""
+    path = home / "manifest/fit.json"
+    path.write_text(re.sub(" sha256:[0-9a-f]*", "", path.read_text()))
+    assert not manifest.read_manifest(home, "fit").outputs
+    assert noticed(home) == []
 
 
 def test_a_manifest_states_its_form_its_stage_and_who_wrote_it(home: Path) -> None:

@@ -18,7 +18,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any, Final, NoReturn
 
-from pendpipe.errors import NO_ROOM, InputError
+from pendpipe.errors import OF_DISKS, InputError
 from pendpipe.process import leave_the_folder_out, one_thread
 from pendpipe.version import __version__
 
@@ -189,7 +189,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as fault:
-        if fault.errno in NO_ROOM and fault.filename is None:
+        if fault.errno in OF_DISKS and fault.filename is None:
             # What is left in the buffer would fail once more when Python ends.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             problem = f"it can't be written ({fault.strerror}); make room, or name a file"

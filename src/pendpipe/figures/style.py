@@ -20,8 +20,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from pendpipe.arrays import FloatArray
-from pendpipe.cells import csv_text
-from pendpipe.files import replaced
+from pendpipe.cells import csv_rows
+from pendpipe.files import MADE_BY, replaced
 
 SHEET: Final = Path(__file__).with_name("pendpipe.mplstyle")
 """Sizes, letters, lines and colours of all figures."""
@@ -271,7 +271,7 @@ def plotted(figure: Figure) -> str:
             rows += [(name, f"{x:.7g}", f"{y:.7g}", error) for (x, y), error in both]
         if rows:
             table += [("of", axes.get_xlabel() or "x", axes.get_ylabel() or "y", "sd"), *rows]
-    return csv_text(table)
+    return csv_rows(table)
 
 
 def save(
@@ -286,9 +286,9 @@ def save(
         "font.family": _FONTS,
     }
     metadata: dict[str, dict[str, Any]] = {
-        "svg": {"Date": None, "Creator": "pendpipe"},
-        "png": {"Software": "pendpipe"},
-        "pdf": {"Creator": "pendpipe", "CreationDate": None},
+        "svg": {"Date": None, "Creator": MADE_BY},
+        "png": {"Software": MADE_BY},
+        "pdf": {"Creator": MADE_BY, "CreationDate": None},
     }
     if "png" in forms:  # a figure of its own, and not one of a thousand records
         metadata["svg"]["Keywords"] = [plotted(figure)]

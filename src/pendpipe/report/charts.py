@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe.arrays import AnyArray, FloatArray
-from pendpipe.cells import csv_text
+from pendpipe.cells import csv_rows
 from pendpipe.figures.decays import Decay, local_quality
 from pendpipe.quantities import axis_unit, pretty_unit
 from pendpipe.recording import Recording
@@ -224,5 +224,5 @@ def quality_by_amplitude(decay: Decay) -> Chart | None:
         for a, q, s in zip(amplitude, seen, sd, strict=True)
     ]
     rows += [("fitted law", f"{a:.6g}", f"{q:.6g}", "") for a, q in zip(reach, law, strict=True)]
-    csv = csv_text([("of", f"amplitude ({shown})", "Q", "sd of Q"), *rows])
+    csv = csv_rows([("of", f"amplitude ({shown})", "Q", "sd of Q"), *rows])
     return Chart(x, y, [("law", line(x(reach), y(law))), ("dots", dots)], csv=csv)

@@ -254,7 +254,7 @@ def _quality(fit: FitResult, large: Quality) -> str:
 
 
 def _csv(fits: Sequence[Fitted]) -> str:
-    return csv_text([COLUMNS, *(record(each).values() for each in fits)])
+    return csv_text(COLUMNS, (record(each).values() for each in fits))
 
 
 def _excel(fits: Sequence[Fitted]) -> bytes:

@@ -21,6 +21,7 @@ from typing import Any, Final, NamedTuple
 from pendpipe.configuration import jobs
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.configuration.models import Configuration
+from pendpipe.files import write_json
 from pendpipe.manifest import (
     Findings,
     Manifest,
@@ -32,7 +33,6 @@ from pendpipe.manifest import (
     read_checked,
     read_manifest,
     recorded,
-    write_checked,
 )
 from pendpipe.provenance import code_version
 from pendpipe.version import __version__
@@ -196,7 +196,7 @@ def write_chunk(campaign: Campaign, stage: Stage, records: Sequence[Record], out
     content = {one.home.name: one.content() for one in made}
     head = {"schema_version": 1, "stage": stage.name, "version": __version__}
     repaired = handed_on()["repaired"].get(str(out), "")
-    write_checked(out, head | {"repaired": repaired, "records": content})
+    write_json(out, head | {"repaired": repaired, "records": content})
 
 
 class Plan(NamedTuple):

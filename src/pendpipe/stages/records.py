@@ -86,7 +86,7 @@ def _row(campaign: Campaign, result: RecordResult) -> dict[str, Any]:
 
 def _in_form(table: pa.Table, form: str) -> bytes | str:
     if form == ".csv":
-        return csv_text([COLUMNS, *(row.values() for row in table.to_pylist())])
+        return csv_text(COLUMNS, (row.values() for row in table.to_pylist()))
     from pyarrow import parquet
 
     stream = io.BytesIO()

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pendpipe.errors import DamagedError, InputError, UnwritableError
-from pendpipe.files import read_json, without_folders, write_json, write_whole
+from pendpipe.files import MADE_BY, MARK, read_json, without_folders, write_json, write_whole
 from pendpipe.manifest import check, disown, job, read_manifest
 
 ORDER: Final = ("acquire", "calibrate", "turning-points", "fit", "diagnose")
@@ -129,4 +129,4 @@ def _write_stubs(outputs: Sequence[Path], reason: str) -> None:
         if path.suffix == ".json":
             write_json(path, {"schema_version": 1, "refused": reason})
         else:
-            write_whole(path, f"# refused: {reason}\n")
+            write_whole(path, f"# refused: {reason}\n# {MARK}: {MADE_BY}\n")
