@@ -38,19 +38,20 @@ RECORDED_BY: Final = "recorded_by"
 """The key in a recording that an instrument has made: it is the user's own, as its raw file is."""
 _BY: Final = r'pendpipe(?: [^\s"<>)\0:]+)?(?: sha256:([0-9a-f]{16}))?'
 """Files of earlier versions have no digest."""
+_IN_TEXT: Final = rf'{_BY}(?=[\s"<])'
 _SVG: Final = r"\A(?:<\?xml[^>]*>\s*)?(?:<!DOCTYPE svg[^>]*>\s*)?<svg[^>]*>\s*"
 _HTML: Final = (
     r'\A<!doctype html>(?:\s*<(?:html|head|meta)[^<>]*>)*?\s*<meta name="generator" content="'
 )
 _BEGINNINGS: Final = (
-    rf'\A\ufeff?\{{\s*"made_by": ?"{_BY}"',  # JSON
-    rf"\A\ufeff?(?:#.*\r?\n)*# made_by: {_BY}",  # a table
+    rf'\A\ufeff?\{{\s*"made_by": ?"{_IN_TEXT}"',  # JSON
+    rf"\A\ufeff?(?:#.*\r?\n)*# made_by: {_IN_TEXT}",  # a table
     # One for spreadsheets, which know no remarks: the last cell of its first row.
-    rf'\A(?:record|file),[^\n]*,made_by\n(?:"(?:[^"]|"")*"|[^"\n])*,{_BY}',
-    rf"\A% made_by: {_BY}",  # LaTeX
-    rf"{_HTML}{_BY}",
-    rf"{_SVG}<metadata>(?s:.){{0,600}}?<dc:title>{_BY}",
-    rf"\A\x89PNG(?s:.){{0,200}}?tEXtSoftware\0{_BY}",
+    rf'\A(?:record|file),[^\n]*,made_by\n(?:"(?:[^"]|"")*"|[^"\n])*,{_IN_TEXT}',
+    rf"\A% made_by: {_IN_TEXT}",  # LaTeX
+    rf"{_HTML}{_IN_TEXT}",
+    rf"{_SVG}<metadata>(?s:.){{0,600}}?<dc:title>{_IN_TEXT}",
+    rf"\A\x89PNG(?s:.){{0,200}}?tEXtSoftware\0{_BY}(?=(?s:.){{8}}[A-Za-z]{{4}})",
     # Of earlier versions alone.
     r'\A\{\n "schema_version": 1,\n "',
     r"\A\ufeff?# refused: ",
@@ -272,11 +273,11 @@ def replaced(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
         check_output(target)
         if is_stream(target) or (target.exists() and not target.is_file()):
             # A device or a pipe is written to: it is not for us to replace it.
-            with target.open(mode, **text) as stream:  # type: ignore[call-overload]
+            with target.open(mode, **text) as stream:
                 yield stream
             return
         temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
-        beside = temporary.open(mode.replace("w", "x") + "+", **text)  # type: ignore[call-overload]
+        beside = temporary.open(mode.replace("w", "x") + "+", **text)
     except OSError as fault:
         raise _cannot_write(target, fault) from None
     try:

@@ -295,7 +295,7 @@ def made_in(form: str, given: dict[str, Path], folder: Path) -> Path:
 def test_what_was_edited_since_is_the_persons(
     given: dict[str, Path], tmp_path: Path, form: str
 ) -> None:
-    """Any byte of it, but for those of the mark, which then is none."""
+    """Any byte of it, those of the mark too."""
     out = made_in(form, given, tmp_path)
     check_output(out)
     made = out.read_bytes()
