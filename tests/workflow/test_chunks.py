@@ -192,6 +192,9 @@ def in_the_future(path: Path) -> None:
         (in_the_future, "fit.json"),
         (altered, "manifest/fit.json"),
         (cut, "manifest/fit.json"),
+        (cut, "recording.csv"),
+        (Path.unlink, "calibration.json"),
+        (altered, "turning_points.csv"),
     ],
 )
 def test_a_plan_notices_what_a_job_then_makes_again(
@@ -201,21 +204,24 @@ def test_a_plan_notices_what_a_job_then_makes_again(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     run(*ORDER)
-    fit, records = STAGES["fit"], chunks_of(campaign)["all"]
-    sound = plan(campaign, fit, "all", records).found
+    output = Path(name).name
+    (stage,) = (each for each in STAGES.values() if each.output == output)
+    files, records = [Path("results", each, output) for each in RECORDS], chunks_of(campaign)["all"]
+    sound = plan(campaign, stage, "all", records).found
     assert (sound.repaired, sound.damages) == ("", ())
-    before, others = sha256(fits()["two"]), written(fits())
+    before, times = [sha256(path) for path in files], [path.stat().st_mtime_ns for path in files]
     change(Path("results/two", name))
-    found = plan(campaign, fit, "all", records).found
+    found = plan(campaign, stage, "all", records).found
     (damage,) = found.damages
     assert damage.path == Path("results/two", name)
     assert found.repaired != sound.repaired, "a changed parameter runs the job"
-    run("fit")
+    run(stage.name)
     assert ("; set aside as " in capsys.readouterr().err) == (damage.found != "missing")
-    assert sha256(fits()["two"]) == before
-    after = plan(campaign, fit, "all", records).found
+    assert [sha256(path) for path in files] == before
+    after = plan(campaign, stage, "all", records).found
     assert (after.damages, after.repaired) == ((), found.repaired), "and runs it once"
-    assert changed(others) == ["two"]
+    anew = [path.stat().st_mtime_ns != time_ns for path, time_ns in zip(files, times, strict=True)]
+    assert anew == [name == "two" for name in RECORDS]
 
 
 def test_a_torn_refusal_is_made_again(campaign: Campaign) -> None:
