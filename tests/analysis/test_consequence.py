@@ -140,6 +140,7 @@ def test_red_keeps_the_period_and_q_of_the_turning_points() -> None:
     assert "−dy/dt" not in str(fit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("b", [LOSS, 2.0 * LOSS])
 def test_what_stands_in_fit_json_comes_back(b: float) -> None:
     fit = fitted(viscous(TIME), fixed={"b": b})

@@ -274,6 +274,7 @@ def test_far_from_bounds_the_interval_is_symmetric() -> None:
     assert (low, high) == pytest.approx((100.0 - HALF_95 * sd, 100.0 + HALF_95 * sd))
 
 
+@pytest.mark.slow
 def test_intervals_cover_the_truth_on_the_bound() -> None:
     """In truth c = 0, correlated with b: at least 95 % of the intervals hold both."""
     rng = np.random.default_rng(5)

@@ -340,6 +340,7 @@ def test_g_of_a_linear_fit_is_that_of_small_swings() -> None:
     assert float(said[1]) == pytest.approx(100.0 * (longer**2 - 1.0), rel=0.03)
 
 
+@pytest.mark.slow
 def test_where_only_the_smallest_swings_contradict_the_larger_are_fitted() -> None:
     values = sample(Eq8(OMEGA, 0.0, 0.0, 0.02, 1e-3), Release(-0.2, 0.5), TIME)
     # A bearing that takes far more from small swings than from large ones.

@@ -60,6 +60,7 @@ def pulls(result: FitResult, truth: dict[str, float]) -> dict[str, float]:
     }
 
 
+@pytest.mark.slow
 def test_pulls_are_standard_and_intervals_cover() -> None:
     found = [fitted(seed=seed) for seed in range(60)]
     pull = np.array([list(pulls(result, TRUTH).values()) for result in found])

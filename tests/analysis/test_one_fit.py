@@ -129,6 +129,7 @@ def test_where_the_form_cannot_be_told_the_error_covers_both() -> None:
     assert low <= 0.6 <= high
 
 
+@pytest.mark.slow
 def test_a_perfect_recording_is_refuted_at_the_level_of_all_questions_together() -> None:
     """Of 60 recordings of the law of fig. 8 four were red."""
     law = Eq8(ONE_HERTZ * 0.516, 0.45, 0.00596, 0.00596, 1.4e-6, "sine")
@@ -387,6 +388,7 @@ def test_no_law_of_a_pendulum_that_swings_far_is_green_and_wrong(
     assert result.light != "red"
 
 
+@pytest.mark.slow
 def test_a_law_that_contradicts_the_decay_is_not_printed(tmp_path: Path, answer_of: Any) -> None:
     time = np.arange(0.0, 100.0, 0.05)
     write_plain(

@@ -27,6 +27,7 @@ def test_an_item_is_a_function_of_its_set_and_its_number() -> None:
     assert one.text != other.text
 
 
+@pytest.mark.slow
 def test_parts_stand_evenly_over_the_numbers() -> None:
     families = [draw("a", number).truth["family"] for number in range(5)]
     assert {"null", "single", "outside"} <= set(families)
@@ -166,6 +167,7 @@ def test_a_recording_is_judged_by_what_was_hidden() -> None:
     assert found.decidable
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "seed"), [(71, 1), (130, 1), (145, 2), (185, 2)])
 def test_a_perfect_recording_lacks_nothing(number: int, seed: int) -> None:
     """Means across turning points, where friction jumps, or over a third harmonic had names.

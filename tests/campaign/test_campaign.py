@@ -221,6 +221,7 @@ def test_a_record_with_too_large_a_loss_is_pulled_up(sigmas: float) -> None:
     assert abs(pulls[number]) > 2.0
 
 
+@pytest.mark.slow
 def test_no_record_is_farther_than_chi2_falls_without_it() -> None:
     """Half more loss in water drives the fit to the balance of water-low-1, which is no worse."""
     found = data(DESIGN, seed=1)
@@ -242,6 +243,7 @@ def test_a_size_on_its_bound_follows_no_record() -> None:
         assert with_it == pytest.approx(without_it, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_class_of_two_is_told_apart_by_another_fluid_and_not_by_repeats() -> None:
     added = named("uniform-drag-excess")
     measured = data(DESIGN, added, (0.12,))
@@ -359,6 +361,7 @@ def odd_record(record: str, percent: float, seed: int) -> Measured:
     return found._replace(values=values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("record", "percent"), [("water-low-5", 1.2), ("water-high-8", -1.2), ("air-03", -1.2)]
 )
@@ -377,6 +380,7 @@ def test_a_record_that_disagrees_is_named_and_no_cause(record: str, percent: flo
     assert abs(drag["value"] - 1.0) < 3.0 * drag["sd"]
 
 
+@pytest.mark.slow
 def test_a_cause_is_found_beside_a_record_that_disagrees() -> None:
     hidden = named("uniform-drag-excess")
     moved = np.zeros(len(DESIGN.nuisances))
@@ -401,6 +405,7 @@ def test_nothing_is_named_where_the_scan_is_silent() -> None:
     assert "No effect of the catalogue stands out" in content["statement"]
 
 
+@pytest.mark.slow
 def test_nothing_competes_with_the_causes() -> None:
     """Near the level of the alarm the evidence for a cause is no 99 %."""
     answer = search(DESIGN, data(DESIGN, named("uniform-drag-excess"), (0.025,), seed=5))
@@ -419,6 +424,7 @@ def test_nothing_competes_with_the_causes() -> None:
     assert content["priors"]["expected_size"]["viscosity-temperature"] == 0.05
 
 
+@pytest.mark.slow
 def test_two_causes_are_one_sentence() -> None:
     both = named("uniform-drag-excess", "grease-drag")
     content = campaign_diagnosis(search(DESIGN, data(DESIGN, both, (0.117, 2e-5), seed=5)), {})

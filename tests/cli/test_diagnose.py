@@ -185,6 +185,7 @@ def test_what_is_missing_is_named_and_the_fit_improves_to_the_noise(
     assert {path.name for path in tmp_path.glob("*.svg")} == set(content["figures"])
 
 
+@pytest.mark.slow
 def test_a_wrong_parameter_is_told_from_missing_physics(linear: Path, tmp_path: Path) -> None:
     """A frequency given 0.03 % too high is not physics that was left out."""
     held = ["--no-figures", "--fix", f"frequency={1.0003 * FREQUENCY_HZ}"]

@@ -313,6 +313,7 @@ def test_nothing_is_colder_than_absolute_zero(tmp_path: Path) -> None:
         load_campaign(content, "config.yaml")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes are Linux's")
 @pytest.mark.parametrize("words", [["page", "--no-diagnosis"], ["fit"], ["inspect"]])
 def test_a_name_that_is_no_utf8_is_a_name(words: list[str], tmp_path: Path) -> None:

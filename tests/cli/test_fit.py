@@ -325,6 +325,7 @@ def test_a_name_in_the_page_is_text_and_no_markup(tmp_path: Path, answer_of: Any
     )
 
 
+@pytest.mark.slow
 def test_a_diagnosis_stands_on_the_page_unless_it_is_not_wanted(tmp_path: Path) -> None:
     page = tmp_path / "rod.html"
     assert cli.main(["page", str(ROD_FILE), "--out", str(page)]) == 0

@@ -146,6 +146,7 @@ def test_a_file_of_others_is_replaced_only_with_force(
         assert main(words) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["svg", "png", "pdf"])
 def test_a_figure_replaces_a_figure_of_ours_and_no_other(
     given: dict[str, Path], tmp_path: Path, form: str

@@ -34,6 +34,7 @@ from pendpipe.recording import Recording, read_plain, write_plain
 README = Path(__file__).parents[2] / "README.md"
 
 
+@pytest.mark.slow
 def test_the_lines_of_the_readme_answer(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     mpl.use("Agg")
     time_s = np.arange(3000) / 50.0

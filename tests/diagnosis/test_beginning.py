@@ -86,6 +86,7 @@ def test_a_linear_torque_is_not_taken_for_a_pendulum() -> None:
     assert answer["verdict"] == "consistent"
 
 
+@pytest.mark.slow
 def test_a_short_record_of_a_pendulum_is_a_pendulums_first() -> None:
     """The linear law keeps the phase; a cubic torque takes up what a second plane changes too."""
     time_s, values = TIME_S[:600], np.append(TRUTH, [1.0, 6e-3, 2e-3, 0.01])
@@ -110,6 +111,7 @@ def test_time_stamps_are_corrected_after_sin_x_was_fitted_to_them() -> None:
     assert any("the readings are not" in note for note in found.search.notes.values())
 
 
+@pytest.mark.slow
 def test_two_coupled_pendulums_are_two_modes_at_their_frequencies() -> None:
     # x'' = -omega^2 x - kappa (x - z) and z'' = -omega^2 z - kappa (z - x), released at x alone.
     omega, kappa, loss = 4.5, 0.9, 0.015
@@ -155,6 +157,7 @@ def test_a_gyroscope_shows_sin_x_and_no_lost_samples(
     assert 2.0 * np.pi * value == pytest.approx(omega, rel=2e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("unit", "scale"), [("m", 9.81 / 4.1**2), ("pixels", 300.0)])
 def test_a_pendulum_seen_from_the_side_shows_sin_x_and_no_bent_sensor(
     unit: str, scale: float

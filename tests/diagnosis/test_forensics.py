@@ -513,6 +513,7 @@ def test_a_jump_of_the_clock_is_confirmed_and_its_size_told(lost_s: float) -> No
         assert abs(float(value) - 1e3 * lost_s) < 4.0 * float(sd) + 0.02 * abs(1e3 * lost_s)
 
 
+@pytest.mark.slow
 def test_neither_a_knock_nor_an_offset_nor_nothing_is_a_jump_of_the_clock() -> None:
     after = np.where(STAMPS >= AT, STAMPS - AT, 0.0)
     knock = 0.05 * np.exp(-LOSS * after) * np.sin(OMEGA * after)

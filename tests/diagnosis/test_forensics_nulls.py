@@ -79,6 +79,7 @@ def test_noise_is_no_fault(kind: str) -> None:
         assert values.min() > 2e-4, name
 
 
+@pytest.mark.slow
 def test_smoothed_noise_has_no_glitches(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its whitening filter lacks neighbours at the ends of the record."""
     monkeypatch.setitem(NOISES, "running mean of 5", Noisy(smoothed))
@@ -135,6 +136,7 @@ def ruled_by_rounding(seed: int, extra: FloatArray | float = 0.0) -> tuple[Fitte
     return record, finding.parameters["noise_over_step"].value
 
 
+@pytest.mark.slow
 def test_a_reading_beyond_the_edge_of_a_code_is_not_a_glitch() -> None:
     # It is a whole step off the code that was due, and yet hardly half a step off the angle.
     for seed in range(20):

@@ -106,6 +106,7 @@ def test_a_small_loss_counts_against_what_is_left_for_each_number(
     )
 
 
+@pytest.mark.slow
 def test_a_magnet_may_be_a_restoring_torque_without_a_name() -> None:
     """A name that imitates it is never confident, and the curve is of its class."""
     (effect,) = diagnose_recording(recording(pulled(), 5)).effects
@@ -125,6 +126,7 @@ def test_two_names_for_one_law_give_way_to_a_curve() -> None:
     assert state.fit.chi2 < before + FURTHER + 18.0
 
 
+@pytest.mark.slow
 def test_two_real_effects_keep_their_names() -> None:
     assert len(diagnosed("two").search.steps) == 2
     assert all(step.winner.lead.effect.kind != "unnamed" for step in diagnosed("two").search.steps)
@@ -154,6 +156,7 @@ def test_a_name_that_leaves_noise_stays() -> None:
     assert state.fit is before
 
 
+@pytest.mark.slow
 def test_no_name_for_a_part_of_a_misfit_is_confident() -> None:
     found = diagnose_recording(recording(with_effects("frequency-drift") + CHIRP, 5))
     named = [effect for effect in found.effects if effect.kind != "unnamed"]
@@ -231,6 +234,7 @@ def test_noise_is_not_described() -> None:
     assert state.steps == ()
 
 
+@pytest.mark.slow
 def test_a_step_and_a_tone_are_both_named_and_no_curve_instead() -> None:
     found = diagnose_recording(recording(with_effects("equilibrium-step", "tone-pickup"), 3))
     assert {each.identifier for each in found.effects} == {"equilibrium-step", "tone-pickup"}
@@ -252,6 +256,7 @@ def test_a_rolling_shutter_is_no_second_mode() -> None:
     assert not second.lead.effect.rare
 
 
+@pytest.mark.slow
 def test_a_torque_with_the_square_of_the_swing_is_no_second_plane() -> None:
     time_s, kappa = np.arange(0.0, 40.0, 0.025), -0.0191
     angle = swung(time_s, 0.68, 4.54, 0.009, torque=lambda x: math.sin(x) + kappa * x * abs(x))[0]
@@ -263,6 +268,7 @@ def test_a_torque_with_the_square_of_the_swing_is_no_second_plane() -> None:
     assert abs(found.value - kappa) < 4.0 * found.sd
 
 
+@pytest.mark.slow
 def test_a_misplaced_pivot_is_a_rival_of_the_quadratic_sensor_that_it_looks_like() -> None:
     """At 0.3 rad cos x - 1 is -x^2/2 but for 3e-4 rad of x^4: either may be the name."""
     for hidden in ("sensor-quadratic", "camera-geometry"):

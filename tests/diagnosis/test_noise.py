@@ -183,6 +183,7 @@ def test_a_line_leaves_the_noise_about_it_as_it_is(count: int, decay_s: float) -
     np.testing.assert_allclose(np.log(found / alone), 0.0, atol=np.log(2.0))
 
 
+@pytest.mark.slow
 @given(st.floats(0.05, 7.0), st.floats(2.0, 60.0), st.integers(40, COUNT))
 def test_the_noise_is_told_whatever_the_harmonics_leave_of_it(
     frequency_hz: float, cycles: float, count: int
@@ -376,6 +377,7 @@ def test_red_noise_is_not_reported_as_a_drift() -> None:
     assert binom.sf(reported - 1, 10, 0.01) > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "motion"),
     [("offset-drift", lambda t: 4e-5 * (t - 16.0)), ("offset-step", lambda t: 5e-4 * (t > 15.0))],
@@ -389,6 +391,7 @@ def test_in_few_readings_a_large_slow_error_of_the_zero_is_no_noise(
     assert name in named(readings, 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("uneven", [0.0, 0.03])
 def test_what_wanders_more_slowly_than_the_motion_is_told_beside_what_is_faster(
     uneven: float,
@@ -450,6 +453,7 @@ def test_a_wander_along_one_line_is_named_and_taken_off(tmp_path: Path, kappa: f
     assert not {"offset-drift", "unnamed-measurement", "tone-pickup"} & set(found)
 
 
+@pytest.mark.slow
 def test_errors_of_their_own_in_both_coordinates_are_no_wander(tmp_path: Path) -> None:
     """Then the test's p-value is uniform, whatever the colour of the noise."""
     random = np.random.default_rng(5)

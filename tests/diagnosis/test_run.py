@@ -50,6 +50,7 @@ from .records import (
 NAMES = tuple(VALUES)
 
 
+@pytest.mark.slow
 def test_eq_8_by_the_other_engine_is_consistent_but_for_one_in_a_hundred() -> None:
     seeds = range(1, 9)
     alarms = sum(diagnosed("null", seed).p_value < 0.01 for seed in seeds)
@@ -140,6 +141,7 @@ def test_lost_samples_are_counted_where_they_were_lost() -> None:
     assert outcome.improved.chi2_per_dof == pytest.approx(1.0, abs=0.15)
 
 
+@pytest.mark.slow
 def test_two_effects_are_both_named() -> None:
     outcome = diagnosed("two")
     classes = classes_found(outcome)
@@ -149,6 +151,7 @@ def test_two_effects_are_both_named() -> None:
     assert outcome.unexplained_p_value > 0.001
 
 
+@pytest.mark.slow
 def test_what_happens_twice_is_reported_twice_each_with_its_own_size_and_instant() -> None:
     effects = diagnosed("two steps").effects
     assert [effect.identifier for effect in effects] == ["equilibrium-step"] * 2
@@ -159,6 +162,7 @@ def test_what_happens_twice_is_reported_twice_each_with_its_own_size_and_instant
         assert abs(time_s.value - at_s) < 4.0 * time_s.sd
 
 
+@pytest.mark.slow
 def test_a_viscous_baseline_lacks_coulomb_friction() -> None:
     truth = LINEAR.copy()
     truth[2] = 3e-4
@@ -189,6 +193,7 @@ def quality_factor(rate: float) -> float:
     return float(np.pi * FREQUENCY_HZ / rate)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", ["hysteretic", "viscous"])
 def test_no_part_of_the_loss_is_more_than_the_whole(part: str) -> None:
     """One part given by itself, and too large, is reported; b was free to be larger only."""
@@ -215,6 +220,7 @@ def test_a_part_of_the_loss_is_held_while_the_other_is_fitted(part: str, share: 
     assert 0.0 < abs(found.value - TRUTH[B]) < 4.0 * found.sd
 
 
+@pytest.mark.slow
 def test_a_viscous_baseline_has_one_part_and_holds_it() -> None:
     given = {"quality_factor_viscous": quality_factor(1.1 * float(LINEAR[B]))}
     record = recording(other_engine(LINEAR), 4)
@@ -308,6 +314,7 @@ def test_noise_with_a_memory_is_noise_and_no_missing_physics() -> None:
     assert "its noise is coloured" in str(outcome)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_red_noise_beside_sin_x_is_noise(seed: int) -> None:
     """Ten times what neighbouring readings show: no tone, drift or curve is missing."""
@@ -512,6 +519,7 @@ def names(outcome: Diagnosis) -> set[str]:
     return {effect.identifier for effect in outcome.effects}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.6, 1.25])
 def test_a_wrong_loss_is_no_drift_and_comes_out_right(factor: float) -> None:
     """Of whatever size: to first order a drift or a curve may look the better."""
@@ -534,6 +542,7 @@ def test_two_wrong_losses_are_not_an_unnamed_third() -> None:
         assert abs(found.value - TRUTH[index]) < 4.0 * found.sd
 
 
+@pytest.mark.slow
 def test_of_several_predictions_the_wrong_one_is_reported() -> None:
     given = {"a": 1.5 * float(TRUTH[A]), "b": float(TRUTH[B]), "c": float(TRUTH[C])}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
@@ -551,6 +560,7 @@ def test_a_wrong_frequency_and_circular_error_are_both_reported(excess: float) -
     assert abs(found.value - FREQUENCY_HZ) < 4.0 * found.sd
 
 
+@pytest.mark.slow
 def test_right_predictions_are_not_blamed_for_missing_physics() -> None:
     """All losses given and true, and one that nobody knew: a free a and b would do as well."""
     effect = by_identifier("cubic-damping")
@@ -563,6 +573,7 @@ def test_right_predictions_are_not_blamed_for_missing_physics() -> None:
     assert sum(odds for name, odds in suspected.items() if name.startswith("parameter")) < 0.1
 
 
+@pytest.mark.slow
 def test_q_beside_a_zero_that_creeps_is_that_of_the_decay() -> None:
     """Its turning points are off by the creep; Q = omega/(2 b), at any amplitude."""
     b, omega, time_s = 0.0334, 3.7, np.arange(1500) / 25.0

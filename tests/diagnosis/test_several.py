@@ -62,6 +62,7 @@ def assert_shared_values_are_true(found: dict[str, Any]) -> None:
         assert abs(value["value"] - truth) < 4.0 * value["sd"]
 
 
+@pytest.mark.slow
 def test_three_releases_share_their_values_and_lack_nothing() -> None:
     found = together("nothing").to_dict()
     assert found["verdict"] == "consistent"
@@ -142,6 +143,7 @@ def test_recording_with_another_damping_is_named_with_its_value() -> None:
     assert "150 mrad contradicts the others in b" in str(found)
 
 
+@pytest.mark.slow
 def test_knock_in_one_recording_is_its_own_and_the_shared_values_stand() -> None:
     knock = {"id": "impulse", "dv": 5e-3, "time": 40.3}
     releases = {
@@ -156,6 +158,7 @@ def test_knock_in_one_recording_is_its_own_and_the_shared_values_stand() -> None
     assert found.to_dict()["recordings"][1]["prediction"]["within_95"] > 0.9
 
 
+@pytest.mark.slow
 def test_command_writes_the_keys_of_a_diagnosis_and_the_recordings(tmp_path: Path) -> None:
     files = []
     for number, amplitude in enumerate((0.1, 0.3)):

@@ -377,6 +377,7 @@ def test_a_drift_that_is_straight_says_no_time_constant() -> None:
     assert diagnosis(drift).summary.missing == ("drifting offset (rate 1.000(10) × 10⁻⁵ rad/s)",)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_prints_as_its_answer() -> None:
     outcome = diagnosed("circular-error")
     assert str(outcome) == repr(outcome)

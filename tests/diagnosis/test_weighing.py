@@ -82,6 +82,7 @@ def test_a_jump_of_ten_times_the_noise_is_no_red_noise_and_has_no_rival() -> Non
     assert effect.probability > 0.9
 
 
+@pytest.mark.slow
 def test_without_one_of_two_jumps_the_other_stays_where_it_is() -> None:
     """Its size, too, fits the readings again only where nothing else takes its place."""
     found = diagnosed("two steps").search
@@ -358,6 +359,7 @@ def test_a_period_is_known_no_better_than_by_the_names_that_share_the_probabilit
     assert quoted.sd > spread
 
 
+@pytest.mark.slow
 @pytest.mark.structure
 def test_a_wrong_parameter_replaces_missing_physics() -> None:
     """It is fitted then, and comes out right."""
@@ -511,6 +513,7 @@ def test_columns_are_of_unit_length_and_beside_the_models_tangent_space() -> Non
         np.testing.assert_allclose(own.T @ own, np.eye(candidate.width), atol=1e-5)
 
 
+@pytest.mark.slow
 def test_of_a_long_record_blocks_of_cycles_tell_all(monkeypatch: pytest.MonkeyPatch) -> None:
     """A third of the numbers keeps 97 % of what a kick among 1,300 cycles lowers chi^2 by."""
     long = Pendulum(quality_factor=1500.0, quadratic=0.0, coulomb=0.0, count=30_000)

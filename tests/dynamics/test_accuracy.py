@@ -35,6 +35,7 @@ W = 2.0 * math.pi * 0.516
 REFERENCE = Eq8(W, quadratic=0.45, hysteretic=0.00596, viscous=0.00596, coulomb=1.4e-6)
 
 
+@pytest.mark.slow
 def test_the_reference_agrees_with_taylor_series_in_time() -> None:
     with mp.workdps(DIGITS):
         pendulum = MpmathPendulum.of(REFERENCE)
@@ -135,6 +136,7 @@ def test_to_the_stop(multiple: float, h: float, q: float, g: float) -> None:
     np.testing.assert_allclose(points.time_s * W, times * W, rtol=1e-8)
 
 
+@pytest.mark.slow
 @given(pendulums(), st.integers(200, 5000))
 @example((Eq8(1.0, 0.0, 0.0, 0.0, 7.821237238076335e-05), 1.0), 4071)
 @example((Eq8(1.0, *[0.005133812566142866] * 4), 1.0), 200)

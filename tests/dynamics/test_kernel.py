@@ -127,6 +127,7 @@ def test_a_new_process_runs_the_kept_code_without_numba(kept: Path) -> None:
     assert first_call(kept) == ["11", "False", "False"]
 
 
+@pytest.mark.slow
 def test_numba_works_in_a_process_that_has_loaded_the_kept_code(kept: Path) -> None:
     """What the kept code is linked with is named for the whole process; Numba finds it sound."""
     assert first_call(kept, NUMBA_AFTERWARDS) == ["11", "False", "False", "3.0", "zero"]

@@ -292,6 +292,7 @@ def content(outcome: Any) -> Shown:
     return shown(outcome)
 
 
+@pytest.mark.slow
 def test_the_frequency_of_the_readings_is_that_of_a_real_pendulum(content: Shown) -> None:
     """The frequency is f0 (1 - A^2/16); at 0.25 rad the next term is 1e-5 of it."""
     spans = content.measured
@@ -324,6 +325,7 @@ def test_a_model_goes_on_smoothly_where_its_own_cycles_begin_late() -> None:
     assert np.max(np.abs(np.diff(loss, 2))) < 0.01 * np.mean(loss)
 
 
+@pytest.mark.slow
 def test_the_envelope_follows_a_zero_that_drifts() -> None:
     time_s = np.arange(1500) / 25.0
     creep = 0.25 * (1.0 - np.exp(-time_s / 20.0))
@@ -410,6 +412,7 @@ def test_the_spectrum_of_a_tone_stands_at_its_frequency(content: Shown) -> None:
     assert frequency[np.argmax(density)] == pytest.approx(3.3, abs=0.05)
 
 
+@pytest.mark.slow
 def test_what_has_nothing_to_show_is_not_drawn(outcome: Any, tmp_path: Path) -> None:
     content = shown(outcome)
     with pytest.raises(NothingToDrawError):
@@ -427,6 +430,7 @@ def test_what_has_nothing_to_show_is_not_drawn(outcome: Any, tmp_path: Path) -> 
         assert path.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_the_figure_of_the_decay_is_small_at_any_length(tmp_path: Path) -> None:
     """Each of 9,000 readings as a path of its own would take 1.3 MB."""
     time_s = np.arange(9000) / 15.0

@@ -55,6 +55,7 @@ def test_every_figure_is_there_as_svg_and_png_however_many_processes_draw(
     assert [(file.name, file.read_bytes()) for file in together.files] == bytes_alone
 
 
+@pytest.mark.slow
 def test_the_same_data_give_the_same_bytes(example: Any, tmp_path: Path) -> None:
     """Whatever a ``matplotlibrc`` asks for; there is no LaTeX here, and it would be called."""
     first = save(draw_fig09(example.content), tmp_path / "a/fig09")

@@ -563,6 +563,7 @@ def test_the_printed_digit_is_the_one_that_was_printed(place: int, scale: float)
     assert units._printed_digit(decay(1.0) * np.pi, scale) is None
 
 
+@pytest.mark.slow
 @given(bits=st.integers(8, 20), zero=st.floats(-0.2, 0.2))
 def test_an_encoder_s_counts_go_on_over_its_zero(bits: int, zero: float) -> None:
     turn = 2.0**bits
@@ -577,6 +578,7 @@ def test_an_encoder_s_counts_go_on_over_its_zero(bits: int, zero: float) -> None
     assert np.array_equal(units._over_the_turn(slow.copy())[0], slow)
 
 
+@pytest.mark.slow
 @given(
     x=st.floats(-3.0, 3.0),
     y=st.floats(0.5, 3.0),

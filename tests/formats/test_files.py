@@ -205,6 +205,7 @@ def zeros(path: Path) -> None:
         file.create_dataset("angle_rad", data=np.zeros(40_000_000), chunks=(10**6,), compression=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "write", "said", "most_bytes"),
     [
@@ -284,6 +285,7 @@ def test_devices_pipes_and_huge_files_are_refused_at_once(tmp_path: Path) -> Non
             read(path)
 
 
+@pytest.mark.slow
 def test_standard_input_and_output(tmp_path: Path) -> None:
     def run(command: str, content: bytes) -> bytes:
         call = [sys.executable, "-m", "pendpipe.cli", *command.split()]

@@ -66,6 +66,7 @@ def test_any_text_that_looks_like_a_table(tmp_path: Path, text: str) -> None:
     hold(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BYTES)
 @clean
 @given(

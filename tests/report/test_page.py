@@ -75,6 +75,7 @@ def rendered(example: Any, content: dict[str, Any], **configuration: Any) -> str
     return render(configuration, content, {}, example.folder, example.folder / "figures")
 
 
+@pytest.mark.slow
 def test_the_page_is_well_formed_and_its_names_are_unique(page: str) -> None:
     outline = Outline(page)
     assert len(outline.ids) == len(set(outline.ids))
