@@ -413,6 +413,45 @@ def test_two_modes_that_beat_are_a_decay_with_two_frequencies_and_losses(rest: b
     assert "0.8640" in note or "0.86399" in note
 
 
+@pytest.mark.parametrize("phase", [1.2, 3.0])
+def test_a_beat_that_first_grows_is_not_held_up_by_a_drive(phase: float) -> None:
+    """Of modes of 107 and 64, read to 1: the amplitude grows for 7 s, falls, and wavers."""
+    time = np.arange(2050) * 0.0507
+    early = np.cos(2.0 * np.pi * 0.70823 * time)
+    late = np.cos(2.0 * np.pi * 0.7351 * time - phase)
+    values = np.exp(-0.0235 * time) * (107.0 * early + 64.0 * late)
+    noise = 0.3 * np.random.default_rng(1).standard_normal(len(time))
+    read = np.round(500.0 + values + noise)
+    motion = Recording(time, read, "reading", metadata={"unit": "1"}, resolution=1.0)
+    fit = pendpipe.fit(motion)
+    assert fit.light_reason.startswith("two modes beat: 0.7082")
+    assert "0.7351" in fit.light_reason
+    assert "(Q = 94." in fit.light_reason
+    assert "(Q = 98." in fit.light_reason
+    # Nothing is cut, and no third period is given beside those two.
+    assert fit.cuts == ()
+    assert not ({"period", "Q"} & set(fit.quotable))
+    assert " s\n" not in str(fit).partition("Copy")[0].partition("\n")[2]
+
+
+def test_of_a_piece_of_two_swings_nothing_is_said() -> None:
+    """Moved by hand for 40 s, let go, and caught: the numbers of what is left say nothing."""
+    hand = 0.2 * np.cumsum(np.random.default_rng(2).standard_normal(60))
+    moved = np.interp(np.arange(4000) / RATE, np.linspace(0.0, 40.0, 60), hand)
+    swings = oscillation(0.3, 0.05, 0.0, most=4.0)
+    caught = swings[-1] + np.cumsum(np.random.default_rng(3).standard_normal(30))
+    moved_again = np.interp(np.arange(2000) / RATE, np.linspace(0.0, 20.0, 30), caught)
+    motion = recording([moved - moved[-1] + swings[0], swings, moved_again], noise=1e-3)
+    fit = pendpipe.fit(motion)
+    assert fit.light != "green"
+    assert "most of it was cut" in fit.light_reason
+    assert "Copy: nothing of this fit can be quoted" in str(fit)
+    with pytest.raises(
+        NotAnalysableError, match=r"most of it was cut: .* of which nothing is said"
+    ):
+        pendpipe.diagnose(motion)
+
+
 def test_a_mode_that_does_not_decay_is_a_drive() -> None:
     with pytest.raises(NotAnalysableError, match="a drive holds the amplitude up"):
         find_free_decay(beat((0.03, 0.0), rest=True))

@@ -112,6 +112,22 @@ def test_time_stamps_are_corrected_after_sin_x_was_fitted_to_them() -> None:
 
 
 @pytest.mark.slow
+def test_at_the_nodes_of_a_beat_no_rows_are_lost() -> None:
+    """There the phase turns by half a cycle; the modes are as large to 1 %, and read to 1."""
+    time_s = np.round(np.arange(2070) * 0.0507, 3)
+    low, high = (np.cos(2.0 * np.pi * f * time_s) for f in (0.70823, 0.7351))
+    noise = 0.3 * np.random.default_rng(1).standard_normal(len(time_s))
+    values = np.round(500.0 + 107.0 * np.exp(-0.0236 * time_s) * (low + 0.99 * high) + noise)
+    record = Recording(time_s, values, "reading", metadata={"unit": "1"}, resolution=1.0)
+    found = diagnose_recording(record)
+    assert found.effects[0].identifier == "second-mode"
+    assert "dropped-samples" not in {each.identifier for each in found.effects}
+    other = found.effects[0].parameters["f_2"].value
+    modes = sorted((found.improved.parameters["frequency"].value, other))
+    np.testing.assert_allclose(modes, [0.70823, 0.7351], atol=3e-5)
+
+
+@pytest.mark.slow
 def test_two_coupled_pendulums_are_two_modes_at_their_frequencies() -> None:
     # x'' = -omega^2 x - kappa (x - z) and z'' = -omega^2 z - kappa (z - x), released at x alone.
     omega, kappa, loss = 4.5, 0.9, 0.015

@@ -383,7 +383,10 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     beside = sum(run.path for run in found) - sum(run.path for run in used)
     alone = told and beside <= 0.3 * told.path and _falls(told, least)
     ends = (float(told.middle_s[0]), float(told.middle_s[-1])) if told else (math.inf, math.inf)
-    beat = _beating(time, values, whole, half_period, place, driven=not alone, decay_s=ends)
+    held = told is not None and told.driven
+    beat = _beating(
+        time, values, whole, half_period, place, driven=not alone, held=held, decay_s=ends
+    )
     if beat is not None:
         return beat
     if told is None:
@@ -558,9 +561,12 @@ def _beating(
     place: str | Path,
     *,
     driven: bool,
+    held: bool,
     decay_s: tuple[float, float],
 ) -> FreeDecay | None:
     """Find two free modes that beat; None where nothing beats, or one decays alone (`decay_s`).
+
+    They are asked where the amplitude rises again, or is `held` up before it falls.
 
     Raises
     ------
@@ -579,9 +585,13 @@ def _beating(
     smooth = np.median(
         np.lib.stride_tricks.sliding_window_view(cycles.swing[first:last], 5), axis=1
     )
-    if not np.max(smooth - np.minimum.accumulate(smooth)) > 0.2 * np.max(smooth):
+    rises = np.max(smooth - np.minimum.accumulate(smooth)) > 0.2 * np.max(smooth)
+    if not (rises or held):
         return None
     start, stop = float(cycles.turn_time_s[first]), float(cycles.turn_time_s[last + 1])
+    # Ends that are nearer than a period to a turning point of the beat are in it.
+    start = float(time[0]) if start - time[0] < 2.0 * half_period else start
+    stop = float(time[-1]) if time[-1] - stop < 2.0 * half_period else stop
     from pendpipe.effects.two_modes import two_modes
 
     inside = (time >= start) & (time <= stop)
@@ -601,7 +611,7 @@ def _beating(
         )
     each = " and ".join(
         f"{mode.frequency.value:.6g} Hz, which loses"
-        f" {with_error(mode.loss.value, mode.loss.sd, short=True)} 1/s"
+        f" {with_error(mode.loss.value, mode.loss.sd, '1/s', short=True)}"
         f" (Q = {math.pi * mode.frequency.value / mode.loss.value:.3g})"
         for mode in modes
     )

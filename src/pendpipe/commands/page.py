@@ -13,7 +13,7 @@ from pendpipe import api
 from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.arguments import FILES, Arguments, command, name_of, tell
 from pendpipe.commands.fit import OPTIONS, fitted
-from pendpipe.errors import InputError, refuse_if
+from pendpipe.errors import InputError, NotAnalysableError, refuse_if
 from pendpipe.options import OUTPUT
 from pendpipe.process import cores, in_order
 from pendpipe.report.class_table import Fitted, class_page
@@ -77,14 +77,18 @@ def _sheet(arguments: Arguments, file: str) -> Sheet:
     recording, result = fitted(arguments, notes.append)
     result, outcome = replace(result, name=name), None
     if not arguments.no_diagnosis and result.method != "amplitudes":
-        outcome = api.diagnose(
-            recording,
-            restoring="sine" if arguments.gravity else arguments.restoring,
-            length_m=arguments.length_m,
-            baseline=arguments.baseline,
-            fixed=parse_fixed(arguments.fixed, arguments.baseline),
-            name=file,
-        )
+        try:
+            outcome = api.diagnose(
+                recording,
+                restoring="sine" if arguments.gravity else arguments.restoring,
+                length_m=arguments.length_m,
+                baseline=arguments.baseline,
+                fixed=parse_fixed(arguments.fixed, arguments.baseline),
+                name=file,
+            )
+        except NotAnalysableError as problem:
+            # What can't be diagnosed was fitted.
+            notes.append(f"not diagnosed: {problem}")
     page = render_recording(name, recording, result, outcome)
     return Sheet(Fitted(file, replace(result, points=None, decay=None)), page, tuple(notes))
 

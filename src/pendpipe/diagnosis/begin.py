@@ -12,7 +12,7 @@ from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.result import Baseline, FitResult
 from pendpipe.analysis.fit.start import start_values, usable_span
 from pendpipe.analysis.torque import restoring_of
-from pendpipe.analysis.turning_points import BEAT, TurningPoints
+from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data, gather
@@ -88,7 +88,7 @@ def begin(
     """
     held = Held(fixed, baseline, points.apparent_frequency_hz)
     angles, _ = as_angles(points)
-    beats = not fixed and any(note.startswith(BEAT) for note in points.notes)
+    beats = not fixed and points.beats is not None
     torque: Restoring = fit.restoring if fit else restoring_of(angles, stated=stated)
     if beats:
         torque = "linear"

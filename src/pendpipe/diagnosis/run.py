@@ -51,7 +51,7 @@ from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.losses import drag_form as drag_form_effect
 from pendpipe.effects.catalogue.restoring import circular_error
-from pendpipe.errors import NotAnalysableError
+from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import stretch, with_error
 from pendpipe.recording import Recording
@@ -123,6 +123,13 @@ def diagnose_recording(
     if restoring == "sine" and part.unit == "m":
         angles, part = measure_recording(_angle_of(part, points, length, place), place)
         points = replace(angles, cuts=points.cuts)
+    refuse_if(
+        points.mostly_cut,
+        place,
+        f"{points.mostly_cut}, of which nothing is said",
+        "cut it with --start and --stop, or see pendpipe inspect",
+        NotAnalysableError,
+    )
     for cut in points.cuts:
         progress(f"left out: {stretch(cut.start_s, cut.stop_s)}, {cut.reason}")
     return diagnose_decay(

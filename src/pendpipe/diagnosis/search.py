@@ -64,10 +64,18 @@ def run_search(state: Hypothesis, task: Task) -> tuple[Hypothesis, tuple[Weighed
     are weighed, the most probable name of a class leads it.
     """
     seen = set()
+    if state.beginning.starts:
+        # Before any fault of the record: at the nodes of a beat the phase turns as if rows were
+        # lost.
+        state = with_other_noise(task.scanned(state), task)
+        begun = max(_starts(state, task), key=lambda each: each.lower, default=None)
+        if begun is not None and begun.lower > 0.0:
+            task.progress(begun.words)
+            state = begun.state.settle(begun.state.fit)
     while True:
         state = with_other_noise(task.scanned(correct(state, task)), task)
         seen.add(state.key)
-        for some in (_starts, _additions, simpler, _descriptions):
+        for some in (_additions, simpler, _descriptions):
             new = [each for each in some(state, task) if each.state.key not in seen]
             best = max(new, key=lambda each: each.lower, default=None)
             if best is not None and best.lower > 0.0:
@@ -90,7 +98,7 @@ def _starts(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
     Without its phase a model's chi^2 says less than the squares of what it leaves.
     """
     before, data, noise = state.fit, state.data, state.noise
-    for start in () if state.steps else state.beginning.starts:
+    for start in state.beginning.starts:
         task.progress(f"the turning points beat: fitting {start.effect.name} first")
         value = np.concatenate([state.beginning.value, start.values])
         fit = fitted_from(before.model.adding(start.effect), data, noise, value, held=state.held)

@@ -483,6 +483,8 @@ def _quality_by_amplitude(decay: Decay) -> tuple[Panel, ...]:
         (factor * each.amplitude_rad, each.quality_factor.value, each.quality_factor.sd)
         for each in seen_qualities(decay.fit)
     ]
+    if not (seen or marks):
+        return ()
     marks.append(_measured_quality(*np.array(seen).reshape(-1, 3).T))
     limit = decay.fit.quality_factor_limit
     if limit is not None and 3.0 * limit.sd < limit.value < 2.0 * float(np.nanmax(quality)):

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,12 +17,13 @@ from pendpipe.analysis.fit.by_waveform import (
     fitted_waveform,
     waveform_result,
 )
+from pendpipe.analysis.fit.decrement import Light
 from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.goodness import LEVEL
 from pendpipe.analysis.fit.printed import period_text
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, read_fit, with_scale
 from pendpipe.analysis.torque import may_be_sine, restoring_of, told_apart
-from pendpipe.analysis.turning_points import BEAT, TurningPoints
+from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.find import turning_points_of
 from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.dynamics.eq8 import OMEGA, Restoring
@@ -112,11 +113,11 @@ def fit_recording(
     result = replace(result, points=points)
     if arm and arm.sd:
         result = replace(with_scale(result, 100.0 * arm.sd / arm.value), scale_percent=None)
-    beats = [note for note in points.notes if note.startswith(BEAT)]
-    if beats:
-        # What its turning points lose is no mode's loss.
-        why = f"{beats[0]}; Eq. 8 has one"
-        return replace(result, light="red", light_reason=why, decrement_check=())
+    if points.beats:
+        # What its turning points lose is no mode's loss, and their period none's.
+        why = f"{points.beats}; Eq. 8 has one"
+        alone: dict[str, Any] = {"decrement_check": (), "other_frequency": None, "quotable": ()}
+        return replace(result, light="red", light_reason=why, **alone)
     by_points = result.method == "turning-points"
     swing = result["amplitude"].value if by_points else 0.5 * float(np.ptp(samples.values))
     missed = result.residual_rms_rad / abs(swing)
@@ -128,6 +129,9 @@ def fit_recording(
         "cut bursts and jumps out with --start and --stop, or see pendpipe diagnose",
         NotAnalysableError,
     )
+    if points.mostly_cut:
+        light: Light = "red" if result.light == "red" else "amber"
+        return replace(result, light=light, light_reason=points.mostly_cut, quotable=())
     refuse_if(
         not result.settled,
         place,

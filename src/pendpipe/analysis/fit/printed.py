@@ -13,7 +13,7 @@ from pendpipe.analysis.fit.consequence import unsure
 from pendpipe.analysis.fit.damping import FALLS, is_extrapolated
 from pendpipe.analysis.fit.quality import LOSSES, SEEN, Quality, period_of_frequency, small_period
 from pendpipe.analysis.torque import TOP, swing_phase
-from pendpipe.analysis.turning_points import BEAT
+from pendpipe.analysis.turning_points import BEAT, CUT
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, pretty_unit, stretch, with_error
 
@@ -110,7 +110,7 @@ def heading(result: FitResult, name: str = "") -> str:
         return f"{name}: {kind}, {result.turning_points} {what}"
     amplitude, swings = points.amplitude_rad, f"{len(points)} {what}"
     ends = (short_size(abs(float(y)), points.unit) for y in (amplitude[0], amplitude[-1]))
-    span = f"{float(np.ptp(points.time_s)):.3g} s"
+    span = f"{float(f'{float(np.ptp(points.time_s)):.3g}'):g} s"
     if result.method != "amplitudes" and decay is not None:
         rate = 1.0 / decay.interval_s if decay.interval_s > 0.0 else math.nan
         span = f"{float(f'{rate:.4g}'):g} Hz, {span}"
@@ -148,7 +148,9 @@ def period_name(result: FitResult) -> str:
 
 
 def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
-    """Yield what is known, a title and a value each."""
+    """Yield what is known, a title and a value each; nothing of two modes beside their own."""
+    if result.light_reason.startswith(BEAT):
+        return
     unit, has_law = result.parameters["amplitude"].unit, result.light != "red" or law
     qualities = result.quality_factors
     period, wide = result.period, result.widening
@@ -267,6 +269,8 @@ def sentence(result: FitResult) -> str:
     """Return the sentence to copy."""
     if result.light_reason.startswith(BEAT):
         return f"{result.light_reason.partition(';')[0]}."
+    if result.light_reason.startswith(CUT):
+        return "nothing of this fit can be quoted."
     unit, said = result.parameters["amplitude"].unit, []
     if "period" in result.quotable:
         period = result.period

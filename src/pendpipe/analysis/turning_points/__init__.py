@@ -3,6 +3,7 @@
 from pendpipe.analysis.turning_points.find import find_turning_points
 from pendpipe.analysis.turning_points.table import (
     BEAT,
+    CUT,
     TurningPoints,
     is_turning_points,
     read_turning_points,
@@ -11,6 +12,7 @@ from pendpipe.analysis.turning_points.table import (
 
 __all__ = [
     "BEAT",
+    "CUT",
     "TurningPoints",
     "find_turning_points",
     "is_turning_points",

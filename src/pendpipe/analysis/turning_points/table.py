@@ -37,6 +37,10 @@ _HEAD: Final = 1 << 16
 """Bytes of a file within which the header of its table begins."""
 BEAT: Final = "two modes beat"
 """How a note begins that tells of two modes."""
+CUT: Final = "most of it was cut"
+"""How it is said that of a recording hardly a decay is left."""
+_FEW: Final = 8
+"""Half cycles up to which what is left is a piece: they tell neither a law nor what it lacks."""
 
 
 class Cut(NamedTuple):
@@ -117,6 +121,19 @@ class TurningPoints:
         alternating = 1.0 - 2.0 * ((self.half_cycle - self.half_cycle[0]) % 2)
         first = float(np.sum(alternating * self.angle_rad))
         return np.asarray(alternating * math.copysign(1.0, first))
+
+    @property
+    def beats(self) -> str | None:
+        """The note that two modes beat, where they do."""
+        return next((note for note in self.notes if note.startswith(BEAT)), None)
+
+    @property
+    def mostly_cut(self) -> str | None:
+        """Say that more motion was cut than is left, where what is left is a few swings."""
+        moving = (cut for cut in self.cuts if "rest " not in cut.reason)
+        cut, left = sum(each.stop_s - each.start_s for each in moving), self.stop_s - self.start_s
+        few = self.half_cycle[-1] - self.half_cycle[0] <= _FEW
+        return f"{CUT}: {left:.3g} s of {left + cut:.3g} s are left" if cut > left and few else None
 
     def first(self, count: int) -> Self:
         """The first `count` of them."""

@@ -107,11 +107,12 @@ def find_lost_samples(data: Data, fit: Fit) -> list[LostSamples]:
     """
     if not data.uniform or data.time_noise:
         return []
-    _, phase, centre = alignment(data, fit.at, data.residual(fit.at.reading))
+    log_ratio, phase, centre = alignment(data, fit.at, data.residual(fit.at.reading))
     if len(phase) < 8:
         return []
     interval = fit.at.sampled.motion.angular_frequency * data.interval_s / data.fold
-    errors = _phase_errors(data, fit, phase, centre)
+    amplitude = np.interp(centre, fit.at.sampled.phase, fit.at.sampled.amplitude)
+    errors = _phase_errors(data, amplitude * np.exp(log_ratio), phase)
     rest = phase.copy()
     found: list[LostSamples] = []
     for _ in range(_MOST_STEPS):
@@ -136,9 +137,11 @@ def find_lost_samples(data: Data, fit: Fit) -> list[LostSamples]:
     return sorted(each for each in found if each.number * signs > 0)
 
 
-def _phase_errors(data: Data, fit: Fit, phase: FloatArray, centre: FloatArray) -> FloatArray:
-    """Return the error of each cycle's phase, estimated from its steps, as 1/amplitude."""
-    amplitude = np.interp(centre, fit.at.sampled.phase, fit.at.sampled.amplitude)
+def _phase_errors(data: Data, amplitude: FloatArray, phase: FloatArray) -> FloatArray:
+    """Return the error of each cycle's phase, estimated from its steps, as 1/amplitude.
+
+    The amplitude is that of the readings: where it vanishes, a phase says nothing.
+    """
     second = np.diff(phase, 2)
     at = amplitude[1:-1]
     usual = 1.4826 * float(np.median(np.abs(second - np.median(second)) * at)) / math.sqrt(6.0)
