@@ -16,6 +16,7 @@ import shutil
 import sys
 import tempfile
 import zlib
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
@@ -455,6 +456,20 @@ def without_folders(text: str) -> str:
     'run 7.csv, line 3: no number'
     """
     return _PATH.sub(lambda found: PurePath(found.group().replace("\\", "/")).name, text)
+
+
+def told_apart(files: Sequence[str | Path]) -> list[str]:
+    """Return the names of files, with as many of their folders as tell them apart.
+
+    >>> told_apart(["runs/a/decay.csv", "runs/b/decay.csv", "runs/b/swing.csv"])
+    ['a/decay.csv', 'b/decay.csv', 'swing.csv']
+    """
+    ends = [
+        [PurePath(*parts[-n:]).as_posix() for n in range(1, len(parts) + 1)]
+        for parts in (Path(file).parts for file in files)
+    ]
+    counts = Counter(end for one in ends for end in set(one))
+    return [next((end for end in one if counts[end] == 1), one[-1]) for one in ends]
 
 
 def distinct_names(files: Sequence[str | Path]) -> list[str]:

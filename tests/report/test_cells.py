@@ -122,3 +122,18 @@ def test_what_a_head_says_reads_back_and_is_no_formula(tmp_path: Path) -> None:
         cells: list[Any] = re.split("[,\n]", file.read_text(encoding="utf-8"))
         assert [cell for cell in cells if is_formula(cell)] == []
         assert found.items() >= told.items()
+
+
+def test_two_files_of_one_name_are_told_apart_in_a_table(tmp_path: Path) -> None:
+    files = [tmp_path / name / "decay.csv" for name in ("left", "right")]
+    time_s = np.arange(900) / 30.0
+    for file in files:
+        file.parent.mkdir()
+        write_plain(
+            file, Recording(time_s, np.cos(4.0 * time_s) * np.exp(-0.01 * time_s), "angle_rad")
+        )
+    page = tmp_path / "class.html"
+    assert cli.main(["fit", *map(str, files), "--out", str(page)]) == 0
+    assert {"left/decay.csv", "right/decay.csv"} <= set(
+        re.findall("<th[^>]*>([^<]*)</th>", page.read_text())
+    )

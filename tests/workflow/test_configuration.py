@@ -2,6 +2,7 @@
 
 import copy
 import json
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -537,3 +538,70 @@ def test_a_lock_is_named_before_there_are_results(
     (found,) = examine(Path("results"))
     assert found.kind == "locked"
     assert "--unlock" in found.safe
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("apparatus.sphere.diameter_m", 38, "is it 38 mm? write 0.038"),
+        ("apparatus.sphere.diameter_sd_m", 50.0, "is it 50 mm? write 0.05"),
+        ("apparatus.sphere.mass_kg", 250, "is it 250 g? write 0.25"),
+        ("apparatus.sphere.screw_volume_m3", "20", "is it 20 cm³? write 2e-05"),
+        ("apparatus.rod.length_m", 77.0, "is it 77 mm? write 0.077 (77 cm: 0.77)"),
+        ("geometries.low-2.weights_m.upper", -26.5, "write -0.0265 (-26.5 cm: -0.265)"),
+        ("apparatus.tank.depth_m", 5e3, "is it 5000 mm? write 5"),
+        ("apparatus.gravity_m_per_s2", 981, "is it 981 cm/s²? write 9.81"),
+        ("apparatus.weights.upper.frontal_area_m2", 16, "is it 16 cm²? write 0.0016"),
+        ("geometries.low-1.weights_m.upper", 267.07, "is it 267.07 mm? write 0.26707"),
+        ("fluids.water.viscosity_pa_s", 1.0016, "is it 1.0016 mPa s? write 0.0010016"),
+        ("simulated.release.water.angle_rad", 30, "is it 30°? write 0.523599"),
+    ],
+)
+def test_a_number_in_another_unit_is_asked_about(key: str, value: object, said: str) -> None:
+    """What no laboratory has, with the factor to the unit that was meant."""
+    content = read_configuration(ROOT / "config/config.yaml")
+    *sections, last = key.split(".")
+    part = content
+    for section in sections:
+        part = part[section]
+    assert abs(float(part[last])) < abs(float(value))  # type: ignore[arg-type]
+    part[last] = value
+    with pytest.raises(InputError, match=re.escape(said)) as caught:
+        load_campaign(content, "config.yaml")
+    assert str(caught.value).startswith(f"config.yaml, {key}: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_number_below_its_bound_has_no_other_unit() -> None:
+    content = read_configuration(ROOT / "config/config.yaml")
+    content["apparatus"]["sphere"]["diameter_m"] = -0.038
+    with pytest.raises(InputError, match="greater than 0") as caught:
+        load_campaign(content, "config.yaml")
+    assert "is it" not in str(caught.value)
+
+
+def test_a_table_that_ends_in_a_row_is_torn(tmp_path: Path) -> None:
+    """A last row that is whole needs no line end: not every editor writes one."""
+    table = tmp_path / "records.tsv"
+    whole = "record\tsource\tstop_s\na\ta.csv\t100\nb\tb.csv\t200"
+    for text in (whole, whole + "\n", whole.replace("\t200", "") + "\n"):
+        table.write_text(text)
+        assert len(read_records(table)) == 2
+    for cut in range(len("b\tb.csv\t200") - len("b\tb"), len("b\tb.csv\t200") - 1):
+        table.write_text(whole[:-cut] if cut > 3 else whole.removesuffix("\t200"))
+        with pytest.raises(InputError, match=r"line 3: the table ends in the middle of a row"):
+            read_records(table)
+
+
+def test_a_file_called_simulated_is_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And two of one name are told apart."""
+    monkeypatch.chdir(tmp_path)
+    files = ["simulated", "x/decay.csv", "y/decay.csv", "z/other.csv"]
+    for name in files:
+        Path(name).parent.mkdir(exist_ok=True)
+        Path(name).write_text("time_s,angle_rad\n0,0\n")
+    assert main(["init", ".", *files]) == 0
+    campaign = load_campaign(read_configuration("config/config.yaml"), "config/config.yaml")
+    assert [str(record.file) for record in campaign.records] == files
+    shown = ["./simulated", "x/decay.csv", "y/decay.csv", "other.csv"]
+    assert [*campaign.shown_sources.values()] == shown

@@ -296,7 +296,10 @@ def _rows(folder: Path, own: list[Path]) -> list[str]:
             for each in (plain, *(f"{plain}-{number}" for number in range(2, len(own) + 2)))
             if each.lower() not in rows
         )
-        rows[name.lower()] = f"{name}\t{Path(os.path.relpath(path, folder)).as_posix()}"
+        source = Path(os.path.relpath(path, folder)).as_posix()
+        # A file may have the name of what is no file.
+        there = "./" * (source == "simulated" or source.startswith("dataq:"))
+        rows[name.lower()] = f"{name}\t{there}{source}"
     return list(rows.values())
 
 

@@ -6,9 +6,10 @@ known name.
 
 import csv
 import json
+import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +20,7 @@ from pydantic.dataclasses import dataclass as checked
 
 from pendpipe.configuration.models import WATER_C, Celsius, Configuration, Geometry, Section
 from pendpipe.errors import InputError, nearest, refuse_if
-from pendpipe.files import is_file, names_in, read_json, read_text
+from pendpipe.files import is_file, names_in, read_json, read_text, told_apart
 
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 LONGEST_NAME: Final = 100
@@ -42,7 +43,7 @@ class Record:
     record
         Its name, that of its folder in ``results/``.
     source
-        ``simulated``, ``dataq:<port>`` or a file.
+        ``simulated``, ``dataq:<port>`` or a file (``./simulated`` is one).
     fluid, branch, geometry
         Names from the configuration; `branch` groups records (``low``, ``high``, ``air``).
     channel
@@ -116,6 +117,7 @@ def read_records(path: str | Path) -> list[Record]:
         ):
             refuse_if(wrong, f"{place}, line {rows[0][0]}", problem, remedy)
     records: list[Record] = []
+    last = rows[-1][0]
     for number, line in rows[1:]:
         cells = [cell.strip() for cell in next(csv.reader([line], delimiter="\t"))]
         where = f"{place}, line {number}"
@@ -124,6 +126,12 @@ def read_records(path: str | Path) -> list[Record]:
             where,
             f"{len(cells)} cells, not {len(names)}",
             "separate by one tab",
+        )
+        refuse_if(
+            len(cells) < len(names) and number == last and not text.endswith(("\n", "\r")),
+            where,
+            f"the table ends in the middle of a row: {len(cells)} of {len(names)} cells",
+            "complete it, and end it with a line end",
         )
         records.append(_record(where, dict(zip(names, cells, strict=False))))
     refuse_if(not records, place, "the table has no records", "add one row per record")
@@ -226,6 +234,16 @@ class Campaign:
     @cached_property
     def _by_name(self) -> dict[str, Record]:
         return {entry.record: entry for entry in self.records}
+
+    @cached_property
+    def shown_sources(self) -> dict[str, str]:
+        """The source of each record: of a file its name, with folders where two have one name."""
+        files = {record.record: record.file for record in self.records if record.file is not None}
+        names = dict(zip(files, told_apart([*files.values()]), strict=True))
+        # A file may have the name of what is no file.
+        names |= {name: f"./{shown}" for name, shown in names.items() if shown == "simulated"}
+        ours = {each.record: each.source.partition(":")[0] for each in self.records}
+        return ours | names
 
     def geometry(self, record: Record) -> Geometry | None:
         """Where the weights are for a record; ``None`` where none is given."""
@@ -409,9 +427,47 @@ def as_input_error(
     if first["type"] == "missing":
         return InputError(where, "this key is missing", "add it (see config/README.md)")
     given = first.get("input")
+    asked = _other_unit(path, given, first.get("ctx", {}))
+    if asked:
+        return InputError(where, *asked)
     problem = first["msg"][0].lower() + first["msg"][1:]
     shown = "" if isinstance(given, dict | list) else f" (it is {given!r})"
     return InputError(where, problem + shown, "see config/README.md")
+
+
+_SMALLER: Final[Mapping[str, tuple[str, tuple[tuple[str, float], ...]]]] = {
+    "_m": ("m", ((" mm", 1e-3), (" cm", 1e-2))),
+    "_kg": ("kg", ((" g", 1e-3), (" mg", 1e-6))),
+    "_m2": ("m²", ((" cm²", 1e-4), (" mm²", 1e-6))),
+    "_m3": ("m³", ((" cm³", 1e-6), (" mm³", 1e-9))),
+    "_pa_s": ("Pa s", ((" mPa s", 1e-3),)),
+    "_m_per_s2": ("m/s²", ((" cm/s²", 1e-2),)),
+    "_rad": ("rad", (("°", math.pi / 180.0),)),
+}
+"""By the ending of a key: its unit, and those in which people write as well."""
+
+
+def _other_unit(path: list[str], given: Any, limits: Mapping[str, Any]) -> tuple[str, str] | None:
+    """Ask whether a number beyond its bound is in a smaller unit; None where none would do."""
+    largest = limits.get("le") or -limits.get("ge", 0.0)
+    try:
+        number = float(given)
+    except (TypeError, ValueError):
+        return None
+    endings = (_SMALLER.get(end) for key in reversed(path) for end in _endings(key))
+    unit, smaller = next(filter(None, endings), ("", ()))
+    fits = [each for each in smaller if largest < abs(number) <= largest / each[1]]
+    if not fits:
+        return None
+    (name, factor), *others = fits
+    more = "".join(f" ({number:g}{name}: {number * factor:.6g})" for name, factor in others)
+    problem = f"{number:g} {unit} is too large, since at most {largest:g} {unit} can be"
+    return problem, f"is it {number:g}{name}? write {number * factor:.6g}{more}"
+
+
+def _endings(key: str) -> Iterator[str]:
+    """The parts of a key's name that may be its unit, the longest first."""
+    return (key[at:] for at, sign in enumerate(key) if sign == "_")
 
 
 def _known_keys(model: type[BaseModel], path: list[str]) -> Iterable[str]:

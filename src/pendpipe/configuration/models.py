@@ -11,6 +11,24 @@ from pydantic import BaseModel, ConfigDict, Field
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
+Length = Annotated[float, Field(gt=0, le=10.0)]
+"""Metres, of an apparatus in a room; what is larger was meant in another unit."""
+LengthOrNone = Annotated[float, Field(ge=0, le=10.0)]
+Distance = Annotated[float, Field(ge=-10.0, le=10.0)]
+Size = Annotated[float, Field(gt=0, le=1.0)]
+"""Metres, of a body on the pendulum's rod."""
+SizeOrNone = Annotated[float, Field(ge=0, le=1.0)]
+Mass = Annotated[float, Field(gt=0, le=50.0)]
+"""Kilograms, of what a person clamps to a rod."""
+MassError = Annotated[float, Field(ge=0, le=50.0)]
+Area = Annotated[float, Field(ge=0, le=1.0)]
+Volume = Annotated[float, Field(ge=0, le=1.0)]
+Viscosity = Annotated[float, Field(gt=0, le=0.5)]
+"""Pascal seconds. Oils have 0.1 and less; in glycerol, 1.4, the paper's sphere rests in a swing."""
+Gravity = Annotated[float, Field(gt=0, le=30.0)]
+"""m/s²: Jupiter's is 25."""
+Angle = Annotated[float, Field(gt=0, le=3.15)]
+"""Radians, of a release: the top is at pi."""
 Celsius = Annotated[float, Field(gt=-273.15)]
 WATER_C: Final = (0.0, 40.0)
 """Where the formulas of `pendpipe.physics` for water's density and viscosity hold, in Celsius."""
@@ -25,22 +43,22 @@ class Section(BaseModel):
 class Rod(Section):
     """The rod, pivoted at its middle."""
 
-    mass_kg: Positive = Field(description="mass of the rod with what is glued to it")
-    mass_sd_kg: NotNegative = Field(0.0, description="standard uncertainty of that mass")
-    length_m: Positive = Field(description="its whole length")
-    length_sd_m: NotNegative = Field(0.0, description="standard uncertainty of that length")
-    radius_m: NotNegative = Field(0.0, description="radius, for the drag of the air; 0 for none")
+    mass_kg: Mass = Field(description="mass of the rod with what is glued to it")
+    mass_sd_kg: MassError = Field(0.0, description="standard uncertainty of that mass")
+    length_m: Length = Field(description="its whole length")
+    length_sd_m: LengthOrNone = Field(0.0, description="standard uncertainty of that length")
+    radius_m: SizeOrNone = Field(0.0, description="radius, for the drag of the air; 0 for none")
 
 
 class Weight(Section):
     """A weight that can be clamped anywhere on the rod."""
 
-    mass_kg: Positive = Field(description="mass")
-    mass_sd_kg: NotNegative = Field(0.0, description="standard uncertainty of the mass")
-    radius_m: NotNegative = Field(
+    mass_kg: Mass = Field(description="mass")
+    mass_sd_kg: MassError = Field(0.0, description="standard uncertainty of the mass")
+    radius_m: SizeOrNone = Field(
         0.0, description="radius of a solid sphere of that mass; 0 for a point"
     )
-    frontal_area_m2: NotNegative = Field(
+    frontal_area_m2: Area = Field(
         0.0, description="area that meets the air, for the quadratic drag; 0 for none"
     )
 
@@ -48,23 +66,21 @@ class Weight(Section):
 class Sphere(Section):
     """The sphere at the lower end, which swings in the fluid."""
 
-    mass_kg: Positive = Field(description="mass with its screw")
-    mass_sd_kg: NotNegative = Field(0.0, description="standard uncertainty of that mass")
-    diameter_m: Positive = Field(description="diameter")
-    diameter_sd_m: NotNegative = Field(0.0, description="standard uncertainty of the diameter")
-    distance_m: Positive = Field(description="from the axis to the centre of the sphere (L)")
-    distance_sd_m: NotNegative = Field(0.0, description="standard uncertainty of that distance")
-    screw_volume_m3: NotNegative = Field(
-        0.0, description="volume of the immersed part of the screw"
-    )
-    screw_distance_m: NotNegative = Field(
+    mass_kg: Mass = Field(description="mass with its screw")
+    mass_sd_kg: MassError = Field(0.0, description="standard uncertainty of that mass")
+    diameter_m: Size = Field(description="diameter")
+    diameter_sd_m: SizeOrNone = Field(0.0, description="standard uncertainty of the diameter")
+    distance_m: Length = Field(description="from the axis to the centre of the sphere (L)")
+    distance_sd_m: LengthOrNone = Field(0.0, description="standard uncertainty of that distance")
+    screw_volume_m3: Volume = Field(0.0, description="volume of the immersed part of the screw")
+    screw_distance_m: LengthOrNone = Field(
         0.0, description="from the axis to the middle of the immersed part of the screw"
     )
-    screw_radius_m: NotNegative = Field(0.0024, description="radius of the screw, for its drag")
-    screw_length_m: NotNegative = Field(
+    screw_radius_m: SizeOrNone = Field(0.0024, description="radius of the screw, for its drag")
+    screw_length_m: LengthOrNone = Field(
         0.0, description="immersed length of the screw that drags; its volume stands above"
     )
-    screw_length_sd_m: NotNegative = Field(
+    screw_length_sd_m: LengthOrNone = Field(
         0.0, description="standard uncertainty of the immersed length"
     )
 
@@ -72,17 +88,17 @@ class Sphere(Section):
 class Tank(Section):
     """The tank in which the sphere swings, along its length."""
 
-    length_m: Positive = Field(description="inner length, along the motion")
-    width_m: Positive = Field(description="inner width, across it")
-    depth_m: Positive = Field(description="depth of the fluid")
-    depth_sd_m: NotNegative = Field(
+    length_m: Length = Field(description="inner length, along the motion")
+    width_m: Length = Field(description="inner width, across it")
+    depth_m: Length = Field(description="depth of the fluid")
+    depth_sd_m: LengthOrNone = Field(
         0.0, description="standard uncertainty of the depth, which counts where a height is given"
     )
-    height_m: Positive | None = Field(
+    height_m: Length | None = Field(
         None, description="of the sphere's centre above the floor; blank: half the depth"
     )
-    height_sd_m: NotNegative = Field(0.0, description="standard uncertainty of that height")
-    off_centre_m: NotNegative = Field(0.0, description="of the sphere, across the tank")
+    height_sd_m: LengthOrNone = Field(0.0, description="standard uncertainty of that height")
+    off_centre_m: LengthOrNone = Field(0.0, description="of the sphere, across the tank")
 
 
 class Hysteresis(Section):
@@ -109,7 +125,7 @@ class Hysteresis(Section):
 class Apparatus(Section):
     """The compound pendulum, before the weights are clamped."""
 
-    gravity_m_per_s2: Positive = Field(9.80665, description="local acceleration of free fall")
+    gravity_m_per_s2: Gravity = Field(9.80665, description="local acceleration of free fall")
     gravity_sd_m_per_s2: NotNegative = Field(
         0.01,
         description="its standard uncertainty; 0.01 where only the standard value is known, which"
@@ -121,16 +137,16 @@ class Apparatus(Section):
     rod: Rod = Field(description="the rod")
     weights: dict[str, Weight] = Field(description="the weights, by name")
     sphere: Sphere | None = Field(None, description="the sphere that swings in the fluid")
-    bearing_torque_n_m: NotNegative = Field(0.0, description="friction torque of the bearings")
+    bearing_torque_n_m: LengthOrNone = Field(0.0, description="friction torque of the bearings")
     added_mass: Literal["boundary-layer", "plain"] = Field(
         "boundary-layer",
         description="on the paper's route, of the displaced fluid: 1/2 + 9 delta/(4 radius), or the"
         " plain 1/2; the fit of all records together has the whole memory of the layer",
     )
-    position_sd_m: NotNegative = Field(
+    position_sd_m: LengthOrNone = Field(
         1.0e-4, description="standard uncertainty of a weight's distance, each time it is clamped"
     )
-    scale_zero_sd_m: NotNegative = Field(
+    scale_zero_sd_m: LengthOrNone = Field(
         3.0e-4, description="standard uncertainty of the zero that all these distances share"
     )
     hysteresis: Hysteresis = Field(
@@ -142,7 +158,7 @@ class Apparatus(Section):
 class Geometry(Section):
     """Where the weights are clamped for a record."""
 
-    weights_m: dict[str, float] = Field(
+    weights_m: dict[str, Distance] = Field(
         description="name of a weight to its distance from the axis; negative above it"
     )
     sphere: bool = Field(True, description="whether the sphere is fitted")
@@ -152,7 +168,7 @@ class Fluid(Section):
     """What the pendulum swings in; it acts on the sphere, without one on the weights."""
 
     density_kg_per_m3: Positive = Field(description="density")
-    viscosity_pa_s: Positive = Field(description="dynamic viscosity")
+    viscosity_pa_s: Viscosity = Field(description="dynamic viscosity")
     drag_coefficient: NotNegative = Field(
         0.0, description="C_d of the drag that grows with the square of the velocity"
     )
@@ -191,7 +207,7 @@ class Device(Section):
 class Release(Section):
     """How a simulated record begins and ends."""
 
-    angle_rad: Positive = Field(description="amplitude at the release")
+    angle_rad: Angle = Field(description="amplitude at the release")
     samples: Annotated[int, Field(ge=64, le=10_000_000)] = Field(
         32768, description="number of samples kept"
     )
@@ -219,10 +235,10 @@ class CaliperRun(Section):
     source: str = Field(
         "simulated", description="`simulated`, or a CSV with displacement_m or angle and volts"
     )
-    arm_m: Positive = Field(description="from the axis to where the caliper touches")
-    travel_m: Positive = Field(description="largest displacement to each side")
+    arm_m: Length = Field(description="from the axis to where the caliper touches")
+    travel_m: Length = Field(description="largest displacement to each side")
     points: Annotated[int, Field(ge=5)] = Field(description="number of positions")
-    displacement_sd_m: NotNegative = Field(description="standard uncertainty of the caliper")
+    displacement_sd_m: LengthOrNone = Field(description="standard uncertainty of the caliper")
     samples: Annotated[int, Field(ge=1)] = Field(64, description="samples averaged at a position")
 
 

@@ -16,7 +16,7 @@ from pendpipe.analysis.turning_points import BEAT
 from pendpipe.cells import csv_text, inert
 from pendpipe.errors import refuse_if
 from pendpipe.estimate import Estimate, chi_square_p_value
-from pendpipe.files import MADE_BY, is_stream, write_json, write_whole
+from pendpipe.files import MADE_BY, is_stream, told_apart, write_json, write_whole
 from pendpipe.quantities import in_columns, with_error
 
 if TYPE_CHECKING:
@@ -297,7 +297,8 @@ def class_page(fits: Sequence[Fitted], links: Sequence[str | None] | None = None
     from pendpipe.report.page import own_files
     from pendpipe.templates import render
 
-    rows = [(Path(cells[0]).name, *cells[1:]) for cells in cells_of(fits)]
+    names = told_apart([each.file for each in fits])
+    rows = [(name, *cells[1:]) for name, cells in zip(names, cells_of(fits), strict=True)]
     return render(
         "pendpipe.report",
         "class.html",

@@ -132,7 +132,7 @@ def _record(
     row = result.record
     content: dict[str, Any] = {
         "record": row.record,
-        "source": row.file.name if row.file else row.source.partition(":")[0],
+        "source": campaign.shown_sources[row.record],
         "fluid": row.fluid,
         "branch": row.branch,
         "geometry": row.geometry,
