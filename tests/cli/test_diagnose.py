@@ -71,6 +71,7 @@ TOP = {
     "provenance",
 }
 MODEL = {"parameters", "residual_rms_rad", "chi2_per_dof", "noise_rms_rad", "fit_p_value"}
+MODEL |= {"period_span_s", "quality_factors"}
 EFFECT = {
     "id",
     "presumed",

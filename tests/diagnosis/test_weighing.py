@@ -31,9 +31,9 @@ from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.result import Diagnosis, Finding
 from pendpipe.diagnosis.rivals import Rival, Scale, class_width, evidence, probabilities
 from pendpipe.diagnosis.run import diagnose_recording
-from pendpipe.diagnosis.weighing import Weighed, fault_named, law_of, weigh, with_likelier
+from pendpipe.diagnosis.weighing import Weighed, fault_named, weigh, with_likelier
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import OMEGA, B
+from pendpipe.effects.baseline import B
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import CURVES
 from pendpipe.effects.model import Model
@@ -50,7 +50,6 @@ from .records import (
     null_fit,
     other_engine,
     prepared,
-    pulled,
     recording,
     scanned,
 )
@@ -166,22 +165,6 @@ def test_a_curve_that_fits_better_does_not_lower_a_name() -> None:
     name = rival(by_identifier("cubic-stiffness"), 1e5 - 101.0)
     drawn, named, _ = probabilities([curve, name], 1e5 - 5.0)
     assert named > drawn
-
-
-@pytest.mark.slow
-def test_a_curve_without_a_name_takes_nothing_from_the_law() -> None:
-    """A pull that no entry of the catalogue describes: a, b, c and f are those of Eq. 8 alone."""
-    outcome = diagnose_recording(recording(pulled(0.5, 0.03), 3), restoring="linear")
-    found, diagnosis = outcome.search, outcome
-    assert [step.winner.drawn for step in found.steps] == [True]
-    weighed = [weigh(found, step) for step in found.steps]
-    law = law_of(found, weighed)
-    assert law.model.effects == ()
-    assert law.chi2 > 2.0 * found.fit.chi2
-    assert law.error_scale > 1.0
-    for name in ("a", "b", "c", "frequency"):
-        alone, given = diagnosis.baseline.parameters[name], diagnosis.improved.parameters[name]
-        assert abs(given.value - alone.value) < 0.1 * given.sd
 
 
 @pytest.mark.structure
@@ -343,20 +326,6 @@ def test_the_class_of_a_likelier_name_is_that_of_the_last_model() -> None:
     assert "cubic-stiffness" in again
     assert again == same
     np.testing.assert_allclose(weighed[1].weights, weighed[0].weights, atol=1e-3)
-
-
-def test_a_period_is_known_no_better_than_by_the_names_that_share_the_probability() -> None:
-    """A drifting clock and a drifting frequency leave the same noise and not the same T0."""
-    outcome = diagnosed("frequency-drift")
-    found = outcome.search
-    (weighed,) = [weigh(found, step) for step in found.steps]
-    values = np.array([found.fit.value[OMEGA], *(mate.fit.value[OMEGA] for mate in weighed.mates)])
-    weights = weighed.weights[:-1] / weighed.weights[:-1].sum()
-    spread = np.sqrt(weights @ (values - weights @ values) ** 2) / (2.0 * np.pi)
-    alone = np.sqrt(found.fit.covariance()[OMEGA, OMEGA]) / (2.0 * np.pi)
-    assert spread > 3.0 * alone
-    quoted = outcome.improved.parameters["frequency"]
-    assert quoted.sd > spread
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
@@ -177,8 +177,6 @@ class Fit:
         Factor on standard deviations for a misfit beyond the noise, in the mean.
     scatter
         Covariance of J'r for that misfit, shape (size, size); None where noise alone is left.
-    variance
-        What other descriptions of the readings add to the variance of the first values.
     """
 
     evaluation: Evaluation
@@ -186,7 +184,6 @@ class Fit:
     converged: bool
     error_scale: float = 1.0
     scatter: FloatArray | None = None
-    variance: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def model(self) -> Model:
@@ -238,8 +235,6 @@ class Fit:
         if self.scatter is not None:
             own = own @ self.scatter[np.ix_(self.free, self.free)] @ own
         matrix[np.ix_(self.free, self.free)] = own
-        diagonal = np.arange(len(self.variance))
-        matrix[diagonal, diagonal] += self.variance
         return matrix
 
 

@@ -40,7 +40,8 @@ _DENSITIES: Final = ("log_density_before", "log_density_after", "gain", "gain_sd
 class FittedModel:
     """A model's parameters, and how well it describes the readings.
 
-    `quality_factors` are Q by amplitude, where the model leaves nothing but noise.
+    `quality_factors` are Q by amplitude; its numbers are averages over the descriptions that share
+    the probability (`quoted`).
     """
 
     parameters: Mapping[str, Estimate]
@@ -50,6 +51,8 @@ class FittedModel:
     fit_p_value: float | None = None
     """Of the one test of fit, where the model is the one that ``fit`` prints."""
     quality_factors: Mapping[float, Estimate] = field(default_factory=dict)
+    period_span_s: tuple[float, float] | None = None
+    """Within which the period of small swings drifts, of which the frequency is the mean."""
 
     @classmethod
     def of_fit(cls, fit: FitResult) -> FittedModel:
@@ -65,6 +68,11 @@ class FittedModel:
             "chi2_per_dof": self.chi2_per_dof,
             "noise_rms_rad": self.noise_rms_rad,
             "fit_p_value": self.fit_p_value,
+            "period_span_s": self.period_span_s,
+            "quality_factors": [
+                {"amplitude_rad": amplitude, **each.as_json()}
+                for amplitude, each in self.quality_factors.items()
+            ],
         }
 
 
@@ -471,6 +479,7 @@ def not_analysable(
     """
     nothing: dict[str, Any] = {"parameters": {}, "residual_rms_rad": None, "chi2_per_dof": None}
     nothing |= {"noise_rms_rad": None, "fit_p_value": None}
+    nothing |= {"period_span_s": None, "quality_factors": []}
     return {
         "schema_version": 1,
         "baseline": {"name": baseline, **nothing},

@@ -26,6 +26,7 @@ from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.held_out import HeldOut, held_out
 from pendpipe.diagnosis.hypothesis import Hypothesis, Task, catalogue_beside
 from pendpipe.diagnosis.projection import whitened
+from pendpipe.diagnosis.quoted import quoted
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
@@ -38,13 +39,11 @@ from pendpipe.diagnosis.result import (
 )
 from pendpipe.diagnosis.search import baseline_fitted, run_search
 from pendpipe.diagnosis.summary import COLOURED_NOISE, LEVEL, statement
-from pendpipe.diagnosis.values import parameters_of, quality_factors_of
+from pendpipe.diagnosis.values import parameters_of
 from pendpipe.diagnosis.weighing import (
     Weighed,
     effect_named,
     fault_named,
-    law_of,
-    with_other_descriptions,
 )
 from pendpipe.dynamics.any_law import NoMotionError, sample_pieces
 from pendpipe.dynamics.eq8 import Restoring
@@ -52,7 +51,7 @@ from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.losses import drag_form as drag_form_effect
 from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.errors import NotAnalysableError, refuse_if
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Estimate, over
 from pendpipe.quantities import stretch, with_error
 from pendpipe.recording import Recording
 
@@ -219,12 +218,12 @@ def diagnose_decay(
         raise NotAnalysableError(place, f"the model can't follow it ({error})", remedy) from error
     effects = _in_order(found, weighed, samples)
     missing = any(effect.identifier != COLOURED_NOISE for effect in effects)
-    # With a red light the fit has lost the motion, which the search follows by its phase; and a
-    # part of b that is held bounds b here alone.
-    stands = fit if fit and fit.light != "red" and not beginning.model.parts else None
-    before, after, law = _models(found, weighed, stands)
+    # A part of b that is held bounds b here alone.
+    printed = None if beginning.model.parts else fit
+    stands = printed if printed and printed.light != "red" else None
+    before, after, leading = _models(found, weighed, printed, level)
     drag_form, swung = stands.drag_form if stands else "energy", found.baseline.model.restoring
-    swings = _small_swings(law, found)
+    swings = _small_swings(leading, found)
     gap = gap_note((whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
     stamps = tuple(note for note in (gap, *found.notes.values()) if note)
     return Diagnosis(
@@ -269,26 +268,36 @@ def diagnose_decay(
 
 
 def _models(
-    found: Hypothesis, weighed: Sequence[Weighed], fit: FitResult | None
+    found: Hypothesis,
+    weighed: Sequence[Weighed],
+    fit: FitResult | None,
+    level: float,
 ) -> tuple[FittedModel, FittedModel, Fit]:
-    """Return the baseline as it is printed, the model with what is missing, and its law.
+    """Return the baseline as it is printed, the model with what is missing, and its fit.
 
-    The baseline's numbers are those of the fit, where that stands.
+    The baseline's numbers are those of the fit, where that stands; the others are averages over
+    the descriptions that share the probability.
     """
     before = _fitted_model(with_errors(found.baseline, found.data, found.noise), found)
     if fit:
-        printed = FittedModel.of_fit(fit)
+        law, small = before, {"frequency": over(1.0, fit.period, "Hz")}
+        if fit.light != "red":
+            law = FittedModel.of_fit(fit)
         of_all = fit.method == "waveform" and not fit.cuts and fit.zero_drift is None
         # What it leaves of other readings, or beside a zero that drifts, compares with nothing.
-        before = printed if of_all else replace(before, parameters=printed.parameters)
-    law = with_other_descriptions(law_of(found, weighed), found, weighed)
+        before = replace(law if of_all else before, parameters={**law.parameters, **small})
     if _adds_nothing(found) and found.fit.error_scale == 1.0:
-        return before, before, law
-    after = _fitted_model(found.fit, found, law)
-    if fit and not found.remainder.systematic:
-        amplitudes = [each.amplitude_rad for each in fit.quality_factors]
-        after = replace(after, quality_factors=quality_factors_of(found.fit, amplitudes))
-    return before, after, law
+        return before, before, found.fit
+    said = quoted(found, weighed, fit, level)
+    after = _fitted_model(found.fit, found)
+    parameters = {**parameters_of(said.leading, found.data), **said.constants}
+    after = replace(
+        after,
+        parameters=parameters,
+        quality_factors=said.quality_factors,
+        period_span_s=said.period_span_s,
+    )
+    return before, after, said.leading
 
 
 def _adds_nothing(found: Hypothesis) -> bool:
@@ -386,8 +395,8 @@ def _as_presumed(effect: Effect, found: Hypothesis) -> FoundEffect:
     )
 
 
-def _fitted_model(fit: Fit, found: Hypothesis, law: Fit | None = None) -> FittedModel:
-    """Return a fit's residual and parameters; those of its `law` where that is another fit.
+def _fitted_model(fit: Fit, found: Hypothesis) -> FittedModel:
+    """Return a fit's residual and parameters.
 
     Residual, chi^2 and noise are those of a reading.
     """
@@ -399,7 +408,7 @@ def _fitted_model(fit: Fit, found: Hypothesis, law: Fit | None = None) -> Fitted
     # What is left holds all noise, whatever the model.
     noise = max(min(found.noise.rms, left, by_baseline), data.step / 12.0**0.5)
     return FittedModel(
-        parameters_of(law or fit, data),
+        parameters_of(fit, data),
         data.rms_of_reading(left),
         data.chi2_per_dof(fit.chi2, len(fit.free)),
         data.rms_of_reading(noise),

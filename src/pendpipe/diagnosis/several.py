@@ -33,6 +33,7 @@ from pendpipe.diagnosis.hypothesis import (
     price,
 )
 from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.quoted import Description, averages, descriptions_of
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
 from pendpipe.diagnosis.result import (
@@ -47,12 +48,7 @@ from pendpipe.diagnosis.search import LESS_FRICTION, run_search
 from pendpipe.diagnosis.stacked import StackedData, StackedNoise
 from pendpipe.diagnosis.summary import COLOURED_NOISE, DOUBTFUL, LEVEL, statement
 from pendpipe.diagnosis.values import constants_of
-from pendpipe.diagnosis.weighing import (
-    Weighed,
-    effect_named,
-    law_of,
-    with_other_descriptions,
-)
+from pendpipe.diagnosis.weighing import Weighed, effect_named
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects import Effect
@@ -144,9 +140,11 @@ def diagnose_several(
     except NoMotionError as error:
         remedy = "diagnose them one by one"
         raise NotAnalysableError("diagnose", f"no model follows all ({error})", remedy) from error
-    law = with_other_descriptions(law_of(found, weighed), found, weighed)
-    after = _Together(found, found.fit, law, outcomes, names, own)
-    before = replace(after, improved=found.baseline, law=found.baseline)
+    after = _Together(
+        found, found.fit, descriptions_of(found, weighed), outcomes, names, own, level
+    )
+    bare = with_errors(found.baseline, found.data, found.noise)
+    before = replace(after, improved=found.baseline, described=[Description(1.0, bare)])
     named, differing = after.effects(weighed)
     events = after.events()
     p_value = min([found.p_value, *(outcome.p_value for outcome in outcomes)])
@@ -388,10 +386,16 @@ class _Together:
 
     found: Hypothesis
     improved: Fit
-    law: Fit
+    described: Sequence[Description]
     outcomes: Sequence[Diagnosis]
     names: Sequence[str]
     own: Sequence[str]
+    level: float
+
+    def averaged(self, of: Callable[[Fit], Mapping[str, Estimate]]) -> dict[str, Estimate]:
+        """Average numbers over the descriptions that share the probability."""
+        bare = with_errors(self.found.baseline, self.found.data, self.found.noise)
+        return averages(self.found, self.described, of, of(bare), self.level).constants
 
     @property
     def differing(self) -> set[str]:
@@ -408,7 +412,7 @@ class _Together:
         within = sum(each.used * (each.fold - 1) for each in alone)
         shared = {
             name: value
-            for name, value in constants_of(self.law, data.unit).items()
+            for name, value in self.averaged(lambda fit: constants_of(fit, data.unit)).items()
             if name in MAY_DIFFER and name not in {*self.own, *self.differing}
         }
         return FittedModel(
@@ -426,12 +430,15 @@ class _Together:
 
     def of_recording(self, name: str, number: int) -> Estimate:
         """Return one recording's value of a parameter."""
-        fit = self.improved if name in self.differing else self.law
-        row = fit.at.parts[number].mixing[MAY_DIFFER[name]]
         scale = 0.5 / math.pi if name == "frequency" else 1.0
-        sd = math.sqrt(max(float(row @ fit.covariance() @ row), 0.0))
-        value, unit = float(row @ fit.value), units(self.found.data.unit)[name]
-        return Estimate(scale * value, scale * sd, unit)
+        unit = units(self.found.data.unit)[name]
+
+        def of(fit: Fit) -> dict[str, Estimate]:
+            row = fit.at.parts[number].mixing[MAY_DIFFER[name]]
+            sd = math.sqrt(max(float(row @ fit.covariance() @ row), 0.0))
+            return {name: Estimate(scale * float(row @ fit.value), scale * sd, unit)}
+
+        return of(self.improved)[name] if name in self.differing else self.averaged(of)[name]
 
     def effects(self, weighed: Sequence[Weighed]) -> tuple[list[FoundEffect], list[FoundEffect]]:
         """Return what all recordings lack, and what they contradict each other in."""
@@ -454,7 +461,7 @@ class _Together:
         return [
             replace(each, location=replace(each.location, summary=f"in {name} alone"))
             for name, outcome, part in zip(
-                self.names, self.outcomes, self.law.at.parts, strict=True
+                self.names, self.outcomes, self.improved.at.parts, strict=True
             )
             for each in outcome.missing
             if each.kind not in ("unnamed", "parameter")
@@ -480,7 +487,7 @@ class _Together:
 
     def recording(self, number: int) -> dict[str, Any]:
         """Return what is to be said of one recording."""
-        diagnosis, part = self.outcomes[number], self.law.at.parts[number]
+        diagnosis, part = self.outcomes[number], self.improved.at.parts[number]
         white = self.improved.residual[:-1][self._of(number)]
         return {
             "name": self.names[number],

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from pendpipe.analysis.fit.printed import short_size
-from pendpipe.analysis.fit.quality import period_of_frequency, seen_qualities
+from pendpipe.analysis.fit.quality import period_of_frequency
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier, declared
 from pendpipe.effects.curves import CURVES
 from pendpipe.estimate import Estimate
@@ -350,10 +350,7 @@ def name_of(identifier: str) -> str:
 
 
 def _changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
-    """Compare the numbers of both models, and Q with that of the better one.
-
-    Where that leaves more than noise, Q is what the turning points show.
-    """
+    """Compare the numbers of the baseline with the averages that are quoted."""
     before, after = diagnosis.baseline.parameters, diagnosis.improved.parameters
     found = []
     if "frequency" in before and "frequency" in after:
@@ -372,7 +369,7 @@ def _changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
     ]
     fit = diagnosis.fit
     if fit is not None and fit.light != "red":
-        better = _better_qualities(diagnosis)
+        better = diagnosis.improved.quality_factors
         found += [
             Change(
                 "Q",
@@ -385,14 +382,6 @@ def _changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
             if each.amplitude_rad in better
         ]
     return tuple(found)
-
-
-def _better_qualities(diagnosis: Diagnosis) -> Mapping[float, Estimate]:
-    """Return Q by amplitude: the better model's, or else the turning points'."""
-    seen = seen_qualities(diagnosis.fit) if diagnosis.fit else ()
-    return diagnosis.improved.quality_factors or {
-        each.amplitude_rad: each.quality_factor for each in seen
-    }
 
 
 def _matters(diagnosis: Diagnosis, changes: Sequence[Change], unit: str) -> str:
@@ -479,16 +468,17 @@ def _quote(diagnosis: Diagnosis, changes: Sequence[Change]) -> str:
     period = next((each for each in changes if each.quantity == "period"), None)
     if period is not None:
         better = period.with_missing
-        said.append(f"T0 {with_error(better.value, better.sd, 's', short=True)}")
+        span = diagnosis.improved.period_span_s
+        drifts = f" in the mean, drifting by {compact(span[1] - span[0], 's')}" if span else ""
+        said.append(f"T0 {with_error(better.value, better.sd, 's', short=True)}{drifts}")
     good = [
         f"{with_error(q.value, q.sd, short=True)} at {short_size(amplitude, unit)}"
-        for amplitude, q in _better_qualities(diagnosis).items()
+        for amplitude, q in diagnosis.improved.quality_factors.items()
         if q.sd < 0.1 * q.value
     ]
     if good:
         ends = good if len(good) < 3 else [good[0], good[-1]]
-        lawless = "" if diagnosis.improved.quality_factors else " (independent of any law)"
-        said.append(f"Q {', '.join(ends)}{lawless}")
+        said.append(f"Q {', '.join(ends)}")
     moved = [each.quantity for each in changes if each.quantity in "abc" and each.moved_sd > _MOVED]
     if moved:
         said.append(f"not {', '.join(moved)}")

@@ -3,21 +3,22 @@
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.least_squares import CHI2_95, Bounds, intervals95
+from pendpipe.analysis.fit.least_squares import Bounds, intervals95
 from pendpipe.analysis.fit.result import PARAMETERS, units
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.dynamics.any_law import Motion, NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OFFSET, OMEGA, TIME, A, B, C
 from pendpipe.effects.curves import Curve, damping_curve
 from pendpipe.effects.model import Evaluated
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Estimate, over
 
 _FIRST_CYCLES: Final = 4.0
 _FEWEST_READINGS: Final = 16
@@ -52,15 +53,57 @@ def parameters_of(fit: Fit, data: Data) -> dict[str, Estimate]:
 def constants_of(fit: Fit, unit: str) -> dict[str, Estimate]:
     """Return a, b, c, offset and frequency."""
     intervals, dress, sds = _intervals(fit), units(unit), _sds(fit)
-    lowest, hertz = fit.model.bounds()[0], 0.5 / math.pi
+    lowest = fit.model.bounds()[0]
     found = {}
     for name, index in _CONSTANTS.items():
         value, sd = float(fit.value[index]), float(sds[index])
         at_bound = index in fit.free and value <= lowest[index]
         found[name] = Estimate(value, sd, dress[name], intervals.get(index), bool(at_bound))
-    frequency, sd = float(fit.value[OMEGA]) * hertz, float(sds[OMEGA]) * hertz
-    found["frequency"] = Estimate(frequency, sd, dress["frequency"])
+    others = tuple(index for index in range(fit.model.first) if index != OMEGA)
+    mean, error = _with_errors(
+        fit, lambda value: small_periods(fit, value).mean(keepdims=True), constant=others
+    )
+    period = Estimate(float(mean[0]), float(error[0]), "s")
+    found["frequency"] = over(1.0, period, dress["frequency"])
     return found
+
+
+_SMALL: Final = 1e-5
+"""Of the smallest amplitude: torques of higher order that change a swing are nothing there."""
+
+
+def small_periods(fit: Fit, value: FloatArray) -> FloatArray:
+    """Return the period of small swings, s, from each turning point of a recording (the loudest).
+
+    An effect's acceleration f along a swing r cos(psi) so small that torques are linear makes
+    omega sqrt(1 + k) of omega, k = -(2/pi) integral of f cos(psi)/(omega^2 r) over half a cycle.
+    What does not change its sign with the swing, a drive, has no part in it. By a clock whose
+    rate drifts it is as that clock shows it.
+    """
+    model, at = fit.model, fit.at
+    if at.parts:
+        part = max(at.parts, key=lambda each: each.at.span.first_amplitude)
+        model, at, value = part.model, part.at, part.mixing @ value
+    motion, omega, pendulum = at.tangent.motion, float(value[OMEGA]), model.pendulum(value)
+    begun = motion.time_s[:, 0]
+    seen = (at.span.start_s <= begun) & (begun <= at.span.stop_s)
+    stiffer, late = np.zeros(len(begun)), np.zeros(np.count_nonzero(seen) + 1)
+    for effect, place in model.places():
+        if effect.form:
+            continue
+        size = at.span.last_amplitude * (1.0 if effect.contact else _SMALL)
+        delay = effect.delay(np.append(at.span.start_s, begun[seen]), value[place])
+        late += 0.0 if delay is None or effect.local else delay
+        for upwards in (1.0, -1.0):
+            log_amplitude = np.full_like(motion.time_s, math.log(size))
+            small = Motion(motion.clock, omega, log_amplitude, motion.time_s, upwards)
+            force = effect.acceleration(small, pendulum, value[place])
+            if force is not None:
+                done = motion.clock.integral(force * motion.clock.cosine)
+                stiffer -= upwards / math.pi * (done[:, -1] - done[:, 0]) / (omega**2 * size)
+    with np.errstate(invalid="ignore"):
+        true = 2.0 * math.pi / (omega * np.sqrt(1.0 + stiffer[seen]))
+    return np.asarray(true / (1.0 + np.gradient(late[1:], begun[seen])))
 
 
 def _sds(fit: Fit) -> FloatArray:
@@ -100,25 +143,70 @@ def _with_errors(
 
 
 def quality_factors_of(fit: Fit, amplitudes: Sequence[float]) -> dict[float, Estimate]:
-    """Return Q of a model's motion by amplitude: pi over what ln y loses in a period about it.
+    """Return Q of a model's motion by amplitude: pi over the relative loss in a period about it.
 
-    Left out are amplitudes that it has not, and those at which it gains.
+    The amplitude is half the way from one side to the other, wherever the equilibrium is; the
+    period is that without losses. Left out are cycles with a kick in them, and amplitudes that it
+    has not or at which it gains.
     """
-    wanted = np.array(amplitudes)
+    wanted, motion = np.log(amplitudes), fit.at.tangent.motion
+    model, slowed = replace(fit.model, _last={"motion": motion}), _slowed(fit)
 
     def quality(value: FloatArray) -> FloatArray:
-        turning = fit.model.evaluate(fit.model.settled(value)).tangent.motion.log_amplitude[:, 0]
-        lost, within = turning[:-2] - turning[2:], np.log(wanted)
-        inside = (turning[-1] <= within) & (within <= turning[0])
-        lost = np.interp(-within, -turning[1:-1], lost)
-        return np.where(inside, math.pi / lost, math.nan)
+        pieces = model.follow(model.settled(value))
+        motion = pieces[-1][1]
+        turned_s, turning = motion.time_s[:, 0], motion.amplitude[:, 0]
+        # What alternates from turning point to turning point is no amplitude.
+        shift = 0.5 * (np.sqrt(turning[:-2] * turning[2:]) - turning[1:-1])
+        shift = 0.5 * shift[1:-1] - 0.25 * (shift[:-2] + shift[2:])
+        log_amplitude = np.log(turning + np.pad(shift, 2))
+        free = np.full(len(turning) - 2, True)
+        for kicked_s, _ in pieces[1:]:
+            # It begins half a cycle early, where the motion is smooth; and a shift has neighbours.
+            near = 2.0 * fit.at.span.period_s
+            free &= (turned_s[2:] < kicked_s - near) | (turned_s[:-2] > kicked_s + near)
+        by_loss = (log_amplitude[:-2] - log_amplitude[2:]) / slowed[: len(free)]
+        found = math.pi / _between(-log_amplitude[1:-1][free], by_loss[free], -wanted)
+        inside = (log_amplitude[-1] <= wanted) & (wanted <= log_amplitude[0])
+        return np.where(inside, found, math.nan)
 
-    found, sds = _with_errors(fit, quality)
+    try:
+        found, sds = _with_errors(fit, quality, constant=(OMEGA, TIME, OFFSET))
+    except NoMotionError:
+        # From another start it stops before the last reading.
+        return {}
     return {
         amplitude: Estimate(float(q), float(sd), "")
         for amplitude, q, sd in zip(amplitudes, found, sds, strict=True)
         if q > 0.0 and math.isfinite(sd)
     }
+
+
+def _slowed(fit: Fit) -> FloatArray:
+    """Return by what factor losses lengthen the cycle about each turning point but the ends.
+
+    What has the same sign on the way back, at the same angle, is no loss.
+    """
+    motion, pull = fit.at.tangent.motion, fit.at.tangent.rates.pull
+    kept = 0.5 * (pull[:-1] + pull[1:, ::-1])
+    pace = np.zeros_like(pull)
+    pace[:-1] = 1.0 / (motion.angular_frequency * (1.0 - kept * motion.clock.cosine[:-1]))
+    done = motion.clock.integral(pace)
+    half = (done[:, -1] - done[:, 0])[:-2]
+    return np.asarray((motion.time_s[2:, 0] - motion.time_s[:-2, 0]) / (2.0 * half))
+
+
+def _between(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:
+    """Return cubics through the four neighbours of each place; NaN of fewer."""
+    if len(x) < 4:
+        return np.full(len(at), math.nan)
+    rows = np.clip(np.searchsorted(x, at), 2, len(x) - 2)[:, None] + np.arange(-2, 2)
+    nodes, total = x[rows], np.zeros(len(at))
+    for k in range(4):
+        others = np.delete(nodes, k, axis=1)
+        own = nodes[:, k, None]
+        total += y[rows[:, k]] * np.prod((at[:, None] - others) / (own - others), axis=1)
+    return total
 
 
 def _errors(columns: FloatArray, covariance: FloatArray) -> FloatArray:
@@ -146,14 +234,7 @@ def _intervals(fit: Fit) -> dict[int, tuple[float, float]]:
         )
     wanted = [index for index in (A, B, C) if index in fit.free]
     found = intervals95(fit.value, normal, gradient, Bounds(low, high), wanted, held)
-    variance = fit.variance if len(fit.variance) else np.zeros(len(fit.value))
-    wider = {}
-    for index, ends in zip(wanted, found, strict=True):
-        value, more = fit.value[index], math.sqrt(CHI2_95 * variance[index])
-        least = float(value - math.hypot(value - ends[0], more))
-        most = float(value + math.hypot(ends[1] - value, more))
-        wider[index] = max(least, float(low[index])), min(most, float(high[index]))
-    return wider
+    return dict(zip(wanted, found, strict=True))
 
 
 def effect_parameters(fit: Fit, effect: Effect, unit: str = "rad") -> dict[str, Estimate]:

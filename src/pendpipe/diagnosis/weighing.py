@@ -103,36 +103,6 @@ def beside(found: Hypothesis, effect: Effect) -> Hypothesis:
     return replace(found, fit=found.named)
 
 
-def law_of(found: Hypothesis, weighed: Sequence[Weighed]) -> Fit:
-    """Return the fit with the names that are more probable, with their rivals, than not.
-
-    A curve without a name, or a doubtful name, would take from the values of a, b and c.
-    """
-    doubtful = [
-        step
-        for step, each in zip(found.steps, weighed, strict=True)
-        if step.winner.drawn or float(np.sum(each.weights[:-1])) < 0.5
-    ]
-    if not doubtful:
-        return found.fit
-    fit = found.without(*doubtful) or found.fit
-    return with_errors(fit, found.data, found.noise)
-
-
-def with_other_descriptions(law: Fit, found: Hypothesis, weighed: Sequence[Weighed]) -> Fit:
-    """Count in the variance of a law's first values what they would be with other effects.
-
-    With what was left out of the law, and with each rival, as much as it is probable.
-    """
-    size = found.baseline.model.size
-    own = found.fit.value[:size]
-    variance = (law.value[:size] - own) ** 2
-    for each in weighed:
-        for mate, weight in zip(each.mates, each.weights[1:], strict=False):
-            variance = variance + weight * (mate.fit.value[:size] - own) ** 2
-    return replace(law, variance=variance)
-
-
 def effect_named(found: Hypothesis, step: Step, weighed: Weighed) -> FoundEffect:
     """Return one effect with its final values, probability and location."""
     effect = step.winner.lead.effect

@@ -371,6 +371,7 @@ def _resists_the_more(curve: Curve, values: FloatArray) -> bool:
     usual_friction,
     identifier="unnamed-damping",
     name="a friction that remembers the last turning point",
+    contact=True,
     equation=r"\ddot x \to \ddot x + g(|x - x_\mathrm{turn}|)\,\mathrm{sgn}\,\dot x",
     argument="way since the turning point, rad",
     ordinate="extra friction, rad/s^2",

@@ -202,6 +202,9 @@ class Effect:
     angular: ClassVar[bool] = False
     """Whether it is about angles, and means nothing for an oscillator in metres."""
 
+    contact: ClassVar[bool] = False
+    """Whether it holds or frees swings that are small enough, so that the period of small swings is
+    that of the smallest that were seen."""
     nodes: ClassVar[int] = 0
     """Nodes of half a cycle that its torque needs: more than usual where it has corners."""
     in_time: ClassVar[bool] = False

@@ -185,6 +185,7 @@ def stribeck_friction(motion: Motion, pendulum: Pendulum, size: float, v_s: floa
     "acceleration",
     identifier="presliding-friction",
     name="presliding friction (Dahl)",
+    contact=True,
     equation=r"\ddot x \mathrel{+}= -\omega^2 k_d z, \quad \dot z = \dot x - |\dot x|\, z/z_c",
     parameters=(
         Parameter("k_d", "1", 0.0, 10.0, word="relative stiffness"),
@@ -233,6 +234,7 @@ _RESOLVED: Final = 0.65
     "acceleration",
     identifier="backlash",
     name="play in the pivot",
+    contact=True,
     nodes=48,
     equation=(
         r"\omega^2 x \to \omega^2 \left(x -"

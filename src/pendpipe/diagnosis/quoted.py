@@ -1,0 +1,255 @@
+"""What a diagnosis quotes: averages over the descriptions that share the probability.
+
+A description is a set of effects: of each that was found its name, a mate of its class, or "none
+of these", with the product of their probabilities. Each is fitted as it is named; with none at all
+it is the fit, with its widened errors. Where some leave only noise, the others do not describe the
+recording. The frequency, a, b, c and Q are averaged (`pendpipe.estimate.averaged`). What leaves
+more than noise, or is a curve without a name, shrinks no error of the fit.
+"""
+
+import itertools
+import math
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.analysis.fit.result import FitResult
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.hypothesis import Hypothesis
+from pendpipe.diagnosis.refine import Fit, best_fit
+from pendpipe.diagnosis.released_parameters import ReleasedParameter
+from pendpipe.diagnosis.remainder import with_errors
+from pendpipe.diagnosis.rivals import Rival
+from pendpipe.diagnosis.values import constants_of, quality_factors_of, small_periods
+from pendpipe.diagnosis.weighing import Weighed
+from pendpipe.estimate import Estimate, averaged, over
+
+_STARTS: Final = 2
+"""Fits of other descriptions from which one begins: those that have most in common with it."""
+LISTED: Final = 0.05
+"""Probability from which a description counts; as from which a rival is listed."""
+Numbers = Mapping[Any, Estimate]
+"""Quantities by name, and Q by amplitude."""
+
+
+class Description(NamedTuple):
+    """One set of effects.
+
+    Parameters
+    ----------
+    probability
+        That it is the right one.
+    fit
+        Of the model with these effects, with errors for what it leaves.
+    """
+
+    probability: float
+    fit: Fit
+
+
+class _Choice(NamedTuple):
+    """What one step may be."""
+
+    probability: float
+    rival: Rival | None
+
+
+_Chosen = tuple[_Choice, ...]
+
+
+def descriptions_of(found: Hypothesis, weighed: Sequence[Weighed]) -> list[Description]:
+    """Fit each description of a probability of 5 % and more, the most probable first.
+
+    Where some leave only noise, these alone. Of a recording that lacks nothing it is the fit.
+    """
+    choices = [_choices(step.winner, each) for step, each in zip(found.steps, weighed, strict=True)]
+    sets = [
+        (math.prod(choice.probability for choice in chosen), chosen)
+        for chosen in itertools.product(*choices)
+        if not _twice(chosen)
+    ]
+    sets.sort(key=lambda each: -each[0])
+    known = _known(found, weighed)
+    described = []
+    for number, (probability, chosen) in enumerate(sets):
+        if number and probability < LISTED:
+            break
+        key = _key(chosen)
+        near = sorted(known, key=lambda other: sum(map(operator.ne, key, other)))[:_STARTS]
+        fit = known.get(key) or _fitted(found, chosen, [known[other] for other in near])
+        if fit is not None:
+            described.append(Description(probability, with_errors(fit, found.data, found.noise)))
+    return [each for each in described if each.fit.scatter is None] or described
+
+
+def _choices(winner: Rival, weighed: Weighed) -> list[_Choice]:
+    """Return the effect that was added, the mates of its class, and none of these."""
+    rivals = (winner, *weighed.mates)
+    named = [
+        _Choice(float(weight), rival)
+        for weight, rival in zip(weighed.weights[:-1], rivals, strict=True)
+    ]
+    return [*named, _Choice(max(1.0 - sum(each.probability for each in named), 0.0), None)]
+
+
+def _twice(chosen: _Chosen) -> bool:
+    """Whether a curve is drawn twice: the mate of one step is what another has added."""
+    drawn = [each.rival.lead.effect.key for each in chosen if each.rival and each.rival.drawn]
+    return len(set(drawn)) < len(drawn)
+
+
+def _key(chosen: _Chosen) -> tuple[str, ...]:
+    """Which effects, by step; what happens twice is told apart by its step."""
+    return tuple(each.rival.lead.effect.key if each.rival else "" for each in chosen)
+
+
+def _known(found: Hypothesis, weighed: Sequence[Weighed]) -> dict[tuple[str, ...], Fit]:
+    """Return what was fitted already: each step's mates, and the model without it.
+
+    Names were weighed without the curve at the end.
+    """
+    own = tuple(step.winner.lead.effect.key for step in found.steps)
+    known = {("",) * len(own): found.baseline, own: found.fit}
+    names = own
+    if found.without_curve:
+        names = (*own[:-1], "")
+        known[names] = found.without_curve
+    for number, (step, each) in enumerate(zip(found.steps, weighed, strict=True)):
+        beside = own if step.winner.drawn else names
+        for key, fit in [("", each.without), *((m.lead.effect.key, m.fit) for m in each.mates)]:
+            known.setdefault((*beside[:number], key, *beside[number + 1 :]), fit)
+    return known
+
+
+def _fitted(found: Hypothesis, chosen: _Chosen, fits: Sequence[Fit]) -> Fit | None:
+    """Fit a set of effects, each from its last values, beside the baseline of other fits."""
+    model, held = found.fit.model.bare(), found.beginning.held
+    here = {id(effect): found.fit.value[place] for effect, place in found.fit.model.places()}
+    values = list[FloatArray]()
+    for rival in (each.rival for each in chosen if each.rival):
+        effect = rival.lead.effect
+        model = model.adding(effect)
+        if isinstance(effect, ReleasedParameter):
+            held = effect.without(held)
+        last = rival.fit.value[len(rival.fit.value) - effect.count :]
+        values.append(here.get(id(effect), last))
+    starts = [np.concatenate([fit.value[: model.first], *values]) for fit in fits]
+    return best_fit(model, found.data, found.noise, starts, held=held)
+
+
+@dataclass(frozen=True)
+class Quoted:
+    """What is quoted of a recording.
+
+    Parameters
+    ----------
+    numbers
+        a, b, c, the offset, the frequency of small swings in Hz, and Q by amplitude.
+    leading
+        The fit of the most probable description.
+    """
+
+    numbers: Numbers
+    leading: Fit
+
+    @property
+    def period_span_s(self) -> tuple[float, float] | None:
+        """The least and the largest period of small swings, where it drifts beyond its error."""
+        periods = small_periods(self.leading, self.leading.value)
+        frequency = self.numbers["frequency"]
+        error = frequency.sd / frequency.value**2
+        return (periods.min(), periods.max()) if np.ptp(periods) > 2.0 * error else None
+
+    @property
+    def constants(self) -> dict[str, Estimate]:
+        """The numbers that have a name."""
+        return {name: each for name, each in self.numbers.items() if isinstance(name, str)}
+
+    @property
+    def quality_factors(self) -> dict[float, Estimate]:
+        """Q by amplitude."""
+        return {y: each for y, each in self.numbers.items() if not isinstance(y, str)}
+
+
+def quoted(
+    found: Hypothesis, weighed: Sequence[Weighed], fit: FitResult | None, level: float
+) -> Quoted:
+    """Average the numbers of one recording.
+
+    Parameters
+    ----------
+    found, weighed
+        The end of a search.
+    fit
+        What ``pendpipe fit`` prints: it stands for "none of these", and its errors are the least
+        of what leaves more than noise. None where it is not that of the baseline.
+    level
+        The p-value from which chance explains what is left.
+    """
+    unit = found.data.unit
+    amplitudes = [each.amplitude_rad for each in fit.quality_factors] if fit else []
+
+    def of(fit: Fit) -> Numbers:
+        return {**constants_of(fit, unit), **quality_factors_of(fit, amplitudes)}
+
+    bare = constants_of(with_errors(found.baseline, found.data, found.noise), unit)
+    return averages(found, descriptions_of(found, weighed), of, {**bare, **printed_by(fit)}, level)
+
+
+def averages(
+    found: Hypothesis,
+    described: Sequence[Description],
+    of: Callable[[Fit], Numbers],
+    none: Numbers,
+    level: float,
+) -> Quoted:
+    """Average numbers over descriptions; those of the baseline are `none`."""
+    numbers = []
+    for each in described:
+        own = none if each.fit.value is found.baseline.value else of(each.fit)
+        drawn = any(effect.kind == "unnamed" for effect in each.fit.model.effects)
+        if drawn or each.fit.scatter is not None or found.unexplained < level:
+            own = {name: _no_surer(value, none.get(name)) for name, value in own.items()}
+        numbers.append(own)
+    return Quoted(
+        {
+            name: averaged(
+                [own[name] for own in numbers if name in own],
+                [
+                    each.probability
+                    for own, each in zip(numbers, described, strict=True)
+                    if name in own
+                ],
+            )
+            for name in dict.fromkeys(name for own in numbers for name in own)
+        },
+        described[0].fit,
+    )
+
+
+def printed_by(fit: FitResult | None) -> Numbers:
+    """Return the numbers of a fit; a, b, c of one to all readings, which the decay allows."""
+    if fit is None:
+        return {}
+    numbers: dict[Any, Estimate] = {
+        each.amplitude_rad: each.quality_factor for each in fit.quality_factors
+    }
+    if fit.method == "waveform" and fit.light != "red":
+        numbers |= {name: fit.parameters[name] for name in "abc"}
+    return {**numbers, "frequency": over(1.0, fit.period, "Hz")}
+
+
+def _no_surer(value: Estimate, fitted: Estimate | None) -> Estimate:
+    """Return a number with the fit's error, if that is larger; else the fit's number."""
+    if fitted is None or not math.isfinite(fitted.sd):
+        return value
+    if not value.sd < fitted.sd:
+        return fitted
+    low, high = fitted.bounds95
+    ends = value.value - (fitted.value - low), value.value + (high - fitted.value)
+    if value.interval95 is not None:
+        ends = max(ends[0], min(0.0, value.interval95[0])), ends[1]
+    return replace(value, sd=fitted.sd, interval95=ends)

@@ -1,0 +1,242 @@
+"""What a diagnosis quotes is what the descriptions that share the probability say of it."""
+
+import functools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pendpipe as pp
+from pendpipe.diagnosis.quoted import LISTED, descriptions_of, printed_by, quoted
+from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.result import Diagnosis
+from pendpipe.diagnosis.run import diagnose_recording
+from pendpipe.diagnosis.values import constants_of, quality_factors_of, small_periods
+from pendpipe.diagnosis.weighing import Weighed, weigh
+from pendpipe.effects import Effect
+from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.curves import restoring_curve
+from pendpipe.effects.model import Model
+
+from .records import (
+    FREQUENCY_HZ,
+    INTERVAL_S,
+    TIME_S,
+    TRUTH,
+    diagnosed,
+    null_fit,
+    prepared,
+    pulled,
+    recording,
+)
+
+T0_S = 1.0 / FREQUENCY_HZ
+INPUTS = Path("../shared/inputs4")
+END_S = float(TIME_S[-1])
+
+
+def weighed_of(outcome: Diagnosis) -> list[Weighed]:
+    return [weigh(outcome.search, step) for step in outcome.search.steps]
+
+
+# The period of small swings is that of the description.
+
+
+def with_effect(effect: Effect, values: tuple[float, ...]) -> Fit:
+    """The truth with an effect, as if it had been fitted."""
+    model = Model(TIME_S, INTERVAL_S, (effect,))
+    value = np.append(TRUTH, values)
+    data, noise = prepared(model.reading(value))
+    return refine(model, data, noise, value, rounds=0)
+
+
+def relaxing(rate: float, tau_s: float) -> float:
+    """The mean over the recording of rate tau (1 - e^(-t/tau))."""
+    return rate * tau_s * (1.0 + tau_s / END_S * math.expm1(-END_S / tau_s))
+
+
+@pytest.mark.parametrize(
+    ("identifier", "values", "change"),
+    [
+        ("cubic-stiffness", (0.5,), 0.0),
+        ("amplitude-linear-stiffness", (-0.3,), 0.0),
+        ("sensor-cubic", (0.2,), 0.0),
+        ("stribeck-friction", (1e-3, 0.1), 0.0),
+        ("damping-drift", (1e-5, 40.0), 0.0),
+        ("equilibrium-creep", (1e-3, 10.0, 0.5), 0.0),
+        ("periodic-drive", (5e-4, 3e-4, 1.2), 0.0),
+        ("dropped-samples", (1e-2, 50.0), 0.0),
+        ("frequency-drift", (6e-6, 40.0), -relaxing(6e-6, 40.0)),
+        ("clock-drift", (6e-6, 40.0), -relaxing(6e-6, 40.0)),
+        ("frequency-step", (1e-3, 0.25 * END_S), -0.75e-3),
+    ],
+)
+def test_the_period_of_small_swings_is_what_an_effect_leaves_it_in_the_mean(
+    identifier: str, values: tuple[float, ...], change: float
+) -> None:
+    """A torque of higher order leaves it; a drift moves its mean, by the clock that drifts."""
+    fit = with_effect(by_identifier(identifier), values)
+    found = 1.0 / constants_of(fit, "rad")["frequency"].value
+    assert found / T0_S - 1.0 == pytest.approx(change, abs=2e-6 + 0.02 * abs(change))
+
+
+def test_a_curve_of_the_torque_moves_the_period_by_its_slope_at_rest() -> None:
+    """A tenth of the swing more torque at the second knot: k = 0.1/0.04 over its unit."""
+    null, _, _ = null_fit()
+    curve = restoring_curve(null.at.span)
+    heights = np.where(curve.knots == 0.0, 0.0, 1e-3 * np.sign(curve.knots))
+    fit = with_effect(curve, tuple(heights))
+    inner = np.min(curve.knots[curve.knots > 0.0])
+    stiffer = curve.scale(null.at.span.pendulum) * 1e-3 / inner
+    assert small_periods(fit, fit.value).mean() == pytest.approx(
+        T0_S / math.sqrt(1.0 + stiffer), rel=1e-6
+    )
+
+
+def test_of_a_contact_the_smallest_swings_that_were_seen_are_the_small_ones() -> None:
+    """Within its play a pendulum has no period at all."""
+    fit = with_effect(by_identifier("backlash"), (1e-3,))
+    turned_s = fit.at.tangent.motion.time_s[:, 0]
+    last = np.flatnonzero(turned_s < END_S)[-1]
+    found = small_periods(fit, fit.value).mean()
+    assert found == pytest.approx(turned_s[last] - turned_s[last - 2], rel=3e-4)
+    assert found > 1.003 * T0_S
+
+
+def test_a_period_that_jumps_is_quoted_in_the_mean_with_its_span() -> None:
+    jump = by_identifier("frequency-step")
+    readings = Model(TIME_S, INTERVAL_S, (jump,)).reading(np.append(TRUTH, [2e-4, 0.4 * END_S]))
+    outcome = diagnose_recording(recording(readings, 3), restoring="linear")
+    quotes, span = outcome.improved.parameters["frequency"], outcome.improved.period_span_s
+    assert abs(quotes.value - FREQUENCY_HZ * (1.0 + 0.6 * 2e-4)) < 3.0 * quotes.sd
+    assert quotes.sd < 0.2 * 2e-4 * FREQUENCY_HZ
+    assert span == pytest.approx((T0_S / 1.0002, T0_S), abs=0.2e-4)
+    assert outcome.to_dict()["improved"]["period_span_s"] == span
+    assert "s in the mean, drifting by 2" in outcome.summary.quote
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "period_s"), [("n01_softening", 0.8), ("n01_hull", 0.8)])
+def test_a_ship_that_softens_is_quoted_with_its_small_swings(name: str, period_s: float) -> None:
+    """Its first swings take 4 % longer; the fit is off by three times what is quoted."""
+    path = INPUTS / f"{name}.csv"
+    if not path.exists():
+        pytest.skip(f"{path} is not here")
+    outcome = pp.diagnose(str(path), restoring="linear")
+    found = 1.0 / outcome.improved.parameters["frequency"].value
+    alone = 1.0 / outcome.baseline.parameters["frequency"].value
+    error = outcome.improved.parameters["frequency"].sd * found**2
+    assert abs(found - period_s) < 2.0 * error
+    assert abs(found - period_s) < 0.3 * abs(alone - period_s)
+    assert error < 0.01 * period_s
+
+
+@pytest.mark.parametrize(
+    ("identifier", "values"),
+    [
+        ("equilibrium-step", (4e-3, 41.3)),
+        ("impulse", (2e-3, 41.3)),
+        ("amplitude-step", (0.01, 41.3)),
+        ("equilibrium-creep", (3e-3, 10.0, 0.5)),
+        ("quadratic-stiffness", (0.05,)),
+    ],
+)
+def test_q_of_a_description_is_that_of_its_losses(
+    identifier: str, values: tuple[float, ...]
+) -> None:
+    """What shifts, knocks or bends a swing takes no energy from it."""
+    fit = with_effect(by_identifier(identifier), values)
+    a, b, c = TRUTH[:3]
+    for amplitude, found in quality_factors_of(fit, [0.12, 0.1, 0.08]).items():
+        by_losses = math.pi * FREQUENCY_HZ / (a * amplitude + b + c / amplitude)
+        assert found.value == pytest.approx(by_losses, rel=6e-4)
+
+
+# Each description is fitted as it is named.
+
+
+@functools.cache
+def softening() -> Diagnosis:
+    """A torque that softens by x|x|: others take its place, and differ in the small swings."""
+    effect = by_identifier("amplitude-linear-stiffness")
+    readings = Model(TIME_S, INTERVAL_S, (effect,)).reading(np.append(TRUTH, [-0.02]))
+    return diagnose_recording(recording(readings, 2), restoring="linear")
+
+
+def test_each_description_has_the_effects_of_its_name_and_its_probability() -> None:
+    outcome = diagnosed("frequency-drift")
+    found, weighed = outcome.search, weighed_of(outcome)
+    described = descriptions_of(found, weighed)
+    (step,), (each,) = found.steps, weighed
+    rivals = [step.winner.lead.effect, *(mate.lead.effect for mate in each.mates)]
+    wanted = {
+        effect.key: weight
+        for effect, weight in zip(rivals, each.weights[:-1].tolist(), strict=True)
+        if weight >= LISTED
+    }
+    given = {one.fit.model.effects[0].key: one.probability for one in described}
+    assert len(given) > 3
+    assert given == pytest.approx(wanted)
+    for one in described:
+        again = refine(one.fit.model, found.data, found.noise, one.fit.value, held=found.held)
+        assert one.fit.chi2 < again.chi2 + 1.0
+
+
+def test_what_chance_excludes_is_no_description_beside_one_that_leaves_noise() -> None:
+    """The fit has 8 % for "none of these", and lies thirty errors of the descriptions away."""
+    outcome = softening()
+    found, weighed = outcome.search, weighed_of(outcome)
+    assert weighed[0].weights[-1] > LISTED
+    assert all(each.fit.model.effects for each in descriptions_of(found, weighed))
+    alone, given = (
+        outcome.baseline.parameters["frequency"],
+        outcome.improved.parameters["frequency"],
+    )
+    assert abs(given.value - FREQUENCY_HZ) < 2.0 * given.sd
+    assert abs(alone.value - FREQUENCY_HZ) > 5.0 * given.sd
+
+
+def test_a_number_is_the_mean_of_the_descriptions_and_its_variance_holds_their_spread() -> None:
+    outcome = diagnosed("frequency-drift")
+    numbers = [
+        (each.probability, constants_of(each.fit, "rad"))
+        for each in descriptions_of(outcome.search, weighed_of(outcome))
+    ]
+    p = np.array([probability for probability, _ in numbers])
+    for name in ("frequency", "a", "b", "c"):
+        values, sds = (
+            np.array([getattr(own[name], what) for _, own in numbers]) for what in ("value", "sd")
+        )
+        mean, given = p @ values / p.sum(), outcome.improved.parameters[name]
+        assert given.value == pytest.approx(mean, rel=1e-9)
+        assert given.sd**2 == pytest.approx(p @ (sds**2 + (values - mean) ** 2) / p.sum())
+
+
+def test_a_fault_of_the_measurement_alone_leaves_one_description_without_it() -> None:
+    """Beside lost samples the fit is as wrong as its times."""
+    outcome = diagnosed("dropped-samples")
+    (only,) = descriptions_of(outcome.search, weighed_of(outcome))
+    assert only.fit.value is outcome.search.fit.value
+    given, alone = (each.parameters["frequency"] for each in (outcome.improved, outcome.baseline))
+    assert abs(given.value - FREQUENCY_HZ) < 3.0 * given.sd
+    assert given.sd < 0.3 * alone.sd
+
+
+# What explains nothing shrinks no error.
+
+
+def test_what_leaves_more_than_noise_is_no_surer_than_the_fit() -> None:
+    """The same answer, once as if chance did not explain what is left."""
+    outcome = softening()
+    found, weighed, told = outcome.search, weighed_of(outcome), printed_by(outcome.fit)
+    clean, rest = (quoted(found, weighed, outcome.fit, level).numbers for level in (0.0, 1.0))
+    for name, least in told.items():
+        assert rest[name].sd > 0.999 * least.sd
+    # Nor is a curve, whatever it leaves.
+    pull = diagnose_recording(recording(pulled(0.5, 0.03), 3), restoring="linear")
+    assert [each.kind for each in pull.missing] == ["unnamed"]
+    for name, least in printed_by(pull.fit).items():
+        known = {**pull.improved.parameters, **pull.improved.quality_factors}
+        assert known[name].sd > 0.999 * least.sd
+    assert clean["frequency"].sd < 0.5 * told["frequency"].sd
