@@ -199,16 +199,22 @@ def run(command: str, words: list[str], limit_s: float) -> dict[str, Any]:
     return {"status": status, "content": content, "said": said, "cpu_s": cpu_s}
 
 
+def options(row: Mapping[str, str]) -> dict[str, str]:
+    """A row's options, as `pp.read` takes them."""
+    words = row["options"].split()
+    names = [each.removeprefix("--") for each in words[::2]]
+    return dict(zip(names, words[1::2], strict=True))
+
+
 def ask(row: Mapping[str, str], limit_s: float) -> dict[str, Any]:
     """Both commands on one recording, and the rms of its free part."""
     import pendpipe as pp
 
-    path, options = RECORDINGS / row["file"], row["options"].split()
-    words = [str(path), *options]
+    path = RECORDINGS / row["file"]
+    words = [str(path), *row["options"].split()]
     fit = run("fit", words, limit_s)
     diagnosis = run("diagnose", [*words, "--no-figures"], limit_s)
-    names = [each.removeprefix("--") for each in options[::2]]
-    recording = pp.read(path, **dict(zip(names, options[1::2], strict=True)))
+    recording = pp.read(path, **options(row))
     kept = slice(None)
     try:
         decay = pp.find_free_decay(recording)

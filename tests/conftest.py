@@ -65,6 +65,26 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 @pytest.fixture(scope="session")
+def panel_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the answers of a run lie: the folders of its processes stand in one."""
+    own = tmp_path_factory.getbasetemp()
+    return (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "panel"
+
+
+@pytest.fixture(scope="session")
+def panel(panel_folder: Path) -> Callable[[str], dict[str, Any]]:
+    """What is answered about a recording of `benchmarks.panel`, asked once a run."""
+    from benchmarks.panel import absent, once
+
+    def answer(name: str) -> dict[str, Any]:
+        if absent(name):
+            pytest.skip("no ../shared/recordings here")
+        return once(panel_folder, name)
+
+    return answer
+
+
+@pytest.fixture(scope="session")
 def make_example() -> Callable[..., Any]:
     """What makes the example campaign of tests/figures, under whatever folder the tests run."""
     name = "pendpipe_example_campaign"

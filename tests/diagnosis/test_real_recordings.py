@@ -21,7 +21,6 @@ from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.hypothesis import first_noise
 from pendpipe.diagnosis.location import beat_of
 from pendpipe.diagnosis.refine import Fit, fit_in_growing_window
-from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects.baseline import A, C
 from pendpipe.effects.catalogue import by_identifier
@@ -78,28 +77,6 @@ def test_a_pendulum_has_the_circular_error_of_its_geometry(name: str) -> None:
     assert values(free, "cubic-stiffness")[0] == pytest.approx(-1.0 / 6.0, rel=0.05)
     # The frequency follows sin x over all cycles to a few tenths of a radian of phase.
     assert sine.max_phase_error_rad < 0.2
-
-
-def test_a_ships_righting_moment_hardens() -> None:
-    fit = fitted(SHIP, cubic_stiffness=(0.0,))
-    # dT/T = -(3/8) k3 A^2, of which the coefficient is known to be about -0.27.
-    k3 = values(fit, "cubic-stiffness")[0]
-    assert k3 > 0.0
-    assert -0.375 * k3 == pytest.approx(-0.27, abs=0.08)
-
-
-@pytest.mark.slow
-def test_a_ship_hardens_rather_than_drifts() -> None:
-    """A clock that drifts by 0.7 % would fit as well, and has a lower prior."""
-    named = diagnose_recording(whole(SHIP)).missing
-    assert named[0].identifier == "cubic-stiffness"
-    k3 = named[0].parameters["k3"]
-    # The coefficient is known to 0.08, and has its own error beside the misfit that is left.
-    assert k3.value == pytest.approx(0.27 / 0.375, abs=0.08 / 0.375 + 2.0 * k3.sd)
-    less = dict(named[0].indistinguishable)
-    assert all(
-        less.get(name, 0.0) < named[0].probability for name in ("clock-drift", "frequency-drift")
-    )
 
 
 def test_a_mass_on_a_spring_beats_with_a_second_mode() -> None:
