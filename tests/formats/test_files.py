@@ -464,9 +464,10 @@ def hidden(path: str = "xl/worksheets/sheet1.xml", prefix: str = "", xml: str = 
         (lambda: hidden(xml="  <!DOCTYPE a [<!ENTITY b 'c'>]>"), "declares entities"),
         (lambda: zipped(**{f"a{number}__csv": PLAIN for number in range(201)}), "201 tables"),
         (lambda: zipped(**{f"a{number}": "" for number in range(10_001)}), "10001 files"),
+        (lambda: "1,2\n" * 5_000_001, "5000001 rows of 4 bytes"),
         (lambda: '{"t": [' + "[]," * 2_000_000 + "[]]}", "2000000 lists and records"),
     ],
-    ids=["prefix", "path", "encoding", "entities", "tables", "files", "lists"],
+    ids=["prefix", "path", "encoding", "entities", "tables", "files", "rows", "lists"],
 )
 def test_what_hides_in_a_file_is_counted(
     tmp_path: Path,

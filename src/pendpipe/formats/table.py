@@ -176,8 +176,10 @@ def periods(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArra
     before, after = outside[turns], outside[turns + 1]
     part = rest[before] / (rest[before] - rest[after])
     crossings = time[before] + part * (time[after] - time[before])
-    edges = zip(before[:-2], before[2:], strict=True)
-    largest = np.array([np.ptp(rest[a : b + 1]) for a, b in edges])
+    high, low = (
+        sign * np.maximum.reduceat(sign * rest, before)[:-1] for sign in (1.0, -1.0)
+    )  # of half cycles
+    largest = np.maximum(high[:-1], high[1:]) - np.minimum(low[:-1], low[1:])
     lasted = crossings[2:] - crossings[:-2]
     usual = np.abs(lasted - np.median(lasted)) < 0.6 * np.median(lasted)
     return lasted[usual], 0.5 * largest[usual]

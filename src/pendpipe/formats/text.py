@@ -35,6 +35,10 @@ _EASTERN: Final = re.compile("时间|時間|角度|시간|각도|(?i:время|
 """Words of a header by which the encodings of the East are told from one another."""
 _LARGEST: Final = 512 << 20
 """Bytes of a table: ten million rows. Its lines and cells take some five times that."""
+_MOST_ROWS: Final = 5_000_000
+"""Rows of any length: they take 0.8 GB."""
+_SHORTEST_ROW: Final = 13
+"""Bytes of a row among more: a time of seven digits and its point, and a reading of four."""
 _LONGEST_LINE: Final = 1 << 20
 _LONGEST_HEADER: Final = 5000
 _WIDEST: Final = 64
@@ -90,6 +94,13 @@ def read_table(place: Path, data: bytes, options: ReadOptions) -> Table:
         len(data) > _LARGEST,
         place,
         f"the table holds more than {_LARGEST >> 20} MB",
+        "give a part of it",
+    )
+    rows = data.count(b"\n")
+    refuse_if(
+        rows > max(_MOST_ROWS, len(data) // _SHORTEST_ROW),
+        place,
+        f"the table holds {rows} rows of {len(data) // max(rows, 1)} bytes: no time counts them",
         "give a part of it",
     )
     return table_of_text(place, decode(data), options, "csv")
