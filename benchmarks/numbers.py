@@ -1,6 +1,6 @@
 """Whether every number that fit and diagnose quote is what they say, whatever the law lacks.
 
-    python -m benchmarks.numbers [--number 150] [--set NAME] [--list] [--processes 2]
+    python -m benchmarks.numbers [--number 150] [--set NAME] [--list] [--fits] [--processes 2]
 
 Recordings of the challenge's integrator as `benchmarks.apparatus` draws them, a quarter each with
 nothing hidden, one effect of the catalogue, two, or one outside it; the torsion wheels among them
@@ -320,17 +320,20 @@ def _number(
     return {"quantity": quantity, "y": amplitude, "withheld": withheld or nothing, **ends}
 
 
-def answer(key: tuple[str, int]) -> dict[str, Any]:
-    """Make an item, hand the library its file, and set what it quotes beside the truth."""
+def answer(key: tuple[str, int, bool]) -> dict[str, Any]:
+    """Make an item, hand the library its file, and set what it quotes beside the truth.
+
+    The key is a set, a number, and whether to diagnose.
+    """
     import pendpipe as pp
 
-    item = draw(*key, dict.fromkeys(GROUPS, 1 / len(GROUPS)), APPARATUS)
+    item = draw(*key[:2], dict.fromkeys(GROUPS, 1 / len(GROUPS)), APPARATUS)
     assert item.bench is not None
     text = item.text
     if item.truth["apparatus"] == "wheel":
         text = text.replace("angle_rad", "displacement_m", 1)
     kept: dict[str, Any] = {"number": key[1], "truth": item.truth, "said": {}, "named": {}}
-    said: dict[str, list[Number]] = {}
+    said: dict[str, list[Number]] = {} if key[2] else {"diagnose": []}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{key[0]}-{key[1]:04d}.csv"
         path.write_text(text, encoding="utf-8")
@@ -339,10 +342,11 @@ def answer(key: tuple[str, int]) -> dict[str, Any]:
             fit = pp.fit(recording).to_dict()
             said["fit"] = list(quoted_by_fit(fit))
             kept["said"]["fit"] = f"{fit['light']}: {fit['light_reason']}"
-            content = pp.diagnose(recording).to_dict()
-            said["diagnose"] = list(quoted_by_diagnosis(content)) or said["fit"]
-            kept["said"]["diagnose"] = content["summary"]["headline"]
-            kept["named"] = {each["id"]: each["probability"] for each in content["effects"]}
+            if key[2]:
+                content = pp.diagnose(recording).to_dict()
+                said["diagnose"] = list(quoted_by_diagnosis(content)) or said["fit"]
+                kept["said"]["diagnose"] = content["summary"]["headline"]
+                kept["named"] = {each["id"]: each["probability"] for each in content["effects"]}
         except Exception as error:
             kept["said"] = {"fit": repr(error), "diagnose": repr(error)} | kept["said"]
     refused = [_number(each, 0.0, None, withheld=True) for each in ("T0", "Q", *"abc")]
@@ -415,9 +419,9 @@ def _unknown(number: Number) -> bool:
     return number["truth"] is None or not math.isfinite(number["truth"])
 
 
-def wanted(count: Callable[..., Count]) -> Iterator[tuple[str, float, bool]]:
+def wanted(count: Callable[..., Count], asked: Sequence[str]) -> Iterator[tuple[str, float, bool]]:
     """What is wanted of the numbers, what they come to, and whether that is enough."""
-    for by in ("fit", "diagnose"):
+    for by in asked:
         for group in GROUPS.values():
             all_ = count(by=by, group=group)
             yield f"{by}, {group}: 95 % intervals hold 90 %", all_.held, all_.held >= 0.9
@@ -447,9 +451,10 @@ def main() -> int:
     parser = judge_parser(__doc__, "numbers", 150)
     parser.add_argument("--set", default="trial", help="name of the set, its seed")
     parser.add_argument("--list", action="store_true", help="print each number that misses")
+    parser.add_argument("--fits", action="store_true", help="no diagnoses")
     told = parser.parse_args()
     numbers = []
-    keys = [(told.set, number) for number in range(told.number)]
+    keys = [(told.set, number, not told.fits) for number in range(told.number)]
     for kept in answers(told, keys, answer, (*SOURCES, "benchmarks/numbers.py")):
         hidden = kept["truth"]["effects"]
         about = {
@@ -465,7 +470,8 @@ def main() -> int:
 
     titles = ("95 % hold, %", "beyond five errors, %", "withheld, %", "width / oracle's")
     print(head("quoted", "n", *titles, "rms pull", "no truth"))
-    for by in ("fit", "diagnose"):
+    asked = ("fit", "diagnose")[: 2 - told.fits]
+    for by in asked:
         for group in GROUPS.values():
             print(table_row(f"**{by}, {group}**", count(by=by, group=group).cells()))
             for name in QUANTITIES:
@@ -475,7 +481,7 @@ def main() -> int:
     known.sort(key=lambda each: -abs(pull(each)))
     shown = [each for each in known if abs(pull(each)) > 2] if told.list else known[:10]
     print("", *map(line, shown), sep="\n")
-    found = list(wanted(count))
+    found = list(wanted(count, asked))
     for title, met in (("met", True), ("missed", False)):
         print(
             f"\n{title}:",
