@@ -23,9 +23,13 @@ settings.load_profile("same")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Files with slow tests come first: no process waits for another, or makes a campaign twice."""
-    slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: item.path not in slow)
+    """Files slow as a whole come first: no process waits for another, or makes a campaign twice."""
+
+    def quick(item: pytest.Item) -> bool:
+        module = item.getparent(pytest.Module)
+        return module is None or all(mark.name != "slow" for mark in module.own_markers)
+
+    items.sort(key=quick)
 
 
 SLOW_S: Final = 1.0
