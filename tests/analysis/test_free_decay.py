@@ -452,6 +452,29 @@ def test_of_a_piece_of_two_swings_nothing_is_said() -> None:
         pendpipe.diagnose(motion)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_a_decay_that_is_caught_is_cut_before_the_catch(seed: int) -> None:
+    """It then hangs still for eight cycles, and its period is known as well as without them."""
+    draw = np.random.default_rng(100 + seed)
+    time = np.arange(6000) / RATE
+    caught_s = draw.uniform(30.0, 45.0)
+    free = 0.4 * np.exp(-0.02 * time) * np.cos(OMEGA * time)
+    since = np.maximum(time - caught_s, 0.0)
+    held = np.interp(caught_s, time, free) * np.exp(-since / draw.uniform(0.01, 0.2))
+    noise = 4e-4 * draw.standard_normal(len(time))
+    swung = time <= caught_s
+    alone, fit = (
+        pendpipe.fit(Recording(time[keep], (values + noise)[keep], "angle_rad"), restoring="linear")
+        for values, keep in (
+            (free, swung),
+            (np.where(swung, free, held), time < caught_s + 8.0 * PERIOD),
+        )
+    )
+    assert fit["period"].sd < 1.5 * alone["period"].sd
+    assert abs(fit["period"].value - alone["period"].value) < 4.0 * fit["period"].sd
+    assert fit.cuts[0]["start_s"] < caught_s + 0.02 * PERIOD
+
+
 def test_a_mode_that_does_not_decay_is_a_drive() -> None:
     with pytest.raises(NotAnalysableError, match="a drive holds the amplitude up"):
         find_free_decay(beat((0.03, 0.0), rest=True))

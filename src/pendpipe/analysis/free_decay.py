@@ -307,6 +307,10 @@ _MANY: Final = 18
 """Half cycles that follow one another by no accident, however small they are."""
 _STEADY: Final = 0.2
 """By which the half periods of a beat may differ from the usual one, but at its nodes."""
+_CATCHABLE: Final = 9
+"""Half cycles of a decay whose last ones tell what the next would have lost."""
+_SPOILT: Final = 3.0
+"""Of the usual loss: what loses more in a half cycle was caught, and what has less left rests."""
 _COUNTED: Final = 0.25
 """Half cycles by which the count across a gap may be off."""
 _NODE: Final = 4
@@ -461,6 +465,7 @@ def _described(
     may_turn_over: bool,
 ) -> FreeDecay:
     """Say where a decay begins and ends, what is cut off it, and what else was noticed."""
+    used = [*used[:-1], _before_catch(time, used[-1])]
     run = used[0]
     flat = _flat_turns(time[run.piece], values[run.piece], run)
     if flat is not None and run.legs - flat > _MANY:
@@ -679,6 +684,25 @@ def _fall_of_all(time: FloatArray, values: FloatArray, middle: FloatArray) -> tu
     place = np.linspace(0.0, 1.0, _BLOCKS)
     (slope, begun), matrix = np.polyfit(place, amplitude, 1, cov=True)
     return float(-slope / begun), float(np.sqrt(matrix[0, 0]) / begun)
+
+
+def _before_catch(time: FloatArray, run: Run) -> Run:
+    """Cut a run that rests before its swings are used up: from the last turning point before.
+
+    A decay comes to rest by itself where its next swing would be none, or is not seen. One that
+    is caught would have swung on; its last half cycle is the hand's, and may be as long as others.
+    """
+    swing, step = run.swing, run.cycles.step
+    rest = float(time[run.piece.stop - 1]) - float(run.cycles.turn_time_s[run.last + 1])
+    if not run.fades or run.legs < _CATCHABLE or rest < 1.5 * run.half_period_s:
+        return run
+    loss = max(float(np.median(-np.diff(swing[-_CATCHABLE:-2]))), 0.0)
+    last = len(swing) - 1
+    while last > 3 and swing[last] < swing[last - 1] - _SPOILT * loss - step:
+        last -= 1
+    if swing[last] < _SPOILT * (loss + step):
+        return run
+    return replace(run, last=run.first + last - 1, fades=False)
 
 
 def _stop(time: FloatArray, run: Run) -> float:
