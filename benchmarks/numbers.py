@@ -208,7 +208,7 @@ class Decay:
     def _loss(self, when_s: float, middle: float, fall: float) -> tuple[float, float]:
         """Relative loss of the cycle that turns at `middle` near an instant, 1/s, and its weight.
 
-        A lopsided motion swings unequally far, and loses of each side in proportion.
+        A one-sided motion swings unequally far, and loses of each side in proportion.
         """
         half = math.pi / self.motion.value("omega")
 
@@ -228,7 +228,7 @@ class Decay:
         return last - first if last < self.end else math.nan
 
     def _at(self, amplitude: float, first: int, of: Array) -> float:
-        """Mean of both sides, which a lopsided motion lets swing unequally far."""
+        """Mean of both sides, which a one-sided motion lets swing unequally far."""
         sides = [(-self.logs[first:][k : len(of) : 2], of[k::2]) for k in (0, 1)]
         place, ends = -math.log(amplitude), -self.logs[[0, -1]] if len(self.logs) else (0.0, 0.0)
         if min(len(at) for at, _ in sides) < 4 or not ends[0] - RELEASED <= place <= ends[1]:

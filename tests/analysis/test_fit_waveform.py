@@ -195,6 +195,8 @@ def test_fit_json_is_read_as_it_was_written() -> None:
         "parameters",
         "period",
         "quality_factors",
+        "gravity",
+        "length",
         "quotable",
         "period_check",
         "hysteretic_share",

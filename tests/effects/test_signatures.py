@@ -16,6 +16,7 @@ from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN
 from pendpipe.effects.curves import usual_loss_rate
 from pendpipe.effects.effect import STRAIGHT_S, Span
 from pendpipe.effects.model import Model
+from pendpipe.physics import STANDARD_GRAVITY_M_PER_S2
 
 from .lock_in import Lines, lock_in, windows
 from .pendulums import OMEGA, baseline, evaluated, plain, reading, times
@@ -318,7 +319,7 @@ def test_a_pendulum_seen_from_the_side_is_the_sine_of_its_angle(amplitude: float
 def test_the_length_of_a_pendulum_in_metres_is_expected_about_g_over_omega_squared() -> None:
     form = CIRCULAR_ERROR_IN["m"]
     span = Model(SHORT_TIME, 0.02).evaluate(baseline(start=0.1)).span
-    length = 9.81 / OMEGA**2
+    length = STANDARD_GRAVITY_M_PER_S2 / OMEGA**2
     penalties = [form.prior_penalty(np.array([1.0 / (k * length) ** 2]), span) for k in (1, 1.2, 3)]
     assert penalties[0] == pytest.approx(0.0, abs=1e-12)
     assert penalties[1] < 1.0 < 20.0 < penalties[2]
