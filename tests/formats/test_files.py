@@ -247,9 +247,10 @@ def test_what_is_packed_is_counted_before_it_is_there(
     [
         ([b"t,theta\n", b"1," * 10_000_000, b"1\n", b"2," * 10_000_000, b"2\n"], "characters long"),
         ([b"9" * 1_000_000] * 100, "characters long"),
-        ([b"#\n" * 100_000] * 100, "no row of numbers|no block of rows"),
+        ([b"#\n" * 100_000] * 49, "no row of numbers|no block of rows"),
+        ([b"#\n" * 100_000] * 100, "rows of 2 bytes"),
     ],
-    ids=["columns", "line", "remarks"],
+    ids=["columns", "line", "remarks", "rows"],
 )
 def test_hostile_text_is_refused_in_little_memory(
     tmp_path: Path, content: list[bytes], said: str
