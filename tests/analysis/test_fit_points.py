@@ -451,6 +451,31 @@ def test_amplitudes_by_hand_are_a_pendulum_s(way: str, drag: Literal["energy", "
     assert fit.quality_factor(seen).value == pytest.approx(math.pi / loss, rel=2e-3)
 
 
+@pytest.mark.parametrize(("quality", "light"), [(1.0, "amber"), (2.5, "amber"), (8.0, "green")])
+def test_below_a_q_of_three_no_cycle_is_left(quality: float, light: str) -> None:
+    """Amplitudes that lose most of themselves in a period give neither Q nor a, b and c."""
+    time = np.arange(12.0) * 0.5
+    fall = 0.2 * np.exp(-math.pi * time / quality)
+    fit = pp.fit(pp.Recording(time_s=time[fall > 1e-4], angle_rad=fall[fall > 1e-4]), period=1.0)
+    assert fit.light == light
+    assert ("Q" in fit.quotable) == (light == "green")
+    assert ("b 0" not in str(fit) and "b 3" not in str(fit)) == (light == "amber")
+    assert ("Q = " in str(fit).partition("Copy")[2]) == (light == "green")
+
+
+def test_a_strongly_damped_swing_is_solved_exactly_and_has_no_q() -> None:
+    """All readings give T0 and the losses of Eq. 8 at a Q of 1.8: they need no cycle."""
+    law, time = Eq8(5.0, 1.7, 0.0, 1.25, 0.0, "sine"), np.arange(0.0, 8.0, 0.01)
+    noise = 1e-4 * np.random.default_rng(1).standard_normal(len(time))
+    angle = sample(law, Release(-0.05, 1.0), time) + noise
+    fit = pp.fit(pp.Recording(time_s=time, angle_rad=angle))
+    assert (fit.method, fit.light) == ("waveform", "amber")
+    assert "Q" not in fit.quotable
+    assert {"period", "a", "b"} <= set(fit.quotable)
+    for name, true in {"a": 1.7, "b": 1.25, "frequency": 5.0 / math.tau}.items():
+        assert abs(fit[name].value - true) < 4.0 * fit[name].sd
+
+
 def test_speeds_without_a_length_keep_their_unit() -> None:
     fit = pp.fit(by_hand(Eq8(math.tau / 1.7, 0.0, 0.0, 0.01, 0.0, "sine"), 0.3)["gate"])
     assert fit["amplitude"].unit == "m/s"

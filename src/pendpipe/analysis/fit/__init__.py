@@ -21,6 +21,7 @@ from pendpipe.analysis.fit.decrement import Light
 from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.goodness import LEVEL
 from pendpipe.analysis.fit.printed import period_text
+from pendpipe.analysis.fit.quality import without_swings
 from pendpipe.analysis.fit.result import Baseline, FitResult, Method, read_fit, with_scale
 from pendpipe.analysis.torque import may_be_sine, restoring_of, told_apart
 from pendpipe.analysis.turning_points import TurningPoints
@@ -139,7 +140,7 @@ def fit_recording(
         "cut the recording with --start and --stop, or see pendpipe diagnose",
         NotAnalysableError,
     )
-    return result
+    return without_swings(result)
 
 
 def fitted_arm(

@@ -19,6 +19,7 @@ from pendpipe.analysis.fit.damping import fast_beside
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness
 from pendpipe.analysis.fit.period import Period
+from pendpipe.analysis.fit.quality import without_swings
 from pendpipe.analysis.fit.result import PARAMETERS, result_of
 from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.analysis.torque import TOP, elliptic
@@ -160,7 +161,7 @@ def fit_amplitudes(
         metadata={"unit": unit},
         resolution=step or None,
     )
-    return replace(result, points=points, decay=shown)
+    return without_swings(replace(result, points=points, decay=shown))
 
 
 def _misfit(fit: EnvelopeFit) -> float:

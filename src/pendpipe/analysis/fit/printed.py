@@ -11,7 +11,15 @@ import numpy as np
 from pendpipe.analysis.angles import READ_AS
 from pendpipe.analysis.fit.consequence import unsure
 from pendpipe.analysis.fit.damping import FALLS, is_extrapolated
-from pendpipe.analysis.fit.quality import LOSSES, SEEN, Quality, period_of_frequency, small_period
+from pendpipe.analysis.fit.quality import (
+    LEAST_QUALITY,
+    LOSSES,
+    OVERDAMPED,
+    SEEN,
+    Quality,
+    period_of_frequency,
+    small_period,
+)
 from pendpipe.analysis.torque import TOP, swing_phase
 from pendpipe.analysis.turning_points import BEAT, CUT
 from pendpipe.estimate import Estimate
@@ -240,6 +248,8 @@ def percent(share: Estimate) -> str:
 
 
 def _law(result: FitResult) -> str:
+    if result.light_reason.startswith(OVERDAMPED) and result.method != "waveform":
+        return "a, b, c need more than a cycle to lose it in"
     text = ", ".join(f"{name} {result[name].or_limit()}" for name in "abc")
     limit = result.quality_factor_limit
     if limit is not None and limit.value > 3.0 * limit.sd:
@@ -280,6 +290,7 @@ def sentence(result: FitResult) -> str:
         doubted = [each for some in unsure(result) for each in some]
         checks = result.decrement_check or [None] * len(known)
         known = [each for each, seen in zip(known, checks, strict=False) if seen not in doubted]
+    known = [each for each in known if not each.quality_factor.value < LEAST_QUALITY]
     if known:
         q = known[0]
         timeless = math.isnan(q.period_s)

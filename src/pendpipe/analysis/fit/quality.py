@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.decrement import losses_of
+from pendpipe.analysis.fit.decrement import Light, losses_of
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.errors import InputError, refuse_if
@@ -22,6 +22,9 @@ from pendpipe.quantities import after_number
 if TYPE_CHECKING:
     from pendpipe.analysis.fit.result import FitResult
 
+LEAST_QUALITY: Final = 3.0
+"""Below, a cycle leaves less than exp(-pi/3) of the swing, a third: it is no cycle."""
+OVERDAMPED: Final = "a cycle loses most of the swing"
 LOSSES: Final = {
     "a": "drag that grows with the square of the speed",
     "b": "viscous and internal loss",
@@ -163,6 +166,25 @@ def released_quality(result: FitResult) -> Estimate:
         return quality_by_law(result, result.value("amplitude")).quality_factor
     seen = seen_qualities(result)
     return seen[0].quality_factor if seen else Estimate(math.nan, math.nan, "")
+
+
+def without_swings(result: FitResult) -> FitResult:
+    """Hold back what has no meaning where Q at the release is below 3: there no period is left.
+
+    A cycle would lose two thirds of the amplitude. Q is then not that of any cycle, and Eq. 14,
+    which is first order in the loss of a cycle, does not give a, b and c; Eq. 8 does.
+    """
+    quality = released_quality(result).value
+    if not quality < LEAST_QUALITY:
+        return result
+    by_cycles = result.method != "waveform"
+    held = {"Q", "losses", *("abc" if by_cycles else ())}
+    kept = tuple(name for name in result.quotable if name not in held)
+    said = f"{OVERDAMPED}, Q = {quality:.2g}: don't quote {'Q, a, b, c' if by_cycles else 'Q'}"
+    if result.light != "green":
+        said = f"{said}; {result.light_reason}"
+    light: Light = "red" if result.light == "red" else "amber"
+    return replace(result, light=light, light_reason=said, quotable=kept)
 
 
 def quality_by_law(result: FitResult, amplitude: float) -> Quality:
