@@ -275,7 +275,7 @@ SHARED: Final[Flags] = {
     }
     | INPUT,
     "--turning-points": {
-        "help": "turning points turning points of an earlier stage, with their cuts",
+        "help": "turning points of an earlier stage, with their cuts",
         "metavar": "CSV",
         "type": Path,
     }

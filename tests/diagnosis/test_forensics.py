@@ -281,6 +281,18 @@ def test_lost_samples_are_found_before_they_spoil_the_rest(lost: dict[int, int])
         assert candidate.time_s == pytest.approx(AIR.times()[place], abs=2.1 / AIR.rate_hz)
 
 
+def test_a_loss_is_as_probable_by_chance_as_the_noise_makes_it() -> None:
+    """One sample, of which five times the noise are five times the standard deviations."""
+    longer, row = Pendulum(count=AIR.count + 10), np.arange(AIR.count)
+    motion = longer.model().reading(longer.values())[row + (row >= 1234)]
+    chances = []
+    for times in (5.0, 15.0, 25.0):
+        record = fitted(AIR, motion + times * drawn_white(generator(), AIR.count))
+        finding = TESTS["dropped-samples"](record.data, record.fit, record.noise, record.samples)
+        chances.append(finding.p_value)
+    assert 0.0 < chances[0] < 1e-30 < chances[1] < 1e-15 < chances[2] < 1e-6
+
+
 def folded(pendulum: Pendulum, readings: FloatArray) -> Fitted:
     """Means of several readings, as the diagnosis takes them of a very long record."""
     record = fitted(pendulum, readings)

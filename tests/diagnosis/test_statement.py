@@ -16,9 +16,9 @@ from pendpipe.diagnosis.location import curve_told, locate
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import Remainder, remainder_of, with_errors
-from pendpipe.diagnosis.result import Diagnosis, FittedModel, FoundEffect, Location
+from pendpipe.diagnosis.result import Diagnosis, FittedModel, FoundEffect, Location, verdict_of
 from pendpipe.diagnosis.rivals import near_harmonic_by_chance
-from pendpipe.diagnosis.summary import numbers_of, statement
+from pendpipe.diagnosis.summary import Change, Summary, numbers_of, statement
 from pendpipe.diagnosis.values import constants_of, curve_values
 from pendpipe.diagnosis.weighing import curve_of
 from pendpipe.effects.baseline import OMEGA, TIME, A, B, C
@@ -238,10 +238,18 @@ def test_a_healthy_pendulum_takes_one_line() -> None:
 
 @pytest.mark.structure
 def test_a_misfit_that_chance_does_not_explain_is_not_nothing() -> None:
-    left = replace(diagnosis(), unexplained_p_value=5e-10)
-    said = "no cause is found for the small misfit that is left (p = 5e-10)"
-    assert left.statement == said
-    assert replace(left, level=1e-10).statement == "nothing is missing (p = 5e-10)"
+    left = replace(diagnosis(), verdict=verdict_of((), 5e-10, 0.01), p_value=5e-10)
+    headline, copied = left.statement.splitlines()
+    assert headline == "a small misfit is left, its cause is NOT known (p = 5e-10)"
+    assert copied.endswith("(p = 5e-10); the cause was not identified.”")
+    colour = [named("coloured-noise")]
+    for p, level, lacks, says in (
+        (5e-10, 0.01, [], "missing-physics"),
+        (5e-10, 1e-10, [], "consistent"),
+        (0.4, 0.01, colour, "consistent"),
+        (0.4, 0.01, [*colour, named("impulse")], "missing-physics"),
+    ):
+        assert verdict_of(lacks, p, level) == says
     for p, chance in ((0.4, " more than chance would"), (5e-10, ", but more than by chance")):
         text = statement("eq8", FittedModel({}, 1e-4, 1.0), [], 1e-4, p, p, 0.01)
         assert f"no effect of the catalogue improves the fit{chance}" in text
@@ -306,6 +314,34 @@ def test_the_answer_has_a_dozen_lines_in_the_order_of_the_questions() -> None:
     for line, start in zip(lines, order, strict=False):
         assert line.startswith(start)
     assert lines[-1].startswith("Copy: “Eq. 8 does not describe this recording (p < 1e-12)")
+
+
+@pytest.mark.structure
+def test_a_line_is_as_wide_as_a_terminal_and_the_whole_is_in_the_details() -> None:
+    law = named(
+        "vortex-shedding",
+        k=Estimate(0.0123, 0.0012, "1/s"),
+        y_c=Estimate(0.123, 0.012, "rad"),
+        phi=Estimate(0.61, 0.01, ""),
+    )
+    knock = named("impulse", dv=Estimate(5e-3, 5e-4, "rad/s"), time=Estimate(21.0, 0.1, "s"))
+    place = Location(summary="; ".join(["throughout the record, mostly at the turning points"] * 3))
+    summary = diagnosis(replace(law, location=place), knock).summary
+    first, *lines, copied = summary.lines("a-long-name-of-a-file.csv")
+    assert first.endswith("csv: missing: vortex shedding above an amplitude; impulse")
+    assert all(len(line) <= 120 for line in (first, *lines))
+    assert "loss rate 0.0123(12) s⁻¹" in copied
+    assert max(map(len, summary.lines(width=math.inf)[:-1])) > 120
+
+
+def test_a_wide_table_leaves_out_the_middle_q() -> None:
+    q = Estimate(157.123, 0.011, "")
+    ends = [Change("Q", q, q, amplitude) for amplitude in (0.5, 0.2, 0.1)]
+    period = Change("period", *(Estimate(1.0 / 3.0, 1e-7, "s"),) * 2)
+    summary = Summary("missing: impulse", consequence=(period, *ends))
+    titles = [summary.table(width).splitlines()[0].split("Q at")[1:] for width in (120, 60)]
+    assert [len(each) for each in titles] == [3, 2]
+    assert titles[1] == [titles[0][0], titles[0][-1]]
 
 
 @pytest.mark.structure

@@ -10,6 +10,7 @@ own start and noise (docs/several.md).
 """
 
 from itertools import product
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -142,7 +143,7 @@ def _report(arguments: Arguments, outcome: Diagnosis, name: str) -> int:
             tell(f"{name}: {warning}")
         excluded = "; ".join(f"{each['id']} {each['p_value']:.2g}" for each in content["excluded"])
         looked = [f"Looked for, with p-values: {excluded}."] if excluded else []
-        text = "\n".join([text, "", content["details"], *looked])
+        text = "\n".join([*outcome.summary.lines(name, inf), "", content["details"], *looked])
     print_answer(arguments, content, text)
     return FOUND if arguments.fail_on == content["verdict"] else 0
 

@@ -24,9 +24,7 @@ from pendpipe.diagnosis.refine import SETTLED, Fit, refine
 from pendpipe.diagnosis.result import Finding
 from pendpipe.dynamics.any_law import NoMotionError
 
-_ANY: Final = 7
-"""Tests that are made on any recording; others need uneven stamps, a tracked mark, or a misfit."""
-_SHARE_OF_EACH: Final = TESTS_SHARE / _ANY
+_SHARE_OF_EACH: Final = TESTS_SHARE / len(FINDERS)
 _MOST_ROUNDS: Final = 12
 
 

@@ -200,12 +200,14 @@ class Hypothesis:
     def p_value(self) -> float:
         """Global, on the baseline: of the catalogue's largest score, and of the tests.
 
+        Where nothing was added the last scan counts, with the noise as it is known at last.
         Properties of the record that do no harm (a coarse step at large amplitude) don't count,
         nor does the colour of its noise.
         """
-        assert self.first is not None
+        first = self.first if self.steps else self.scan
+        assert first is not None
         faults = [each.p_value for each in self.faults if each.identifier != COLOURED_NOISE]
-        return min(self.first.p_value / CATALOGUE_SHARE, *self.quiet.values(), *faults, 1.0)
+        return min(first.p_value / CATALOGUE_SHARE, *self.quiet.values(), *faults, 1.0)
 
     @property
     def unexplained(self) -> float:

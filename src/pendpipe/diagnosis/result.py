@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from pendpipe.analysis.fit.result import FitResult, drawer_of
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.diagnosis.summary import BASELINES, LEVEL, Summary, html_of, summarise
+from pendpipe.diagnosis.summary import BASELINES, COLOURED_NOISE, LEVEL, Summary, html_of, summarise
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.estimate import Estimate
 
@@ -33,6 +33,17 @@ def swinging(baseline: str, restoring: str, drag_form: str) -> str:
 
 
 Verdict = Literal["consistent", "missing-physics", "not-analysable"]
+
+
+def verdict_of(missing: Iterable[FoundEffect], p_value: float, level: float) -> Verdict:
+    """Return what is said of a recording: it is consistent where chance explains the residual.
+
+    Coloured noise is reported, and is nothing that a model lacks.
+    """
+    lacks = any(effect.identifier != COLOURED_NOISE for effect in missing)
+    return "missing-physics" if lacks or p_value < level else "consistent"
+
+
 _DENSITIES: Final = ("log_density_before", "log_density_after", "gain", "gain_sd")
 
 

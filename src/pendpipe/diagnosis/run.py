@@ -36,9 +36,10 @@ from pendpipe.diagnosis.result import (
     FoundEffect,
     Location,
     swinging,
+    verdict_of,
 )
 from pendpipe.diagnosis.search import baseline_fitted, run_search
-from pendpipe.diagnosis.summary import COLOURED_NOISE, LEVEL, statement
+from pendpipe.diagnosis.summary import LEVEL, statement
 from pendpipe.diagnosis.values import parameters_of
 from pendpipe.diagnosis.weighing import (
     Weighed,
@@ -217,7 +218,7 @@ def diagnose_decay(
         remedy = "cut it with --start and --stop, or change what is held with --fix"
         raise NotAnalysableError(place, f"the model can't follow it ({error})", remedy) from error
     effects = _in_order(found, weighed, samples)
-    missing = any(effect.identifier != COLOURED_NOISE for effect in effects)
+    verdict = verdict_of(effects, found.p_value, level)
     # A part of b that is held bounds b here alone.
     printed = None if beginning.model.parts else fit
     stands = printed if printed and printed.light != "red" else None
@@ -231,10 +232,10 @@ def diagnose_decay(
         before,
         after,
         after.noise_rms_rad,
-        "missing-physics" if missing else "consistent",
+        verdict,
         found.p_value,
         (*_presumed(found, drag_form), *effects),
-        _left_out(found, beginning.held, progress) if missing else None,
+        _left_out(found, beginning.held, progress) if verdict != "consistent" else None,
         after.residual_rms_rad,
         found.unexplained,
         statement(

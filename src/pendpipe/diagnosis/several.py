@@ -42,11 +42,12 @@ from pendpipe.diagnosis.result import (
     FoundEffect,
     Location,
     swinging,
+    verdict_of,
 )
 from pendpipe.diagnosis.rivals import Scale
 from pendpipe.diagnosis.search import LESS_FRICTION, run_search
 from pendpipe.diagnosis.stacked import StackedData, StackedNoise
-from pendpipe.diagnosis.summary import COLOURED_NOISE, DOUBTFUL, LEVEL, statement
+from pendpipe.diagnosis.summary import DOUBTFUL, LEVEL, statement
 from pendpipe.diagnosis.values import constants_of
 from pendpipe.diagnosis.weighing import Weighed, effect_named
 from pendpipe.dynamics.any_law import NoMotionError
@@ -152,7 +153,7 @@ def diagnose_several(
     own_forms = [each for each in outcomes[0].effects if each.presumed]
     effects = (*own_forms, *named, *differing, *events)
     told = [after.recording(number) for number in range(len(names))]
-    missing = any(not (each.presumed or each.identifier == COLOURED_NOISE) for each in effects)
+    missing = [each for each in effects if not each.presumed]
     noise_rms = _rms([outcome.noise_rms_rad for outcome in outcomes])
     held = (
         held_out(found.baseline, found.fit, found.data, found.noise, found.held, found.held)
@@ -177,7 +178,7 @@ def diagnose_several(
         before.model(),
         after.model(),
         noise_rms,
-        "missing-physics" if missing else "consistent",
+        verdict_of(missing, p_value, level),
         p_value,
         effects,
         held,

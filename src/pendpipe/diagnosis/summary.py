@@ -41,6 +41,8 @@ _SURE: Final = 0.95
 """Probability from which a name without rivals needs no further measurement."""
 SMALLEST: Final = 1e-12
 """Smaller p-values rest on tails of the noise that nobody has tested."""
+WIDTH: Final = 120
+"""Of a line that is printed."""
 _SHOWN: Final = 4
 """Of what was looked for."""
 _KNOWN: Final = 2.0
@@ -159,19 +161,31 @@ class Summary:
         )
         return [(title, value) for title, value in pairs if value]
 
-    def lines(self, name: str = "") -> list[str]:
-        """Return the answer as it is printed, a dozen lines at most."""
+    def lines(self, name: str = "", width: float = WIDTH) -> list[str]:
+        """Return the answer as it is printed: a dozen lines at most, all but the last `width` wide.
+
+        What makes room are numbers of effects (the sentence has them), last clauses, and Q between
+        the largest amplitude and the smallest.
+        """
+        first = f"{name}: {self.headline}" if name else self.headline
+        for cause in self.missing if len(first) > width else ():
+            first = first.replace(cause, cause if cause.endswith("together)") else _bare(cause))
         return [
-            f"{name}: {self.headline}" if name else self.headline,
-            *(f"  {title:<22}{value}" for title, value in self.pairs()),
-            *(f"  {row}" for row in self.table().splitlines()),
+            first,
+            *(_within(f"  {title:<22}{value}", width) for title, value in self.pairs()),
+            *(f"  {row}" for row in self.table(width - 2).splitlines()),
             *([f"Copy: {self.sentence}"] if self.sentence else []),
         ]
 
-    def table(self) -> str:
+    def table(self, width: float = math.inf) -> str:
         """Return *as fitted* and *with what is missing* side by side."""
         rows = [("", "as fitted", "with what is missing"), *self.rows()]
-        return in_columns(list(zip(*rows, strict=True))) if self.consequence else ""
+        text = in_columns(list(zip(*rows, strict=True))) if self.consequence else ""
+        if max(map(len, text.splitlines()), default=0) <= width:
+            return text
+        of_q = [each for each in self.consequence if each.quantity == "Q"]
+        kept = [each for each in self.consequence if each not in of_q[1:-1]]
+        return replace(self, consequence=tuple(kept)).table()
 
     def rows(self) -> list[tuple[str, str, str]]:
         """Return the table as rows: quantity, as fitted, with what is missing."""
@@ -217,6 +231,18 @@ def read_summary(content: Mapping[str, Any], unit: str) -> Summary:
     return Summary(**{**content, **lists, "consequence": changes})
 
 
+def _bare(cause: str) -> str:
+    """Return a cause without its numbers."""
+    return cause.rpartition(" (")[0] if cause.endswith(")") else cause
+
+
+def _within(line: str, width: float) -> str:
+    """Leave out the last clauses of a line until it is short enough."""
+    while len(line) > width and "; " in line:
+        line = line.rpartition("; ")[0]
+    return line
+
+
 def _title(change: Change) -> str:
     if change.amplitude_rad is None:
         return {"period": "T0"}.get(change.quantity, change.quantity)
@@ -230,14 +256,15 @@ def summarise(diagnosis: Diagnosis) -> Summary:
     if not found:
         beyond = f" beyond {presumed}, which is fitted" if presumed else ""
         noise = any(each.identifier == COLOURED_NOISE for each in diagnosis.effects)
-        p = printed(diagnosis.unexplained_p_value)
+        p = printed(diagnosis.p_value)
         coloured = "; its noise is coloured" if noise else ""
         wanders = any("the zero wanders" in note for note in diagnosis.warnings)
         zero = "; its zero wanders" if wanders else ""
-        said = f"nothing is missing{beyond}"
-        if diagnosis.unexplained_p_value < diagnosis.level:
-            said = f"no cause is found{beyond} for the small misfit that is left"
-        return Summary(f"{said} ({p}){coloured}{zero}")
+        said, sentence = f"nothing is missing{beyond}", ""
+        if diagnosis.verdict != "consistent":
+            said = f"a small misfit is left{beyond}, its cause is NOT known"
+            sentence = _sentence(diagnosis, (), presumed)
+        return Summary(f"{said} ({p}){coloured}{zero}", sentence=sentence)
     contradicting = [
         each.name
         for each in found

@@ -22,6 +22,8 @@ from pendpipe.estimate import Estimate
 
 _SIGNIFICANT_SD: Final = 7.0
 """Standard deviations from which a phase step is significant."""
+_EFFICIENCY: Final = 0.37
+"""Part of the differences whose rms would be as good as the median of all of their sizes."""
 _WHOLE_WITHIN: Final = 0.03
 """Largest distance of a step from a whole number of intervals, in intervals."""
 _LARGEST_ERROR: Final = 0.12
@@ -54,11 +56,15 @@ class LostSamples(NamedTuple):
         How many; negative where samples were doubled.
     measured
         The step of the phase, in intervals.
+    p_value
+        Probability that chance makes the largest of all steps as large: Student's, since their
+        scatter is measured by as many.
     """
 
     time_s: float
     number: int
     measured: float
+    p_value: float = 1.0
 
 
 def find(evidence: Evidence) -> Finding | None:
@@ -74,7 +80,7 @@ def find(evidence: Evidence) -> Finding | None:
     said = ", ".join(f"{each.time_s:.6g} s ({each.number})" for each in lost[:6])
     return Finding(
         "dropped-samples",
-        0.0,
+        min(each.p_value for each in lost),
         parameters={
             "d": Estimate(number * interval, 0.0, "s"),
             "samples": Estimate(float(number), 0.0, ""),
@@ -113,7 +119,7 @@ def find_lost_samples(data: Data, fit: Fit) -> list[LostSamples]:
     interval = fit.at.sampled.motion.angular_frequency * data.interval_s / data.fold
     amplitude = np.interp(centre, fit.at.sampled.phase, fit.at.sampled.amplitude)
     errors = _phase_errors(data, amplitude * np.exp(log_ratio), phase)
-    rest = phase.copy()
+    rest, freedom = phase.copy(), _EFFICIENCY * (len(phase) - 2)
     found: list[LostSamples] = []
     for _ in range(_MOST_STEPS):
         step = rest[2:] - rest[:-2]
@@ -129,7 +135,8 @@ def find_lost_samples(data: Data, fit: Fit) -> list[LostSamples]:
             break
         at = int(np.argmax(np.where(significant, np.abs(step) / error, 0.0)))
         when = _instant(data, fit, phase, centre, at + 1)
-        found.append(LostSamples(when, int(number[at]), float(step[at] / interval)))
+        chance = min(2.0 * len(step) * float(stdtr(freedom, -np.abs(step[at]) / error[at])), 1.0)
+        found.append(LostSamples(when, int(number[at]), float(step[at] / interval), chance))
         rest[at + 2 :] -= number[at] * interval
         # The cycle in which it happened has an intermediate phase.
         rest[at + 1] = 0.5 * (rest[at] + rest[at + 2])
