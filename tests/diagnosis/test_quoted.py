@@ -22,6 +22,7 @@ from pendpipe.effects.model import Model
 from .records import (
     FREQUENCY_HZ,
     INTERVAL_S,
+    OMEGA_RAD_S,
     TIME_S,
     TRUTH,
     diagnosed,
@@ -151,6 +152,16 @@ def test_q_of_a_description_is_that_of_its_losses(
     for amplitude, found in quality_factors_of(fit, [0.12, 0.1, 0.08]).items():
         by_losses = math.pi * FREQUENCY_HZ / (a * amplitude + b + c / amplitude)
         assert found.value == pytest.approx(by_losses, rel=6e-4)
+
+
+def test_q_is_with_the_period_that_losses_do_not_lengthen() -> None:
+    """A viscous pendulum of Q = omega/(2 b) = 14 loses exp(-b t), 1/(8 Q^2) slower."""
+    b, model = 0.2, Model(TIME_S[:200], INTERVAL_S)
+    value = np.array([0.0, b, 0.0, 0.0, OMEGA_RAD_S, 0.15, -0.3, 0.0])
+    data, noise = prepared(model.reading(value), TIME_S[:200])
+    fit = refine(model, data, noise, value, rounds=0)
+    for found in quality_factors_of(fit, [0.1, 0.05, 0.02]).values():
+        assert found.value == pytest.approx(0.5 * OMEGA_RAD_S / b, rel=1e-5)
 
 
 # Each description is fitted as it is named.

@@ -211,8 +211,9 @@ def averages(
     for each in described:
         own = none if each.fit.value is found.baseline.value else of(each.fit)
         drawn = any(effect.kind == "unnamed" for effect in each.fit.model.effects)
-        if drawn or each.fit.scatter is not None or found.unexplained < level:
-            own = {name: _no_surer(value, none.get(name)) for name, value in own.items()}
+        more = each.fit.scatter is not None or found.unexplained < level
+        if more or drawn:
+            own = {name: _beside(value, none.get(name), more=more) for name, value in own.items()}
         numbers.append(own)
     return Quoted(
         {
@@ -242,14 +243,23 @@ def printed_by(fit: FitResult | None) -> Numbers:
     return {**numbers, "frequency": over(1.0, fit.period, "Hz")}
 
 
-def _no_surer(value: Estimate, fitted: Estimate | None) -> Estimate:
-    """Return a number with the fit's error, if that is larger; else the fit's number."""
+def _beside(value: Estimate, fitted: Estimate | None, *, more: bool) -> Estimate:
+    """Return a number of what explains nothing, no surer than the fit's.
+
+    Of what leaves more than noise it is the surer of both; a curve, which follows whatever there
+    is, is as right as the fit.
+    """
     if fitted is None or not math.isfinite(fitted.sd):
         return value
-    if not value.sd < fitted.sd:
+    if more and not value.sd < fitted.sd:
         return fitted
-    low, high = fitted.bounds95
-    ends = value.value - (fitted.value - low), value.value + (high - fitted.value)
+    found = value if more else averaged([value, fitted], [1.0, 1.0])
+    if not found.sd < fitted.sd:
+        return found
+    own, others = found.bounds95, fitted.bounds95
+    low = min(own[0], found.value - (fitted.value - others[0]))
     if value.interval95 is not None:
-        ends = max(ends[0], min(0.0, value.interval95[0])), ends[1]
-    return replace(value, sd=fitted.sd, interval95=ends)
+        # That of a, b, c ends where they are zero.
+        low = max(low, min(own[0], 0.0))
+    high = max(own[1], found.value + (others[1] - fitted.value))
+    return replace(found, sd=fitted.sd, interval95=(low, high))

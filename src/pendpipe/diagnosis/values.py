@@ -147,7 +147,7 @@ def quality_factors_of(fit: Fit, amplitudes: Sequence[float]) -> dict[float, Est
 
     The amplitude is half the way from one side to the other, wherever the equilibrium is; the
     period is that without losses. Left out are cycles with a kick in them, and amplitudes that it
-    has not or at which it gains.
+    has not, or at which nothing is known of its loss.
     """
     wanted, motion = np.log(amplitudes), fit.at.tangent.motion
     model, slowed = replace(fit.model, _last={"motion": motion}), _slowed(fit)
@@ -178,7 +178,7 @@ def quality_factors_of(fit: Fit, amplitudes: Sequence[float]) -> dict[float, Est
     return {
         amplitude: Estimate(float(q), float(sd), "")
         for amplitude, q, sd in zip(amplitudes, found, sds, strict=True)
-        if q > 0.0 and math.isfinite(sd)
+        if q > sd
     }
 
 
