@@ -180,7 +180,8 @@ def _quantile(parts: Sequence[tuple[float, Estimate]], probability: float) -> fl
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if below(middle) < probability else (low, middle)
-    return 0.5 * (low + high)
+    # A bound at which a part of the distribution stands is an end itself.
+    return low if probability < 0.5 else high
 
 
 def measured(text: str) -> Estimate:

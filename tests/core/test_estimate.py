@@ -60,7 +60,8 @@ def test_the_average_of_what_cannot_be_negative_is_not() -> None:
     """Two descriptions without dry friction, one with little: no interval begins below zero."""
     none, little = Estimate(0.0, 1e-3, "", (0.0, 2e-3), True), Estimate(1e-3, 1e-3, "", (0.0, 3e-3))
     found = averaged([none, none, little], [0.4, 0.4, 0.2])
-    assert found.bounds95[0] == pytest.approx(0.0, abs=1e-9)
+    assert found.bounds95[0] == 0.0
+    assert found.or_limit().startswith("<")
     assert found.value < found.bounds95[1] < 3e-3
     assert not found.at_bound
     assert averaged([none, none], [0.5, 0.5]).at_bound
