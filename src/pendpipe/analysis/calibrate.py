@@ -227,8 +227,8 @@ class Calibration:
                 f" by at most {100 * curve.largest_deviation:.2g} % of its span)"
             )
         lines = (
-            f"volts_per_radian {constant.value:.7g} +- {constant.sd:.2g} V/rad",
-            f"offset           {offset.value:.5g} +- {offset.sd:.2g} V",
+            f"volts_per_radian {constant.value:.7g} ± {constant.sd:.2g} V/rad",
+            f"offset           {offset.value:.5g} ± {offset.sd:.2g} V",
             f"points           {len(self.volts)}, from {low:.4g} to {high:.4g} rad",
             f"residual sd      {self.residual_sd_volts:.3g} V",
             *([f"lack of fit      p = {misfit:.3g}"] if np.isfinite(misfit) else []),

@@ -279,10 +279,12 @@ def _count_late_rows(choice: Choice, base: TimeBase) -> None:
     scatter = [np.median(np.abs(np.diff(found))) / np.median(found) for found in (stamped, counted)]
     if scatter[1] < min(0.1 * scatter[0], 0.03):
         late = float(np.std(base.time_s - even))
+        # Of exact times the periods agree to the last digit.
+        better = float(min(scatter[0] / max(scatter[1], 1e-300), 1000.0))
         base.weak_guesses.append(
             f"time stamps scatter by {late:.2g} s, as of arrival: rows are counted at"
             f" {1.0 / (even[1] - even[0]):.6g} Hz, by which the periods agree"
-            f" {scatter[0] / scatter[1]:.0f} times better; the rate is known"
+            f" {better:.0f} times better{' or more' * (better == 1000.0)}; the rate is known"
             f" to {100.0 * late / np.ptp(even):.1g} % (--sample-rate)"
         )
         base.time_s = even

@@ -244,7 +244,7 @@ class FitResult:
     def __repr__(self) -> str:
         """Return the numbers in one line."""
         numbers = ", ".join(
-            f"{name}={entry.value:.6g}+-{entry.sd:.2g}" for name, entry in self.parameters.items()
+            f"{name}={entry.value:.6g}±{entry.sd:.2g}" for name, entry in self.parameters.items()
         )
         return f"FitResult({self.light}: {numbers})"
 
