@@ -234,12 +234,6 @@ def test_noise_is_not_described() -> None:
     assert state.steps == ()
 
 
-@pytest.mark.slow
-def test_a_step_and_a_tone_are_both_named_and_no_curve_instead() -> None:
-    found = diagnose_recording(recording(with_effects("equilibrium-step", "tone-pickup"), 3))
-    assert {each.identifier for each in found.effects} == {"equilibrium-step", "tone-pickup"}
-
-
 def test_a_rolling_shutter_is_no_second_mode() -> None:
     """A row that lies x higher is read kappa x later: a second harmonic that falls as A^2."""
     finer = np.arange(-0.2, TIME_S[-1] + 0.2, 0.2 * INTERVAL_S)

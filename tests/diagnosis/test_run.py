@@ -1,7 +1,6 @@
 """A diagnosis from a recording to its verdict."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -276,40 +275,6 @@ def test_the_noise_is_that_of_a_reading_whatever_was_averaged(rate_hz: float) ->
     assert answer["noise_rms_rad"] == fit.noise_rms_rad
     assert left["residual_rms_rad"] == pytest.approx(1e-4, rel=within)
     assert left["chi2_per_dof"] == pytest.approx(1.0, abs=2.0 * within)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("rate_hz", [45.0, 120.0])
-def test_so_it_is_beside_an_effect(rate_hz: float) -> None:
-    plain = simulated(rate_hz, amplitude=0.1)
-    angle = plain.values + 0.5 * plain.values**2
-    answer = pp.diagnose(pp.Recording(time_s=plain.time_s, angle_rad=angle)).to_dict()
-    missing = [each["id"] for each in answer["effects"] if not each["presumed"]]
-    assert missing[0] == "sensor-quadratic"
-    for number in (answer["noise_rms_rad"], answer["improved"]["residual_rms_rad"]):
-        assert number == pytest.approx(1e-4, rel=0.03)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "spoilt",
-    [
-        lambda time_s, angle: (time_s + 2e-5 * time_s**2, angle),  # fitted to turning points
-        lambda time_s, angle: (time_s, angle + 2e-5 * time_s),  # fitted with a zero that drifts
-        lambda time_s, angle: (  # to a part
-            time_s[:1600],
-            np.where(time_s > 40.0, 0.97 * angle, angle)[:1600],
-        ),
-        lambda time_s, angle: (time_s, np.where(time_s == time_s[900], angle + 0.1, angle)),
-    ],
-    ids=["clock", "zero", "gain", "glitch"],
-)
-def test_what_is_found_never_leaves_more_of_the_readings_than_was_left_without_it(
-    spoilt: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]],
-) -> None:
-    plain = simulated(20.0, amplitude=0.3)
-    found = pp.diagnose(pp.Recording(*spoilt(plain.time_s, plain.values), "angle_rad"))
-    assert found.improved.residual_rms_rad <= found.baseline.residual_rms_rad
 
 
 def test_a_position_is_diagnosed_as_l_sin_x() -> None:
