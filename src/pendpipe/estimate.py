@@ -125,6 +125,10 @@ def over(number: float, estimate: Estimate, unit: str = "") -> Estimate:
     return Estimate(value, value * estimate.sd / estimate.value, unit, ends)
 
 
+LISTED: Final = 0.05
+"""Probability from which a description counts in an average; as from which a rival is listed."""
+
+
 def averaged(estimates: Sequence[Estimate], probabilities: Sequence[float]) -> Estimate:
     """Average one quantity over descriptions that share the probability.
 

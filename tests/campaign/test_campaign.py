@@ -14,6 +14,7 @@ from pendpipe.campaign.diagnose import (
     held_out,
     local_scores,
     next_measurements,
+    quoted_coefficient,
     search,
 )
 from pendpipe.campaign.effects import CATALOGUE, Surface, confined
@@ -425,6 +426,34 @@ def test_nothing_competes_with_the_causes() -> None:
 
 
 @pytest.mark.slow
+def test_k_is_averaged_over_the_causes_that_share_the_probability() -> None:
+    """A little grease looks like air in the benchmark, and like another law of the loss torque."""
+    size = 0.02 * CATALOGUE["grease-drag"].expected
+    answer = search(DESIGN, data(DESIGN, named("grease-drag"), (size,), seed=5))
+    (found,) = answer.found
+    quoted = quoted_coefficient(answer)
+    leader = coefficient(found.leader)
+    listed = [rival for rival, probability in found.rivals if probability > 0.05]
+    assert len(listed) == 2
+    assert quoted.sd > 2.0 * leader.sd
+    low, high = quoted.bounds95
+    assert all(low < coefficient(fit).value < high for fit in (found.leader, *listed))
+    content = campaign_diagnosis(answer, {})
+    assert content["quoted"]["hysteretic_coefficient"]["sd"] == quoted.sd
+    assert f"k is {quoted}" in content["statement"]
+
+
+def test_what_no_cause_explains_widens_k() -> None:
+    """Records that scatter three times more than their errors say."""
+    found, none = data(DESIGN, seed=7), predict(DESIGN, (), np.zeros(len(DESIGN.nuisances)))
+    answer = search(DESIGN, found._replace(values=none + 3.0 * (found.values - none)))
+    fit = answer.improved
+    wider = np.sqrt(fit.chi2 / fit.degrees_of_freedom)
+    assert answer.found == ()
+    assert wider > 1.2
+    assert quoted_coefficient(answer).sd == pytest.approx(wider * coefficient(fit).sd)
+
+
 def test_two_causes_are_one_sentence() -> None:
     both = named("uniform-drag-excess", "grease-drag")
     content = campaign_diagnosis(search(DESIGN, data(DESIGN, both, (0.117, 2e-5), seed=5)), {})

@@ -27,7 +27,7 @@ from pendpipe.campaign.fit import (
     only,
     predict,
 )
-from pendpipe.estimate import chi_square_p_value
+from pendpipe.estimate import LISTED, Estimate, averaged, chi_square_p_value
 from pendpipe.templates import render
 
 CLASS_CHI2: Final = 6.0
@@ -479,6 +479,7 @@ def campaign_diagnosis(
         "patterns": causes(search),
         "left_out": [far._asdict() for far in search.left_out],
         "numbers": {name: _shown(fit) for name, fit in _with_and_without(search).items()},
+        "quoted": {"hysteretic_coefficient": quoted_coefficient(search).as_json()},
         "priors": {
             "nothing_missing": NOTHING_MISSING,
             "expected_size": {name: each.expected for name, each in CATALOGUE.items()},
@@ -523,6 +524,30 @@ def _with_and_without(search: CampaignSearch) -> dict[str, JointFit]:
         )
         for name, each in answers.items()
     }
+
+
+def quoted_coefficient(search: CampaignSearch) -> Estimate:
+    """Return k averaged over the causes that share the probability.
+
+    Each is fitted; so is "nothing" in the place of the last one. What is left to 1 is "none of
+    these": the fit with all that was found, its error widened by what it leaves.
+    """
+    improved = search.improved
+    own = coefficient(improved)
+    widened = math.sqrt(max(improved.chi2 / max(improved.degrees_of_freedom, 1), 1.0))
+    described = list[tuple[float, Estimate]]()
+    if search.found:
+        last, before = (
+            search.found[-1],
+            [search.baseline, *(one.leader for one in search.found)][-2],
+        )
+        fits = [(last.probability, last.leader), (last.nothing, before)]
+        fits += [(probability, rival) for rival, probability in last.rivals]
+        described = [(probability, coefficient(fit)) for probability, fit in fits]
+    rest = max(1.0 - sum(probability for probability, _ in described), 0.0)
+    described.append((rest, Estimate(own.value, widened * own.sd, own.unit)))
+    counted = [each for each in described if each[0] >= LISTED] or described
+    return averaged([each for _, each in counted], [probability for probability, _ in counted])
 
 
 def _shown(fit: JointFit) -> dict[str, Any]:
@@ -668,6 +693,7 @@ def statement(
         left=left,
         numbers=_with_and_without(search) if search.whole else {},
         coefficient=coefficient,
+        quoted=quoted_coefficient(search),
         expected=expected,
         effects=len(CATALOGUE),
         copies=copies,

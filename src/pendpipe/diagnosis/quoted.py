@@ -25,12 +25,10 @@ from pendpipe.diagnosis.remainder import with_errors
 from pendpipe.diagnosis.rivals import Rival
 from pendpipe.diagnosis.values import constants_of, quality_factors_of, small_periods
 from pendpipe.diagnosis.weighing import Weighed
-from pendpipe.estimate import Estimate, averaged, over
+from pendpipe.estimate import LISTED, Estimate, averaged, over
 
 _STARTS: Final = 2
 """Fits of other descriptions from which one begins: those that have most in common with it."""
-LISTED: Final = 0.05
-"""Probability from which a description counts; as from which a rival is listed."""
 Numbers = Mapping[Any, Estimate]
 """Quantities by name, and Q by amplitude."""
 

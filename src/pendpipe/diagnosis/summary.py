@@ -421,7 +421,7 @@ def _matters(diagnosis: Diagnosis, changes: Sequence[Change], unit: str) -> str:
         f" {replace(each.with_missing, unit=each.fitted.unit).or_limit()}"
         for each in moved
     ]
-    what = ", ".join(words) if words else "no number moves by two standard deviations"
+    what = ", ".join(words) if words else "no number moves by two sd"
     return f"the fit misses the readings by {left} (noise {noise}): {what}"
 
 

@@ -32,6 +32,7 @@ from pendpipe.diagnosis.values import effect_parameters
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.curves import Curve
+from pendpipe.estimate import LISTED
 
 _CLEAN_CHARGE: Final = 5.0
 """Charge (in chi^2) against "none of these" if the model leaves only noise: then one effect
@@ -39,8 +40,6 @@ without rivals in thirteen is wrong, as on opened challenges."""
 _OF_A_FURTHER_NAME: Final = 2.2
 """Charge for "none of these" for each further name: on an opened set of apparatus 93 % of single
 names were right, 76 % of those beside another, 45 % of those beside two."""
-_LISTED_FROM: Final = 0.05
-"""Probability from which an unnamed curve is listed among the rivals."""
 _SEEN_IN_RESIDUAL: Final = (*RANDOM, "coloured-noise")
 """Faults detected in a residual: the misfit of a curve can look like any of them."""
 _LIKELIER: Final = 1.5
@@ -128,7 +127,7 @@ def effect_named(found: Hypothesis, step: Step, weighed: Weighed) -> FoundEffect
         tuple(
             (mate.identifier, float(weight))
             for mate, weight in zip(mates, weights[1:], strict=False)
-            if weight > _LISTED_FROM or not mate.drawn
+            if weight > LISTED or not mate.drawn
         ),
         effect.discriminating_test,
         locate(without, found.fit, found.data, effect),
