@@ -11,11 +11,29 @@ import pytest
 from benchmarks.apparatus import draw, solved
 from benchmarks.check import challenge_faults
 from benchmarks.consistency import FEWEST_CYCLES, KINDS, Truth, draw as drawn_at, judge, recorded
+from benchmarks.journal import ROOT
 
-from benchmarks import journal, known_physics as known, null_families as nulls
+from benchmarks import house, journal, known_physics as known, null_families as nulls
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.effects.catalogue import CATALOGUE
 from pendpipe_challenge.score import CONFIDENT, Solved, questions
+
+# A folder grows where its row says why, and the ways to one thing are those that stand there.
+
+
+def test_a_folder_keeps_its_budget_of_statements_or_its_row_says_why_it_was_raised() -> None:
+    sizes, table = house.by_folder(ROOT), {row["folder"]: row for row in house.rows("budgets.tsv")}
+    assert sizes.keys() == table.keys()
+    over = {name: n for name, n in sizes.items() if n > int(table[name]["budget"])}
+    assert not over, f"take something out, or raise its row in benchmarks/budgets.tsv: {over}"
+    raised = {name for name, row in table.items() if int(row["budget"]) > int(row["f501561d"])}
+    assert not [name for name in raised if len(table[name]["reason"].split()) < 3]
+
+
+@pytest.mark.parametrize("row", house.rows("concepts.tsv"), ids=lambda row: row["concept"])
+def test_each_way_to_one_thing_stands_where_the_table_says(row: dict[str, str]) -> None:
+    assert house.ways(ROOT, row["definitions"]) == row["definitions"].split()
+
 
 # The judge of apparatus: items by set and number, and what an answer about one is worth.
 
