@@ -15,8 +15,10 @@ import pytest
 import pendpipe as pp
 from pendpipe import cli, manifest
 from pendpipe.dynamics import Eq8, Release, sample
+from pendpipe.estimate import Estimate
 from pendpipe.quantities import with_error
 from pendpipe.recording import write_plain
+from pendpipe.report.class_table import _together
 
 # `pendpipe fit` answers: one recording or many, as a summary, a table, JSON or a figure.
 
@@ -116,6 +118,20 @@ def test_the_files_of_a_class_that_agree_are_put_together(tmp_path: Path, answer
     mean = together["T0"]["mean"]
     assert abs(mean["value"] - 1.0 / 0.7) < 4.0 * mean["sd"]
     assert together["T0"]["p_value"] > 1e-3
+
+
+@pytest.mark.parametrize(("sd", "says"), [(0.1, "they agree"), (0.02, "they differ by more")])
+def test_values_agree_where_chance_gives_their_chi_square(sd: float, says: str) -> None:
+    """Of three values chi^2 is beyond its value by exp(-chi^2/2): two degrees of freedom."""
+    together = _together(
+        "T0", [Estimate(value, sd, "s") for value in (0.8, 1.0, 1.2)], 4, mean=True
+    )
+    assert together.mean.value == pytest.approx(1.0)
+    assert together.mean.sd == pytest.approx(sd / math.sqrt(3.0))
+    assert together.chi2 == pytest.approx(2.0 * (0.2 / sd) ** 2)
+    assert together.p_value == pytest.approx(math.exp(-0.5 * together.chi2))
+    assert says in str(together)
+    assert "mean of 3 files (1 far from them left out)" in str(together)
 
 
 TIME = np.arange(0.0, 60.0, 0.02)
