@@ -149,9 +149,11 @@ def test_q_of_a_description_is_that_of_its_losses(
     """What shifts, knocks or bends a swing takes no energy from it."""
     fit = with_effect(by_identifier(identifier), values)
     a, b, c = TRUTH[:3]
-    for amplitude, found in quality_factors_of(fit, [0.12, 0.1, 0.08]).items():
+    for amplitude, found in quality_factors_of(fit, [0.149, 0.12, 0.1, 0.08]).items():
         by_losses = math.pi * FREQUENCY_HZ / (a * amplitude + b + c / amplitude)
-        assert found.value == pytest.approx(by_losses, rel=6e-4)
+        # Near the first turning point half of what is asked for is extrapolated.
+        within = 0.012 if amplitude > 0.14 else 6e-4
+        assert found.value == pytest.approx(by_losses, rel=within)
 
 
 def test_q_is_with_the_period_that_losses_do_not_lengthen() -> None:

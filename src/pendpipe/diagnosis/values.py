@@ -142,6 +142,10 @@ def _with_errors(
     return centre, _errors(jacobian, fit.covariance())
 
 
+_FEWEST_TURNING_POINTS: Final = 6
+"""Of which two are known with two neighbours on each side."""
+
+
 def quality_factors_of(fit: Fit, amplitudes: Sequence[float]) -> dict[float, Estimate]:
     """Return Q of a model's motion by amplitude: pi over the relative loss in a period about it.
 
@@ -156,10 +160,16 @@ def quality_factors_of(fit: Fit, amplitudes: Sequence[float]) -> dict[float, Est
         pieces = model.follow(model.settled(value))
         motion = pieces[-1][1]
         turned_s, turning = motion.time_s[:, 0], motion.amplitude[:, 0]
-        # What alternates from turning point to turning point is no amplitude.
-        shift = 0.5 * (np.sqrt(turning[:-2] * turning[2:]) - turning[1:-1])
-        shift = 0.5 * shift[1:-1] - 0.25 * (shift[:-2] + shift[2:])
-        log_amplitude = np.log(turning + np.pad(shift, 2))
+        if len(turning) < _FEWEST_TURNING_POINTS:
+            return np.full(len(wanted), math.nan)
+        # What alternates from turning point to turning point is no amplitude; it changes smoothly.
+        side = 1.0 - 2.0 * (np.arange(len(turning)) % 2)
+        bent = side[1:-1] * (np.sqrt(turning[:-2] * turning[2:]) - turning[1:-1])
+        inner = 0.25 * bent[1:-1] + 0.125 * (bent[:-2] + bent[2:])
+        first, last = inner[0] - inner[1], inner[-1] - inner[-2]
+        begins = inner[0] + first * np.array([2.0, 1.0])
+        ends = inner[-1] + last * np.array([1.0, 2.0])
+        log_amplitude = np.log(turning + side * np.concatenate([begins, inner, ends]))
         free = np.full(len(turning) - 2, True)
         for kicked_s, _ in pieces[1:]:
             # It begins half a cycle early, where the motion is smooth; and a shift has neighbours.
