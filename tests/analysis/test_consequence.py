@@ -184,8 +184,8 @@ def test_the_amplitude_falls_to_a_half_and_to_1_e_when_the_fit_says(name: str) -
 
 
 def test_a_time_beyond_the_recording_is_called_extrapolated() -> None:
-    """Halved after 30 s, and down to 1/e after 40 s."""
-    for until, said in ((1000, "s, both extrapolated"), (1700, "s (extrapolated)"), (3100, "s")):
+    """Halved after 23 s, and down to 1/e after 33 s."""
+    for until, said in ((1000, "s, both extrapolated"), (1500, "s (extrapolated)"), (3100, "s")):
         assert re.search(rf"[0-9)] {re.escape(said)}; log", str(fitted(viscous(TIME[:until]))))
 
 

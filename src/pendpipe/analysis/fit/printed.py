@@ -17,6 +17,7 @@ from pendpipe.analysis.fit.quality import (
     OVERDAMPED,
     SEEN,
     Quality,
+    mean_square,
     period_of_frequency,
     small_period,
 )
@@ -350,10 +351,9 @@ def _lengthening(result: FitResult) -> float | None:
         return 1.0
     unit = result.parameters["amplitude"].unit
     length = {"rad": math.inf, "m": result.length.value if result.length else None}.get(unit)
-    squares = [each.amplitude_rad**2 for each in result.quality_factors]
-    if length is None or not squares:
+    if length is None:
         return None
-    size = math.sqrt(sum(squares) / len(squares))
+    size = math.sqrt(mean_square(result))
     angle = size if unit == "rad" else math.asin(min(size / length, 1.0))
     return float(swing_phase(np.array([min(angle, TOP)] * 2), "sine")[0]) / math.pi
 

@@ -254,6 +254,12 @@ def _times(estimate: Estimate, factor: float, unit: str) -> Estimate:
     return Estimate(factor * estimate.value, factor * estimate.sd, unit)
 
 
+def mean_square(result: FitResult) -> float:
+    """Mean of the squares of a large, a middle and a small amplitude, by which the period grows."""
+    seen = [check.amplitude_rad for check in result.decrement_check]
+    return float(np.mean(np.square(seen or [result.value("amplitude")])))
+
+
 def small_period(result: FitResult) -> Estimate:
     """Period 1/f of Eq. 8's frequency, s: with the torque of sin x that of small amplitudes.
 

@@ -18,6 +18,7 @@ from pendpipe.analysis.fit.goodness import LEVEL, Goodness, combined
 from pendpipe.analysis.fit.least_squares import CHI2_95
 from pendpipe.analysis.fit.printed import html, lines, pendulum_of
 from pendpipe.analysis.fit.quality import (
+    mean_square,
     qualities,
     quality_at,
     released_quality,
@@ -597,8 +598,7 @@ def with_scale(result: FitResult, scale_percent: float) -> FitResult:
     """
     powers = {"amplitude": 1.0, "offset": 1.0, "c": 1.0, "a": -1.0}
     if result.restoring == "sine":
-        squares = [each.amplitude_rad**2 for each in result.quality_factors]
-        powers["frequency"] = sum(squares) / max(len(squares), 1) / 8.0
+        powers["frequency"] = mean_square(result) / 8.0
     return replace(_stretched(result, powers, 0.01 * scale_percent), scale_percent=scale_percent)
 
 
