@@ -21,6 +21,8 @@ truth. Real ones are rows of `known_physics.tsv` (``record``), read in ``../shar
 ``known``
     Of a real recording: what its row of the table knows, and names that would be wrong.
 
+A recording that is to be ``drawn`` has its figures and its page made, too.
+
 What is answered wrongly today stands in ``missed``, by question, with what is said instead.
 """
 
