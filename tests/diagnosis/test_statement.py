@@ -12,7 +12,7 @@ import pytest
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.held_out import HeldOut
-from pendpipe.diagnosis.location import curve_told, locate
+from pendpipe.diagnosis.location import curve_told, locate, mains_of
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import Remainder, remainder_of, with_errors
@@ -586,6 +586,8 @@ def test_a_tone_of_the_mains_is_known_behind_its_alias(tone_hz: float, says: str
     start = np.append(bare.value, [3e-4, 0.0, tone_hz])
     found = locate(bare, refine(bare.model.adding(tone), data, noise, start), data, tone)
     assert found.mains == says
+    twice = replace(data, fold=2)  # means of two readings, of 30 a second
+    assert mains_of(Estimate(tone_hz, 1e-4, "Hz"), twice) == says.replace("15", "30")
     assert found.summary.endswith(says)
     assert ("50 Hz" in numbers_of(replace(named("tone-pickup"), location=found))) == bool(says)
 

@@ -130,7 +130,9 @@ def mains_of(line: Estimate, data: Data) -> str:
             if taken > _BY_CHANCE:
                 return ""
             if abs(abs(mains - rate * round(mains / rate)) - line.value) < within:
-                folded = f" folded at {rate:.4g} readings a second" if mains > 0.5 * rate else ""
+                recorded = rate * data.fold * data.every  # the means of some are analysed
+                folded = f" folded at {recorded:.4g} readings a second"
+                folded = folded if mains > 0.5 * recorded else ""
                 return f"{mains:g} Hz{folded or ' of the mains'}"
     return ""
 
