@@ -113,8 +113,9 @@ def fit_amplitudes(
     if sine:
         decays = [(drag, partial(pendulum_decay, s, drag)) for drag in _DRAGS for s in shares]
     rough = min((fit_envelope(points, held.envelope, each) for _, each in decays), key=_misfit)
-    left = float(rough.residual @ rough.residual)
-    scatter = max(math.sqrt(left / freedom), quantisation_rms(step))
+    scatter = max(
+        math.sqrt(float(rough.residual @ rough.residual) / freedom), quantisation_rms(step)
+    )
     sd = max(scatter, _FINEST * first) * _students(freedom)
     points = replace(points, angle_sd_rad=np.full(len(points), sd))
     fits = [(drag, fit_envelope(points, held.envelope, decay)) for drag, decay in decays]
