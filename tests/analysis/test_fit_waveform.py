@@ -202,7 +202,7 @@ def test_fit_json_is_read_as_it_was_written() -> None:
         "hysteretic_share",
         "clock_ppm",
         "scale_percent",
-        "widening",
+        "backbone",
         "damping",
         "quality_factor_limit",
         "quality_factor_hysteretic",

@@ -16,7 +16,7 @@ import pendpipe
 import pendpipe as pp
 from pendpipe import cli
 from pendpipe.analysis.fit import fit_recording
-from pendpipe.analysis.fit.decrement import Check, check_decrement, loss_of, seen_loss
+from pendpipe.analysis.fit.decrement import check_decrement, loss_of, seen_loss
 from pendpipe.analysis.fit.goodness import LEVEL, judge
 from pendpipe.analysis.fit.quality import seen_qualities
 from pendpipe.analysis.turning_points import TurningPoints
@@ -97,9 +97,11 @@ def test_a_fit_names_the_rate_that_inspect_names(rate: float, digits: int) -> No
 
 def test_a_loss_within_its_error_shows_no_q() -> None:
     fit = pp.fit(clean(Eq8(5.0, viscous=0.02), 0.2, np.arange(0.0, 60.0, 0.02), 2e-4))
-    checks = (Check(0.2, 0.02, 1e-6, 1e-3), Check(0.1, 0.02, 0.02, 1e-3))
-    (seen,) = seen_qualities(replace(fit, decrement_check=checks))
-    assert seen.quality_factor.value == pytest.approx(5.0 / (2.0 * 0.02), rel=1e-3)
+    first, *_, last = fit.decrement_check
+    sd = np.where(fit.backbone.amplitude_rad > last.amplitude_rad, 1e-3, 1.0)
+    shown = replace(fit.backbone, decrement_sd=sd)
+    (seen,) = seen_qualities(replace(fit, shown=shown, decrement_check=(first, last)))
+    assert seen.quality_factor.value == pytest.approx(5.0 / (2.0 * 0.02), rel=0.02)
 
 
 def test_uneven_times_stay_as_they_are() -> None:

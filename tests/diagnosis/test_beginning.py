@@ -270,7 +270,8 @@ def same(one: Mapping[str, Estimate], other: Mapping[str, Estimate], view: View)
         elif name != "phase":
             assert abs(other[name].value) == pytest.approx(value * factor, rel=1e-3), name
         if name != "phase" or not view.later_s:
-            assert other[name].sd == pytest.approx(estimate.sd * factor, rel=1e-3), name
+            # A spread that turning points ask for: they are the same to 1e-3 (`fits_agree`).
+            assert other[name].sd == pytest.approx(estimate.sd * factor, rel=3e-3), name
 
 
 @functools.cache

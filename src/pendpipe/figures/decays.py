@@ -4,7 +4,7 @@ Each draws the law that was fitted, and names it in its key.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +16,7 @@ from scipy.interpolate import make_interp_spline
 
 from pendpipe import physics
 from pendpipe.analysis.fit.by_points import fit_envelope
-from pendpipe.analysis.fit.quality import relative_loss_sd, seen_qualities
+from pendpipe.analysis.fit.quality import period_of, relative_loss_sd
 from pendpipe.analysis.fit.result import FitResult, read_fit
 from pendpipe.analysis.turning_points import TurningPoints, read_turning_points
 from pendpipe.arrays import FloatArray
@@ -333,19 +333,36 @@ def local_quality(decay: Decay) -> FloatArray:
     FloatArray
         Time, Q and its standard deviation, shape (3, n).
     """
-    rows, first = [], 0
+    rows = []
     time, y, sd = decay.points.time_s, decay.amplitude_rad, decay.points.angle_sd_rad
-    for last in range(1, len(time)):
-        if min(y[first], y[last]) <= 10.0 * max(sd[first], sd[last]):
-            break
-        if y[last] > FALL * y[first]:
-            continue
+    for first, last in _spans(decay):
         decrement = np.log(y[first] / y[last])
         half_cycles = decay.points.half_cycle[last] - decay.points.half_cycle[first]
         value = 0.5 * np.pi * half_cycles / decrement
         spread = value * np.hypot(sd[first] / y[first], sd[last] / y[last]) / decrement
         rows.append((0.5 * (time[first] + time[last]), value, spread))
-        first = last
+    return np.array(rows, dtype=np.float64).reshape(-1, 3).T
+
+
+def _spans(decay: Decay) -> Iterator[tuple[int, int]]:
+    """First and last turning point of spans in which the amplitude falls to `FALL`."""
+    y, sd, first = decay.amplitude_rad, decay.points.angle_sd_rad, 0
+    for last in range(1, len(y)):
+        if min(y[first], y[last]) <= 10.0 * max(sd[first], sd[last]):
+            return
+        if y[last] <= FALL * y[first]:
+            yield first, last
+            first = last
+
+
+def local_period(decay: Decay) -> FloatArray:
+    """Amplitude, mean period and its standard deviation in the spans of `local_quality`, (3, n)."""
+    points, rows = decay.points, []
+    for first, last in _spans(decay):
+        cycles = 0.5 * float(points.half_cycle[last] - points.half_cycle[first])
+        lasts, sd = points.time_s[last] - points.time_s[first], points.time_sd_s[[first, last]]
+        amplitude = float(np.mean(decay.amplitude_rad[first : last + 1]))
+        rows.append((amplitude, lasts / cycles, float(np.hypot(*sd)) / cycles))
     return np.array(rows, dtype=np.float64).reshape(-1, 3).T
 
 
@@ -414,17 +431,18 @@ def draw_fit(decay: Decay, recording: Recording) -> Figure:
     Returns
     -------
     Figure
-        Three panels: readings with the fitted amplitude; turning points less the fitted law;
-        Q against amplitude, with the Q that the turning points show without a model.
+        Four panels: readings with the fitted amplitude; turning points less the fitted law; period
+        and Q against amplitude, by the law and as the turning points show them without one: in
+        spans, and as the smooth curve with its 95 % band (`FitResult.backbone`).
     """
-    readings, quality = _readings(decay, recording), _quality_by_amplitude(decay)
+    readings, backbone = _readings(decay, recording), _by_amplitude(decay)
     about = {name: readings.about[name] for name in ("xlabel", "xlim")}
     return figure_of(
-        6.6,
+        4.6 + 2.0 * len(backbone),
         readings,
         _residual(decay, about),
-        *quality,
-        shares=(1.3, 0.7, 1.0)[: 2 + len(quality)],
+        *backbone,
+        shares=(1.3, 0.7, 1.0, 1.0)[: 2 + len(backbone)],
         sharex=False,
     )
 
@@ -459,8 +477,7 @@ def draw_sheet(decay: Decay, recording: Recording) -> Figure:
     Figure
         Two panels for one printed sheet.
     """
-    quality = _quality_by_amplitude(decay)
-    panels = (_readings(decay, recording), *quality)
+    panels = (_readings(decay, recording), *_by_amplitude(decay)[-1:])
     return figure_of(4.9, *panels, shares=(1.2, 1.0)[: len(panels)], sharex=False)
 
 
@@ -470,28 +487,48 @@ def draw_residual(decay: Decay) -> Figure:
     return figure_of(2.2, _residual(decay, {"xlabel": "Time (s)"}))
 
 
-def _quality_by_amplitude(decay: Decay) -> tuple[Panel, ...]:
-    """Q against amplitude; nothing of amplitudes without a period."""
+def _by_amplitude(decay: Decay) -> tuple[Panel, ...]:
+    """Period and Q against amplitude; nothing of amplitudes without a period."""
     amplitude, quality = decay.along(np.linspace(0.0, float(decay.elapsed_s[-1]), 400))
     if np.isnan(quality).all():
         return ()
-    factor, unit = axis_unit(decay.amplitude_rad, decay.points.unit)
-    marks = []
-    if decay.fit.light != "red":
+    fit, (factor, unit) = decay.fit, axis_unit(decay.amplitude_rad, decay.points.unit)
+    shown, has_law, label = fit.backbone, fit.light != "red", "curve through them, 95 %"
+    periods: list[Mark] = []
+    marks: list[Mark] = []
+    if shown is not None:
+        y = factor * shown.amplitude_rad
+        seen = shown.amplitude_rad >= 0.999 * shown.seen_rad[1]
+        of_loss = shown.decrement_sd / shown.decrement
+        value = np.pi / (shown.period_s * shown.decrement)
+        for panel, curve_, sd in (
+            (periods, shown.period_s, shown.period_sd),
+            (marks, value, value * of_loss),
+        ):
+            panel.append(band(y[seen], curve_[seen], 1.96 * sd[seen], label=label))
+            panel.append(curve(y[seen], curve_[seen], BLUE, width=0.8))
+    if has_law:
         marks.append(curve(factor * amplitude, quality, label="fitted law"))
-    seen = [
-        (factor * each.amplitude_rad, each.quality_factor.value, each.quality_factor.sd)
-        for each in seen_qualities(decay.fit)
-    ]
-    if not (seen or marks):
+        law = [period_of(fit, each) for each in amplitude.tolist()]
+        periods.append(curve(factor * amplitude, law, label="fitted law"))
+    if not marks:
+        # Two modes that beat lose nothing that is theirs.
         return ()
-    marks.append(_measured_quality(*np.array(seen).reshape(-1, 3).T))
-    limit = decay.fit.quality_factor_limit
+    when, *q = local_quality(decay)
+    place = np.interp(when, decay.points.time_s, decay.amplitude_rad)
+    marks.append(_measured_quality(factor * place, *q))
+    place, *of_time = local_period(decay)
+    periods.append(_measured_quality(factor * place, *of_time))
+    limit = fit.quality_factor_limit
     if limit is not None and 3.0 * limit.sd < limit.value < 2.0 * float(np.nanmax(quality)):
         marks.append(level(limit.value, GREY, 1.4, linestyle=":", label="limit πf/b"))
     largest, least = float(np.max(amplitude)), float(np.min(amplitude))
     # Dry friction ends the fitted motion: zero stands on no logarithmic axis.
     if 0.0 < 5.0 * least < largest:
         marks.append(logarithmic("x", largest / least))
+        periods.append(logarithmic("x", largest / least))
     about = {"xlabel": f"Amplitude ({unit})", "ylabel": "Q", "ylim": (0.0, None)}
-    return (Panel(marks, about, key=2),)
+    found = Panel(marks, about, key=2)
+    if shown is None or np.isnan(shown.period_s).all():
+        return (found,)
+    return Panel(periods, {"ylabel": "Period (s)"}), found

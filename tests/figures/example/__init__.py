@@ -115,7 +115,6 @@ def write_record(folder: Path, name: str, truth: Truth, seed: int) -> dict[str, 
         "light": "green",
         "light_reason": "",
         "quotable": [],
-        "widening": {"period": 1.0, "losses": 1.0},
         "period_check": [],
         "decrement_check": [],
     }

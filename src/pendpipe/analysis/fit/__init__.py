@@ -118,7 +118,7 @@ def fit_recording(
         # What its turning points lose is no mode's loss, and their period none's.
         why = f"{points.beats}; Eq. 8 has one"
         alone: dict[str, Any] = {"decrement_check": (), "other_frequency": None, "quotable": ()}
-        return replace(result, light="red", light_reason=why, **alone)
+        return replace(result, light="red", light_reason=why, shown=None, **alone)
     by_points = result.method == "turning-points"
     swing = result["amplitude"].value if by_points else 0.5 * float(np.ptp(samples.values))
     missed = result.residual_rms_rad / abs(swing)

@@ -200,6 +200,7 @@ def _with_held(
 
 
 _LATE: Final = 3.0
+"""Variance of the times over their own beyond which they are late as no law has it."""
 
 
 def envelope_and_period(
@@ -270,7 +271,10 @@ def fit_points(
         points,
         held.law(period.angular_frequency, envelope.value[:3].tolist(), restoring),
         goodness=Goodness(
-            points.noise_rms_rad, envelope.chi2_per_dof, (p_value,), max(stretched, 1.0)
+            points.noise_rms_rad,
+            envelope.chi2_per_dof,
+            (p_value, tail(period.chi2_per_dof / _LATE, freedom, 1e9)),
+            max(stretched, 1.0),
         ),
         said=[late] if period.chi2_per_dof > _LATE else [],
         fixed=fixed,

@@ -22,7 +22,7 @@ FALLS: Final = {"damping_time_s": math.exp(-1.0), "half_life_s": 0.5}
 def damping_of(result: FitResult) -> dict[str, Estimate]:
     """Return other measures of the loss at the largest amplitude of `quality.qualities`.
 
-    ``half_life_s`` and ``damping_time_s``, the times in which the fitted law (with a red light:
+    ``half_life_s`` and ``damping_time_s``, the times in which the fitted law (where it is refuted:
     what the turning points show) takes that amplitude to a half and to 1/e of it; NaN where the
     motion stops before, infinite without a loss. ``logarithmic_decrement``, pi/Q, is that of one
     period at ``amplitude_rad``.
@@ -49,23 +49,13 @@ def is_extrapolated(result: FitResult, amplitude: float) -> bool:
 
 def _falls(result: FitResult, amplitude: float, part: float) -> Estimate:
     """The time to a part of an amplitude, with its error."""
-    if result.light == "red":
-        return _seen_to_fall(result, amplitude, part)
+    shown = result.lawless
+    if shown is not None:
+        return shown.fall(amplitude, part)
     time_s, gradient = fall_time(result.law, amplitude, part)
     covariance = result.covariance_of("a", "b", "c")
     sd = math.sqrt(max(float(gradient @ covariance @ gradient), 0.0))
     return Estimate(time_s, sd if math.isfinite(time_s) else time_s, "s")
-
-
-def _seen_to_fall(result: FitResult, amplitude: float, part: float) -> Estimate:
-    """The same by the losses that the turning points show, the last one going on."""
-    checks = sorted(result.decrement_check)
-    logs = np.linspace(math.log(part * amplitude), math.log(amplitude), 101)
-    own = np.log([each.amplitude_rad for each in checks])
-    loss = np.interp(logs, own, [each.seen for each in checks])
-    relative = np.interp(logs, own, [each.seen_sd / each.seen for each in checks])
-    time_s, sd = np.trapezoid([1.0 / loss, relative / loss], logs)
-    return Estimate(float(time_s), float(sd), "s")
 
 
 def fall_time(law: Eq8, amplitude: float, part: float) -> tuple[float, FloatArray]:

@@ -19,7 +19,7 @@ from pendpipe.quantities import compact, with_error
 Light = Literal["green", "amber", "red"]
 TOLERANCE: Final = 0.05
 """Part of the decrement by which a law may miss it whatever the errors are."""
-_CONFIRMED: Final = 0.10
+CONFIRMED: Final = 0.10
 """A decrement known worse than this confirms nothing."""
 _CERTAIN: Final = 3.9
 """Standard deviations from which a difference contradicts: three such questions are asked among
@@ -81,7 +81,7 @@ class Check(NamedTuple):
     @property
     def confirms(self) -> bool:
         """Whether they agree, and so closely that this says something."""
-        return not self.misses(_CERTAIN) and self.seen_sd <= _CONFIRMED * abs(self.seen)
+        return not self.misses(_CERTAIN) and self.seen_sd <= CONFIRMED * abs(self.seen)
 
     def sentence(self, unit: str) -> str:
         """Say it in a clause."""
@@ -118,11 +118,11 @@ def check_decrement(points: TurningPoints, law: Eq8) -> tuple[Check, ...]:
         return ()
     found = _seen(clear)
     part = clear
-    while not found[-1][2] <= _CONFIRMED * abs(found[-1][1]) and len(part) > 3 * _FEWEST:
+    while not found[-1][2] <= CONFIRMED * abs(found[-1][1]) and len(part) > 3 * _FEWEST:
         # The smallest amplitude at which the decrement is seen well.
         part = part.first(int(0.95 * len(part)))
         further = _seen(part)
-        if further[-1][2] <= _CONFIRMED * abs(further[-1][1]):
+        if further[-1][2] <= CONFIRMED * abs(further[-1][1]):
             found = further
     return tuple(
         Check(amplitude, loss_of(law, amplitude), loss, sd, scatter)

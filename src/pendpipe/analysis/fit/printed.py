@@ -162,13 +162,13 @@ def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
         return
     unit, has_law = result.parameters["amplitude"].unit, result.light != "red" or law
     qualities = result.quality_factors
-    period, wide = result.period, result.widening
+    period = result.period
     small = "period, small swings" if result.restoring == "sine" else "period"
     text = with_error(period.value, period.sd, "s", short=True)
     if result.method == "amplitudes":
         text = f"{text}, as given" if math.isfinite(period.value) else _TIMELESS
-    elif result.light == "red":
-        text += f", {WITHOUT_LAW}" if result.period_check else ""
+    elif result.lawless is not None:
+        text += f", {WITHOUT_LAW}"
     elif result.restoring == "sine" and qualities:
         large = qualities[0]
         text += f"  ({large.period_s:.5g} s at {short_size(large.amplitude_rad, unit)})"
@@ -176,7 +176,7 @@ def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
         if result.restoring == "linear":
             text += f"; {_OF_AN_ANGLE}"
         text += "; twice that, if the axis lies along the string (--column)"
-    yield small, text + _widened(wide.period if result.light != "red" else 1.0)
+    yield small, text
     by_clock = period.sd < _CLOCK * period.value and result.method != "amplitudes"
     if by_clock and result.clock_ppm is None:
         moved = with_error(float(f"{_CLOCK * period.value:.1g}"), None, "s")
@@ -186,7 +186,8 @@ def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
             f"{_number(each.quality_factor)} at {size(each.amplitude_rad, unit)}"
             for each in qualities
         )
-        without = f", {WITHOUT_LAW}" if result.light == "red" else _widened(wide.losses)
+        lawless = result.light == "red" or result.lawless is not None
+        without = f", {WITHOUT_LAW}" if lawless else ""
         if math.isfinite(period.value):
             yield "Q", found + without
         yield "damping", damping(result)
@@ -197,11 +198,6 @@ def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
     yield "law", f"−dy/dt = a y² + b y + c: {_law(result)}"
     yield "misfit", misfit(result)
     yield from _pendulum_line(result)
-
-
-def _widened(factor: float) -> str:
-    times = f"{factor:.0f}" if factor > 9.95 else f"{factor:.2g}"
-    return f"  (error × {times} for what the law misses)" if factor > 1.05 else ""
 
 
 def damping(result: FitResult) -> str:
@@ -288,7 +284,7 @@ def sentence(result: FitResult) -> str:
         said.append(f"{period_name(result)} = {with_error(period.value, period.sd, 's')}")
     known = list(result.quality_factors)
     if result.light != "red":
-        doubted = [each for some in unsure(result) for each in some]
+        doubted = unsure(result)[1]
         checks = result.decrement_check or [None] * len(known)
         known = [each for each, seen in zip(known, checks, strict=False) if seen not in doubted]
     known = [each for each in known if not each.quality_factor.value < LEAST_QUALITY]
@@ -303,7 +299,8 @@ def sentence(result: FitResult) -> str:
     if not said:
         return "nothing of this fit can be quoted."
     of = "amplitudes" if result.method == "amplitudes" else "turning points"
-    without = f" (from the {of}, without a law)" if result.light == "red" else ""
+    lawless = result.light == "red" or result.lawless is not None
+    without = f" (from the {of}, without a law)" if lawless else ""
     return f"{'; '.join(said)}{without}."
 
 
@@ -333,7 +330,8 @@ def pendulum_of(result: FitResult) -> dict[str, Estimate]:
     With the torque of sin x the fitted omega is omega_0, that of small swings. Otherwise
     omega_0 = omega 2 K(sin(y/2))/pi at the root-mean-square angle y, where that is known.
     """
-    period = small_period(result)
+    linear = result.restoring == "linear"
+    period = period_of_frequency(result["frequency"]) if linear else small_period(result)
     omega = math.tau / period.value * (_lengthening(result) or 1.0)
     relative = 2.0 * period.sd / period.value
     if result.length is not None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from pendpipe.analysis.fit.backbone import Backbone
 from pendpipe.analysis.fit.decrement import Light, losses_of
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
@@ -89,33 +90,45 @@ class Quality:
 def qualities(result: FitResult) -> tuple[Quality, ...]:
     """Q and the shares of the losses at the release, a middle and a small amplitude of the decay.
 
-    The fitted law's, or what the turning points show where the light is red.
+    The fitted law's; Q is what the turning points show where the law is refuted, and with a red
+    light there are no shares.
     """
     if result.light == "red":
         return seen_qualities(result)
     smaller = [check.amplitude_rad for check in result.decrement_check[1:]]
     wanted = dict.fromkeys([result.parameters["amplitude"].value, *smaller])
-    return tuple(quality_by_law(result, amplitude) for amplitude in wanted)
+    return tuple(_quality(result, amplitude) for amplitude in wanted)
 
 
 def seen_qualities(result: FitResult) -> tuple[Quality, ...]:
     """Return the amplitudes and quality factors that the turning points show without a law."""
+    if (shown := result.backbone) is None:
+        return ()
+    found = (_seen_quality(result, shown, each.amplitude_rad) for each in result.decrement_check)
     return tuple(
-        Quality(
-            check.amplitude_rad,
-            Estimate(1.0 / check.seen, check.seen_sd / check.seen**2, "s"),
-            period_of(result, check.amplitude_rad),
-            {},
-        )
-        for check in result.decrement_check
-        if check.seen > SEEN * check.seen_sd
+        each for each in found if 0.0 < SEEN * each.damping_time_s.sd < each.damping_time_s.value
     )
+
+
+def _quality(result: FitResult, amplitude: float) -> Quality:
+    """The law's, or what the turning points show where it is refuted; with the law's shares."""
+    by_law, shown = quality_by_law(result, amplitude), result.lawless
+    if shown is None or not shown.reaches(amplitude):
+        return by_law
+    return replace(_seen_quality(result, shown, amplitude), losses=by_law.losses)
+
+
+def _seen_quality(result: FitResult, shown: Backbone, amplitude: float) -> Quality:
+    loss, period = shown.loss(amplitude), shown.period(amplitude).value
+    period = period if math.isfinite(period) else period_of(result, amplitude)
+    time = Estimate(1.0 / loss.value, loss.sd / loss.value**2, "s")
+    return Quality(amplitude, time, period, {})
 
 
 def quality_at(result: FitResult, amplitude_rad: float) -> Estimate:
     """Return Q at an amplitude, ``pi/(T loss)`` with the period and the loss there.
 
-    Of the law, or with a red light between the turning points' three.
+    Of the law, or what the turning points show where it is refuted.
 
     Parameters
     ----------
@@ -138,23 +151,17 @@ def quality_at(result: FitResult, amplitude_rad: float) -> Estimate:
         f"give a positive number of {unit}",
     )
     if result.light != "red":
-        return quality_by_law(result, amplitude_rad).quality_factor
-    seen = sorted(seen_qualities(result), key=lambda each: each.amplitude_rad)
-    ends = [seen[0].amplitude_rad, seen[-1].amplitude_rad] if seen else []
-    if not seen or not 0.9 * ends[0] <= amplitude_rad <= 1.2 * ends[1]:
-        where = f"from {ends[0]:.3g} to {ends[1]:.3g}{after_number(unit)}" if seen else "nowhere"
+        return _quality(result, amplitude_rad).quality_factor
+    shown = result.backbone
+    if shown is None or not shown.reaches(amplitude_rad):
+        ends = shown and (shown.amplitude_rad[-1], shown.amplitude_rad[0])
+        where = f"from {ends[0]:.3g} to {ends[1]:.3g}{after_number(unit)}" if ends else "nowhere"
         raise InputError(
             "amplitude_rad",
             f"no law describes this decay, and its turning points show Q {where}",
             "ask within, or fit a part of the recording",
         )
-    place = math.log(amplitude_rad)
-    x = [math.log(each.amplitude_rad) for each in seen]
-    value, sd = (
-        float(np.interp(place, x, [getattr(each.quality_factor, name) for each in seen]))
-        for name in ("value", "sd")
-    )
-    return Estimate(value, sd, "")
+    return _seen_quality(result, shown, amplitude_rad).quality_factor
 
 
 def released_quality(result: FitResult) -> Estimate:
@@ -163,7 +170,7 @@ def released_quality(result: FitResult) -> Estimate:
     NaN where the turning points of a decay without a law do not show it.
     """
     if result.light != "red":
-        return quality_by_law(result, result.value("amplitude")).quality_factor
+        return _quality(result, result.value("amplitude")).quality_factor
     seen = seen_qualities(result)
     return seen[0].quality_factor if seen else Estimate(math.nan, math.nan, "")
 
@@ -247,7 +254,7 @@ def period_of(result: FitResult, amplitude: float) -> float:
         cycle = turning_points(lossless, Release(0.0, amplitude), count=3)
     except ValueError:
         return 1.0 / result.value("frequency")
-    return float(cycle.time_s[2])
+    return float(cycle.time_s[2]) if amplitude > 0.0 else 1.0 / result.value("frequency")
 
 
 def _times(estimate: Estimate, factor: float, unit: str) -> Estimate:
@@ -263,13 +270,11 @@ def mean_square(result: FitResult) -> float:
 def small_period(result: FitResult) -> Estimate:
     """Period 1/f of Eq. 8's frequency, s: with the torque of sin x that of small amplitudes.
 
-    With a red light that of the turning points; its error covers how far large, middle and small
-    swings are from it.
+    Where the law is refuted that of the turning points, extrapolated to small swings.
     """
-    if result.light == "red" and result.period_check:
-        whole, *parts = result.period_check
-        spread = max((abs(each.seen - whole.seen) for each in parts), default=0.0)
-        return Estimate(whole.seen, math.hypot(whole.seen_sd, spread), "s")
+    shown = result.lawless
+    if shown is not None and math.isfinite(shown.small_period.value):
+        return shown.small_period
     return period_of_frequency(result.parameters["frequency"])
 
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from pendpipe.analysis.fit.consequence import Widening, judged, scaled
+from pendpipe.analysis.fit.backbone import Backbone, backbone_of
+from pendpipe.analysis.fit.consequence import judged, scaled
 from pendpipe.analysis.fit.damping import damping_of, fast_beside
 from pendpipe.analysis.fit.decrement import Check, Light, check_decrement
 from pendpipe.analysis.fit.goodness import LEVEL, Goodness, combined
@@ -19,6 +20,7 @@ from pendpipe.analysis.fit.least_squares import CHI2_95
 from pendpipe.analysis.fit.printed import html, lines, pendulum_of
 from pendpipe.analysis.fit.quality import (
     mean_square,
+    period_of,
     qualities,
     quality_at,
     released_quality,
@@ -135,10 +137,8 @@ class FitResult:
         why.
     quotable
         What may be quoted: ``"period"``, ``"Q"``, ``"losses"``, ``"a"``, ``"b"``, ``"c"``.
-    period_check
-        The law's period beside that of the turning points: all, large, middle and small swings.
-    widening
-        By what standard deviations were multiplied for what the law misses.
+    shown
+        The backbone, where it is known already (`backbone`).
     hysteretic_share
         Part of b that the fitted law has as hysteretic; hardly any recording tells it.
     clock_ppm
@@ -189,8 +189,7 @@ class FitResult:
     light: Light = "amber"
     light_reason: str = "the decrement was not checked"
     quotable: tuple[str, ...] = ()
-    period_check: tuple[Check, ...] = ()
-    widening: Widening = field(default_factory=Widening)
+    shown: Backbone | None = field(default=None, repr=False, compare=False)
     hysteretic_share: float = 0.5
     clock_ppm: float | None = None
     scale_percent: float | None = None
@@ -235,8 +234,42 @@ class FitResult:
     @property
     def refuted(self) -> bool:
         """Whether the readings differ from the law by more than noise explains."""
-        test = self.fit_p_value is not None and self.fit_p_value < LEVEL
-        return test or max(self.widening) > 1.0
+        return self.fit_p_value is not None and self.fit_p_value < LEVEL
+
+    @cached_property
+    def backbone(self) -> Backbone | None:
+        """Period and decrement against amplitude, as the turning points show them without a law.
+
+        None of too few of them, and of two modes that beat.
+
+        Examples
+        --------
+        >>> import pendpipe as pp
+        >>> fit = pp.fit("examples/rod-pendulum.csv")
+        >>> print(fit.backbone.small_period, fit.backbone.loss(0.05))
+        (1.145475 ± 0.000027) s (0.019411 ± 0.000063) s⁻¹
+        """
+        if self.shown is not None or self.points is None or not self.decrement_check:
+            return self.shown
+        return backbone_of(self.points, self.law)
+
+    @property
+    def lawless(self) -> Backbone | None:
+        """The backbone, where period and Q are quoted from it: the law is refuted."""
+        return self.backbone if self.refuted or self.light == "red" else None
+
+    @property
+    def period_check(self) -> tuple[Check, ...]:
+        """The law's period beside the backbone's, at the amplitudes of `decrement_check`."""
+        shown = self.backbone
+        if shown is None:
+            return ()
+        at = [check.amplitude_rad for check in self.decrement_check]
+        seen = [shown.period(amplitude) for amplitude in at]
+        return tuple(
+            Check(y, period_of(self, y), each.value, each.sd, shown.period_scatter)
+            for y, each in zip(at, seen, strict=True)
+        )
 
     def __str__(self) -> str:
         """Return what is known, the sentence to copy, and what to do next."""
@@ -401,7 +434,7 @@ class FitResult:
             "clock_ppm": self.clock_ppm,
             "scale_percent": self.scale_percent,
             "quotable": list(self.quotable),
-            "widening": self.widening._asdict(),
+            "backbone": self.backbone and self.backbone.as_json(),
             "period_check": [check._asdict() for check in self.period_check],
             "decrement_check": [check._asdict() for check in self.decrement_check],
             "parameters": {name: self.parameters[name].as_json() for name in PARAMETERS},
@@ -461,8 +494,7 @@ class FitResult:
             clock_ppm=content.get("clock_ppm"),
             scale_percent=content.get("scale_percent"),
             quotable=tuple(content.get("quotable", ())),
-            widening=Widening(**content.get("widening", {})),
-            period_check=tuple(Check(**check) for check in content.get("period_check", ())),
+            shown=content.get("backbone") and Backbone.from_json(content["backbone"]),
             decrement_check=tuple(Check(**check) for check in content["decrement_check"]),
             **held,
         )
@@ -518,7 +550,7 @@ def result_of(
     b = parameters["b"]
     limit = quality_of_rate(parameters["frequency"].value, b) if b.value > 0.0 else None
     checks = check_decrement(points, law)
-    if len(goodness.p_values) > 1 and goodness.p_value >= LEVEL:
+    if rest["method"] == "waveform" and goodness.p_value >= LEVEL:
         # Turning points that contradict a law whose residual is white are off themselves.
         white = f"all readings leave only noise (p = {goodness.p_value:.2g})"
         checks = tuple(
@@ -569,8 +601,8 @@ def _warnings(result: FitResult, stretched: float) -> list[str]:
         ),
         (
             stretched > 1.0,
-            f"{seen} {stretched:.3g} times what the noise explains: the standard deviations are"
-            " enlarged by its root; see pendpipe diagnose",
+            f"{seen} {stretched:.3g} times what the noise explains: period and Q are those of the"
+            " turning points, and a, b, c carry what the law is off by; see pendpipe diagnose",
         ),
         (
             result.baseline == "eq8" and mixed and a.sd * y0 > _UNCLEAR * rate,
@@ -613,7 +645,12 @@ def _stretched(result: FitResult, powers: Mapping[str, float], part: float) -> F
         sd = math.hypot(old.sd, part * power * old.value)
         found = scaled(old, sd / old.sd if old.sd > 0.0 else 1.0, name)
         parameters[name] = replace(found, sd=sd)
-    return replace(result, parameters=parameters, covariance=covariance)
+    shown, power = result.shown, powers.get("frequency", 0.0)
+    if shown is not None:
+        small = shown.small_period
+        wider = replace(small, sd=math.hypot(small.sd, part * power * small.value))
+        shown = replace(shown, small_period=wider)
+    return replace(result, parameters=parameters, covariance=covariance, shown=shown)
 
 
 def read_fit(path: str | Path) -> FitResult:
