@@ -16,6 +16,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.fit.quality import small_frequency
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.hypothesis import Hypothesis
@@ -25,7 +26,7 @@ from pendpipe.diagnosis.remainder import with_errors
 from pendpipe.diagnosis.rivals import Rival
 from pendpipe.diagnosis.values import constants_of, quality_factors_of, small_periods
 from pendpipe.diagnosis.weighing import Weighed
-from pendpipe.estimate import LISTED, Estimate, averaged, over
+from pendpipe.estimate import LISTED, Estimate, averaged
 
 _STARTS: Final = 2
 """Fits of other descriptions from which one begins: those that have most in common with it."""
@@ -208,10 +209,15 @@ def averages(
     numbers = []
     for each in described:
         own = none if each.fit.value is found.baseline.value else of(each.fit)
-        drawn = any(effect.kind == "unnamed" for effect in each.fit.model.effects)
+        kinds = {effect.kind for effect in each.fit.model.effects if not effect.form}
         more = each.fit.scatter is not None or found.unexplained < level
-        if more or drawn:
-            own = {name: _beside(value, none.get(name), more=more) for name, value in own.items()}
+        if more or "unnamed" in kinds:
+            # The fit lacks what has a name: it may be sure of another number.
+            alone = more and kinds <= {"unnamed"}
+            own = {
+                name: _beside(value, none.get(name), more=more, alone=alone)
+                for name, value in own.items()
+            }
         numbers.append(own)
     return Quoted(
         {
@@ -238,18 +244,18 @@ def printed_by(fit: FitResult | None) -> Numbers:
     }
     if fit.method == "waveform" and fit.light != "red":
         numbers |= {name: fit.parameters[name] for name in "abc"}
-    return {**numbers, "frequency": over(1.0, fit.period, "Hz")}
+    return {**numbers, "frequency": small_frequency(fit)}
 
 
-def _beside(value: Estimate, fitted: Estimate | None, *, more: bool) -> Estimate:
+def _beside(value: Estimate, fitted: Estimate | None, *, more: bool, alone: bool) -> Estimate:
     """Return a number of what explains nothing, no surer than the fit's.
 
-    Of what leaves more than noise it is the surer of both; a curve, which follows whatever there
-    is, is as right as the fit.
+    Of a curve `alone` that leaves more than noise it is the surer of both; a curve, which follows
+    whatever there is, is as right as the fit.
     """
     if fitted is None or not math.isfinite(fitted.sd):
         return value
-    if more and not value.sd < fitted.sd:
+    if alone and not value.sd < fitted.sd:
         return fitted
     found = value if more else averaged([value, fitted], [1.0, 1.0])
     if not found.sd < fitted.sd:

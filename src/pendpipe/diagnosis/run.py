@@ -12,6 +12,7 @@ import numpy as np
 
 from pendpipe.analysis.angles import scale_of
 from pendpipe.analysis.fit.fixed import check_fixed
+from pendpipe.analysis.fit.quality import small_frequency
 from pendpipe.analysis.fit.result import Baseline, FitResult
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples, prepare
@@ -52,7 +53,7 @@ from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.losses import drag_form as drag_form_effect
 from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.errors import NotAnalysableError, refuse_if
-from pendpipe.estimate import Estimate, over
+from pendpipe.estimate import Estimate
 from pendpipe.quantities import stretch, with_error
 from pendpipe.recording import Recording
 
@@ -281,7 +282,7 @@ def _models(
     """
     before = _fitted_model(with_errors(found.baseline, found.data, found.noise), found)
     if fit:
-        law, small = before, {"frequency": over(1.0, fit.period, "Hz")}
+        law, small = before, {"frequency": small_frequency(fit)}
         if fit.light != "red":
             law = FittedModel.of_fit(fit)
         of_all = fit.method == "waveform" and not fit.cuts and fit.zero_drift is None

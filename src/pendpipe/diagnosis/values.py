@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from pendpipe.analysis.fit.least_squares import Bounds, intervals95
 from pendpipe.analysis.fit.result import PARAMETERS, units
@@ -101,6 +102,8 @@ def small_periods(fit: Fit, value: FloatArray) -> FloatArray:
             if force is not None:
                 done = motion.clock.integral(force * motion.clock.cosine)
                 stiffer -= upwards / math.pi * (done[:, -1] - done[:, 0]) / (omega**2 * size)
+    # A loss that jumps within a half cycle pulls one way there, and is no stiffness.
+    stiffer = np.median(sliding_window_view(np.pad(stiffer, 1, "edge"), 3), axis=1)
     with np.errstate(invalid="ignore"):
         true = 2.0 * math.pi / (omega * np.sqrt(1.0 + stiffer[seen]))
     return np.asarray(true / (1.0 + np.gradient(late[1:], begun[seen])))

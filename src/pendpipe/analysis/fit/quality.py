@@ -17,7 +17,7 @@ from pendpipe.analysis.fit.decrement import Light, losses_of
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Estimate, over
 from pendpipe.quantities import after_number
 
 if TYPE_CHECKING:
@@ -276,6 +276,12 @@ def small_period(result: FitResult) -> Estimate:
     if shown is not None and math.isfinite(shown.small_period.value):
         return shown.small_period
     return period_of_frequency(result.parameters["frequency"])
+
+
+def small_frequency(result: FitResult) -> Estimate:
+    """Frequency of small swings, Hz: the law's, or where that is refuted 1/T of `small_period`."""
+    small, fitted = small_period(result), result.parameters["frequency"]
+    return fitted if small == period_of_frequency(fitted) else over(1.0, small, "Hz")
 
 
 def period_of_frequency(frequency: Estimate) -> Estimate:
