@@ -204,7 +204,7 @@ class Hypothesis:
         Properties of the record that do no harm (a coarse step at large amplitude) don't count,
         nor does the colour of its noise.
         """
-        first = self.first if self.steps else self.scan
+        first = self.first if self.steps or self.now is None else self.now
         assert first is not None
         faults = [each.p_value for each in self.faults if each.identifier != COLOURED_NOISE]
         return min(first.p_value / CATALOGUE_SHARE, *self.quiet.values(), *faults, 1.0)
