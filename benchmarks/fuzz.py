@@ -167,7 +167,9 @@ def zip_of(random: Random, folder: Path) -> Path:
             name = name_of_member(random) + str(number) * (random.random() < 0.2)
             rows = 0 if number > 5 else random.choice((0, 3, 300, 300, 300, 1000))
             content = sheet(random, rows) if name.endswith(".xml") else swing(random, rows)
-            bomb = b"0,0\n" * random.choice((1 << 20, 12 << 20)) if random.random() < 0.003 else b""
+            # One at most: an archive is no larger than 64 MB.
+            large = number == 0 and random.random() < 0.02
+            bomb = b"0,0\n" * random.choice((1 << 20, 12 << 20)) if large else b""
             coding = "utf-16" if "utf-16" in content[:60] else "utf-8"
             archive.writestr(name, bomb or content.encode(coding))
     return path
