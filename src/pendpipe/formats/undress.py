@@ -66,8 +66,8 @@ def _of_several_lines(lines: list[str]) -> list[str]:
 
 
 def _shape(line: str) -> str:
-    """What a line says beside its numbers."""
-    numberless = TOKEN.sub("\0", line[:_LONGEST_ROW])
+    """What a line says beside its numbers, each of which is a NUL here."""
+    numberless = TOKEN.sub("\0", line[:_LONGEST_ROW].replace("\0", " "))
     return " ".join(numberless.replace("[[", " [").replace("]]", "]").split())
 
 
