@@ -73,9 +73,10 @@ def test_the_same_data_give_the_same_bytes(example: Any, tmp_path: Path) -> None
 
 def test_letters_stay_letters_and_no_axis_has_an_offset(example: Any, tmp_path: Path) -> None:
     svg, _ = save(draw_fig03(example.content["calibration"]), tmp_path / "fig03")
-    words = "".join(ET.parse(svg).getroot().itertext())
+    # The data of the curves and the digest stand in the metadata, where "1e" may occur.
+    words = [e.text or "" for e in ET.parse(svg).getroot().iter() if e.tag.endswith("}text")]
     assert "Sensor output (V)" in words
-    assert "1e" not in words
+    assert not any("1e" in word for word in words)
 
 
 def test_drawing_leaves_matplotlib_as_it_was(example: Any) -> None:
