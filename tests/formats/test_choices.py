@@ -98,6 +98,15 @@ def test_a_long_table_is_read_by_the_quantity_that_it_names(tmp_path: Path, orde
     same(read(tmp_path / "a.txt", ReadOptions(column="omega")), RATE)
 
 
+@pytest.mark.parametrize("above", ["", "pendulum three,second run\n", "a,b\nc,d\n"])
+def test_a_row_of_units_is_no_row_of_names(tmp_path: Path, above: str) -> None:
+    """Whatever stands above the names."""
+    recording = read_as(tmp_path, text(TIME, ANGLE, head=above + "clock,theta\ns,rad\n"), "a.csv")
+    same(recording)
+    assert recording.unit == "rad"
+    assert any("theta" in note for note in recording.notes)
+
+
 def test_trackers_masses_are_named_and_chosen(tmp_path: Path) -> None:
     other = 0.2 * RATE
     columns = (TIME, ANGLE, 0.1 * ANGLE, other, 0.1 * other)
@@ -419,6 +428,14 @@ def test_periods_and_amplitudes_of_a_steady_swing(period: float, level: float, s
     assert np.median(amplitude) == pytest.approx(size, rel=0.01)
     # Every half period one ends, but for the first two and what the ends cut.
     assert abs(len(lasted) - (2 * 39.99 / period - 2)) <= 1.5
+
+
+@given(spikes=st.integers(8, 15), size=st.floats(1e-3, 1e3))
+def test_spikes_of_a_sensor_at_rest_have_no_period(spikes: int, size: float) -> None:
+    """Not half a per cent of the readings: the quantiles between which a swing lies are one."""
+    at_rest = np.zeros(len(CENTISECONDS))
+    at_rest[100 : 100 + 200 * spikes : 200] = size * (-1.0) ** np.arange(spikes)
+    assert [len(found) for found in periods(CENTISECONDS, at_rest)] == [0, 0]
 
 
 @given(power=st.floats(-1.0, 2.0), radians=st.sampled_from([1.0, np.pi / 180]))

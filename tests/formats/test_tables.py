@@ -1006,7 +1006,10 @@ def written(folder: Path, time: np.ndarray, angle: np.ndarray, header: str) -> P
 
 @pytest.mark.parametrize(
     ("unit", "turn"),
-    [("deg", 360.0), ("gon", 400.0), ("rev", 1.0), ("rad", 2.0 * math.pi), ("arcmin", 21600.0)],
+    [
+        *(("deg", 360.0), ("gon", 400.0), ("rev", 1.0), ("half-turns", 2.0), ("mdeg", 360e3)),
+        *(("rad", 2.0 * math.pi), ("mrad", 2e3 * math.pi), ("arcmin", 21600.0), ("arcsec", 1296e3)),
+    ],
 )
 def test_a_turn_is_two_pi_in_every_unit(tmp_path: Path, unit: str, turn: float) -> None:
     angle = CLOCKED_RAD * turn / (2.0 * math.pi)
