@@ -13,10 +13,10 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics import FINDERS
 from pendpipe.diagnosis.forensics.evidence import Evidence
+from pendpipe.diagnosis.found import Finding
 from pendpipe.diagnosis.noise import Noise, white_noise
 from pendpipe.diagnosis.noise_estimate import estimate_noise
 from pendpipe.diagnosis.refine import Fit, refine
-from pendpipe.diagnosis.result import Finding
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.model import Model
 from pendpipe.recording import find_step

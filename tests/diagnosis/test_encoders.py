@@ -20,9 +20,9 @@ from pendpipe.diagnosis.forensics.codes import noise_before_rounding, spacing_of
 from pendpipe.diagnosis.forensics.converter import worst_comb
 from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.local import Local
+from pendpipe.diagnosis.found import Finding
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import Fit, refine
-from pendpipe.diagnosis.result import Finding
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.effects.model import Model

@@ -17,9 +17,9 @@ from pendpipe.diagnosis.forensics.glitches import _described, find_in_misfit, sm
 from pendpipe.diagnosis.forensics.lost_samples import LostSamples, find_lost_samples, loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.forensics.tails import Tail
+from pendpipe.diagnosis.found import Confirmation, Finding
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
-from pendpipe.diagnosis.result import Confirmation, Finding
 from pendpipe.effects.catalogue import CATALOGUE
 from pendpipe.effects.catalogue.restoring import cubic_stiffness
 from pendpipe.effects.model import Model

@@ -11,12 +11,13 @@ import pytest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.found import FittedModel, FoundEffect, Location, verdict_of
 from pendpipe.diagnosis.held_out import HeldOut
 from pendpipe.diagnosis.location import curve_told, locate, mains_of
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import Remainder, remainder_of, with_errors
-from pendpipe.diagnosis.result import Diagnosis, FittedModel, FoundEffect, Location, verdict_of
+from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.rivals import near_harmonic_by_chance
 from pendpipe.diagnosis.summary import Change, Summary, numbers_of, statement
 from pendpipe.diagnosis.values import constants_of, curve_values

@@ -24,11 +24,12 @@ from pendpipe.diagnosis.detect import (
     draw_chance,
     prepare,
 )
+from pendpipe.diagnosis.found import Finding
 from pendpipe.diagnosis.hypothesis import Hypothesis, Step, applicable
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.projection import local_p_values, scores_and_lengths, tangent_basis
 from pendpipe.diagnosis.refine import Fit, refine
-from pendpipe.diagnosis.result import Diagnosis, Finding
+from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.rivals import Rival, Scale, class_width, evidence, probabilities
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.weighing import Weighed, fault_named, weigh, with_likelier

@@ -44,7 +44,7 @@ COMMANDS: Final = {
 }
 """The commands with the line that ``--help`` shows for each."""
 SMALL: Final = frozenset(
-    ("inspect", "convert", "simulate", "init", "campaign", "config", "effects", "completion")
+    ("inspect", "convert", "simulate", "init", "campaign", "config", "effects")
 )
 """Those in one file, `pendpipe.commands.small`."""
 STAGES: Final = {

@@ -8,8 +8,9 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.angles import as_angles
+from pendpipe.analysis.fit.fitted import Baseline
 from pendpipe.analysis.fit.fixed import Held
-from pendpipe.analysis.fit.result import Baseline, FitResult
+from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.fit.start import start_values, usable_span
 from pendpipe.analysis.torque import restoring_of
 from pendpipe.analysis.turning_points import TurningPoints

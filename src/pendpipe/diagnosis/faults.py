@@ -17,11 +17,11 @@ from pendpipe.diagnosis.data import Data, at_even_times
 from pendpipe.diagnosis.detect import TESTS_SHARE
 from pendpipe.diagnosis.forensics import FINDERS, RANDOM_TORQUE, Finder
 from pendpipe.diagnosis.forensics.evidence import Evidence
+from pendpipe.diagnosis.found import Finding
 from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Task, is_further, price_of_another
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import SETTLED, Fit, refine
-from pendpipe.diagnosis.result import Finding
 from pendpipe.dynamics.any_law import NoMotionError
 
 _SHARE_OF_EACH: Final = TESTS_SHARE / len(FINDERS)

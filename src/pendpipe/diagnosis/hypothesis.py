@@ -15,14 +15,13 @@ from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data, with_lattice
 from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Detection, detect, prepare
+from pendpipe.diagnosis.found import COLOURED_NOISE, Finding
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import Noise, white_noise
 from pendpipe.diagnosis.noise_estimate import estimate_noise
 from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR, Fit, best_fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import INCOMPLETE, Remainder, remainder_of
-from pendpipe.diagnosis.result import Finding
-from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA

@@ -11,8 +11,8 @@ from pendpipe.analysis.demodulation import by_cycle
 from pendpipe.analysis.fit.printed import short_size
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.found import Location
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import Location
 from pendpipe.diagnosis.values import curve_values, curves_of, last_in
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling

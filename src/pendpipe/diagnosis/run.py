@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from pendpipe.analysis.angles import scale_of
+from pendpipe.analysis.fit.fitted import Baseline
 from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.quality import small_frequency
-from pendpipe.analysis.fit.result import Baseline, FitResult
+from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.arrays import FloatArray
@@ -24,6 +25,7 @@ from pendpipe.diagnosis.data import with_scatter
 from pendpipe.diagnosis.forensics.codes import with_true_step
 from pendpipe.diagnosis.forensics.lost_samples import loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
+from pendpipe.diagnosis.found import LEVEL, FittedModel, FoundEffect, Location, verdict_of
 from pendpipe.diagnosis.held_out import HeldOut, held_out
 from pendpipe.diagnosis.hypothesis import Hypothesis, Task, catalogue_beside
 from pendpipe.diagnosis.projection import whitened
@@ -31,16 +33,9 @@ from pendpipe.diagnosis.quoted import quoted
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
-from pendpipe.diagnosis.result import (
-    Diagnosis,
-    FittedModel,
-    FoundEffect,
-    Location,
-    swinging,
-    verdict_of,
-)
+from pendpipe.diagnosis.result import Diagnosis, swinging
 from pendpipe.diagnosis.search import baseline_fitted, run_search
-from pendpipe.diagnosis.summary import LEVEL, statement
+from pendpipe.diagnosis.summary import statement
 from pendpipe.diagnosis.values import parameters_of
 from pendpipe.diagnosis.weighing import (
     Weighed,

@@ -16,12 +16,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.result import Baseline, units
+from pendpipe.analysis.fit.fitted import Baseline, units
 from pendpipe.analysis.torque import TOP, swing_phase
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.found import LEVEL, FittedModel, FoundEffect, Location, verdict_of
 from pendpipe.diagnosis.held_out import held_out
 from pendpipe.diagnosis.hypothesis import (
     MOST_EFFECTS,
@@ -36,18 +37,11 @@ from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.quoted import Description, averages, descriptions_of
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
-from pendpipe.diagnosis.result import (
-    Diagnosis,
-    FittedModel,
-    FoundEffect,
-    Location,
-    swinging,
-    verdict_of,
-)
+from pendpipe.diagnosis.result import Diagnosis, swinging
 from pendpipe.diagnosis.rivals import Scale
 from pendpipe.diagnosis.search import LESS_FRICTION, run_search
 from pendpipe.diagnosis.stacked import StackedData, StackedNoise
-from pendpipe.diagnosis.summary import DOUBTFUL, LEVEL, statement
+from pendpipe.diagnosis.summary import DOUBTFUL, statement
 from pendpipe.diagnosis.values import constants_of
 from pendpipe.diagnosis.weighing import Weighed, effect_named
 from pendpipe.dynamics.any_law import NoMotionError

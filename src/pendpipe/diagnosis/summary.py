@@ -9,24 +9,21 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from pendpipe.analysis.fit.printed import short_size
 from pendpipe.analysis.fit.quality import period_of_frequency
+from pendpipe.diagnosis.cycles import SmallSwings
+from pendpipe.diagnosis.found import COLOURED_NOISE, FittedModel, FoundEffect
+from pendpipe.diagnosis.outcome import Outcome
+from pendpipe.diagnosis.remainder import Remainder
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier, declared
 from pendpipe.effects.curves import CURVES
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, in_columns, listed, with_error
 
-if TYPE_CHECKING:
-    from pendpipe.diagnosis.cycles import SmallSwings
-    from pendpipe.diagnosis.remainder import Remainder
-    from pendpipe.diagnosis.result import Diagnosis, FittedModel, FoundEffect
-
 BASELINES: Final = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 """The baselines in words."""
-LEVEL: Final = 0.01
-"""The false-alarm probability: how often a recording that lacks nothing is reported."""
 NAMED: Final = 0.5
 """Probability from which a cause is named, its class counted together."""
 DOUBTFUL: Final = 0.05
@@ -47,8 +44,6 @@ _SHOWN: Final = 4
 """Of what was looked for."""
 _KNOWN: Final = 2.0
 """Standard deviations from which a parameter of an effect is printed."""
-COLOURED_NOISE: Final = "coloured-noise"
-"""What is reported of the noise, and is nothing that a model lacks."""
 UNNAMED: Final = {
     "unnamed-damping": "a loss of unknown form",
     "unnamed-restoring": "a restoring torque of unknown form",
@@ -249,7 +244,7 @@ def _title(change: Change) -> str:
     return f"Q at {short_size(change.amplitude_rad, change.unit)}"
 
 
-def summarise(diagnosis: Diagnosis) -> Summary:
+def summarise(diagnosis: Outcome) -> Summary:
     """Make the answer of a diagnosis."""
     presumed = _presumed(diagnosis)
     found = [each for each in diagnosis.missing if each.identifier != COLOURED_NOISE]
@@ -297,12 +292,12 @@ def summarise(diagnosis: Diagnosis) -> Summary:
     )
 
 
-def _unit(diagnosis: Diagnosis) -> str:
+def _unit(diagnosis: Outcome) -> str:
     amplitude = diagnosis.baseline.parameters.get("amplitude")
     return "rad" if amplitude is None else amplitude.unit
 
 
-def _presumed(diagnosis: Diagnosis) -> str:
+def _presumed(diagnosis: Outcome) -> str:
     words = {"circular-error": "sin x", "drag-form": "drag v|v|"}
     names = [words.get(each.identifier, each.name) for each in diagnosis.effects if each.presumed]
     return " and ".join(names)
@@ -376,7 +371,7 @@ def name_of(identifier: str) -> str:
     return by_identifier(identifier).name
 
 
-def _changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
+def _changes(diagnosis: Outcome) -> tuple[Change, ...]:
     """Compare the numbers of the baseline with the averages that are quoted."""
     before, after = diagnosis.baseline.parameters, diagnosis.improved.parameters
     found = []
@@ -411,7 +406,7 @@ def _changes(diagnosis: Diagnosis) -> tuple[Change, ...]:
     return tuple(found)
 
 
-def _matters(diagnosis: Diagnosis, changes: Sequence[Change], unit: str) -> str:
+def _matters(diagnosis: Outcome, changes: Sequence[Change], unit: str) -> str:
     """Say how large the misfit is, and which numbers it moves."""
     left = compact(diagnosis.baseline.residual_rms_rad, unit)
     noise = compact(diagnosis.noise_rms_rad, unit)
@@ -425,7 +420,7 @@ def _matters(diagnosis: Diagnosis, changes: Sequence[Change], unit: str) -> str:
     return f"the fit misses the readings by {left} (noise {noise}): {what}"
 
 
-def _where(diagnosis: Diagnosis, found: Sequence[FoundEffect]) -> str:
+def _where(diagnosis: Outcome, found: Sequence[FoundEffect]) -> str:
     """Say where the most probable effect shows, and where the rest lies."""
     first = max(found, key=_leader)
     text = first.location.summary.removeprefix("it shows ").removeprefix("It shows ")
@@ -439,7 +434,7 @@ def _where(diagnosis: Diagnosis, found: Sequence[FoundEffect]) -> str:
     return text
 
 
-def _certainty(diagnosis: Diagnosis, named: Sequence[str], *, rest: bool) -> str:
+def _certainty(diagnosis: Outcome, named: Sequence[str], *, rest: bool) -> str:
     sure = [
         f"{class_of(each)[0][1]} {percent(class_of(each)[0][0])}"
         for each in diagnosis.missing
@@ -459,7 +454,7 @@ def _certainty(diagnosis: Diagnosis, named: Sequence[str], *, rest: bool) -> str
     return text or "see candidates"
 
 
-def _excluded(diagnosis: Diagnosis, found: Sequence[FoundEffect]) -> tuple[str, ...]:
+def _excluded(diagnosis: Outcome, found: Sequence[FoundEffect]) -> tuple[str, ...]:
     """Names of what was looked for and not added, those that readers ask after first."""
     suspected = {each.identifier for each in found}
     suspected |= {rival for each in found for rival, _ in each.indistinguishable}
@@ -489,7 +484,7 @@ def _decide_by(found: Sequence[FoundEffect]) -> str:
     return _test_of(best[2]) if best else ""
 
 
-def _quote(diagnosis: Diagnosis, changes: Sequence[Change]) -> str:
+def _quote(diagnosis: Outcome, changes: Sequence[Change]) -> str:
     """What can be quoted: T0 and Q of the better model, a, b, c that stay."""
     said, unit = list[str](), _unit(diagnosis)
     period = next((each for each in changes if each.quantity == "period"), None)
@@ -512,7 +507,7 @@ def _quote(diagnosis: Diagnosis, changes: Sequence[Change]) -> str:
     return "; ".join(said)
 
 
-def _sentence(diagnosis: Diagnosis, names: Sequence[str], presumed: str) -> str:
+def _sentence(diagnosis: Outcome, names: Sequence[str], presumed: str) -> str:
     model = {"eq8": "Eq. 8", "viscous": "Eq. 3"}.get(
         diagnosis.baseline_name, diagnosis.baseline_name
     )

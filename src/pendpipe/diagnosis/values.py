@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from pendpipe.analysis.fit.fitted import PARAMETERS, units
 from pendpipe.analysis.fit.least_squares import Bounds, intervals95
-from pendpipe.analysis.fit.result import PARAMETERS, units
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.refine import Fit

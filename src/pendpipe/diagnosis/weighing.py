@@ -9,13 +9,13 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.found import Finding, FoundEffect
 from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Step, is_further, is_gross
 from pendpipe.diagnosis.instants import with_instants
 from pendpipe.diagnosis.location import curve_told, locate
 from pendpipe.diagnosis.refine import SETTLED, Fit, best_fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import with_errors
-from pendpipe.diagnosis.result import Finding, FoundEffect
 from pendpipe.diagnosis.rivals import (
     NEAR,
     Rival,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any, Final, Literal, Self
+from typing import Any, Final, Literal, Self
 
 import numpy as np
 
@@ -45,9 +45,6 @@ from pendpipe.effects.baseline import (
 )
 from pendpipe.effects.curves import Curve
 from pendpipe.effects.effect import Effect, Kick, Pendulum, Span
-
-if TYPE_CHECKING:
-    from pendpipe.effects.stack import Part
 
 
 @dataclass(frozen=True)
@@ -124,6 +121,38 @@ def kick_sizes(
     turned = np.arctan2(-new_v, new_x) - np.arctan2(-v, x)
     turned -= 2.0 * math.pi * np.round(turned / (2.0 * math.pi))
     return by_log, -turned / omega
+
+
+@dataclass(frozen=True)
+class Part:
+    """One recording of several (`pendpipe.effects.stack`), evaluated.
+
+    Parameters
+    ----------
+    number
+        Of the recording.
+    model, value, at
+        Its own model, at its values.
+    mixing
+        Its values by those of all, shape (own values, values of all).
+    """
+
+    number: int
+    model: Model
+    value: FloatArray
+    at: Evaluated
+    mixing: FloatArray
+
+    @cached_property
+    def own(self) -> FloatArray:
+        """Derivatives of its readings by its own values."""
+        return jacobian(self.model, self.value, self.at)
+
+    def responses(
+        self, effect: Effect, changes: Sequence[tuple[FloatArray, FloatArray]]
+    ) -> FloatArray:
+        """Change of its readings for each pair of values of an effect, shape (changes, n)."""
+        return responses(effect, changes, self.at, self.model.pendulum(self.value))
 
 
 Seen = Literal["angle", "rate"]

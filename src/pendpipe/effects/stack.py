@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, Final, Self
 
 import numpy as np
@@ -19,7 +18,7 @@ from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics.any_law import NoMotionError, Sampled
 from pendpipe.effects.baseline import BASELINE, OFFSET, OMEGA, START, TIME, A, B, C
 from pendpipe.effects.effect import Effect, Parameter, Span
-from pendpipe.effects.model import Evaluated, Model, jacobian, responses
+from pendpipe.effects.model import Evaluated, Model, Part
 
 MAY_DIFFER: Final = {"a": A, "b": B, "c": C, "frequency": OMEGA}
 """What the recordings of one pendulum share, unless it was changed between them."""
@@ -97,30 +96,8 @@ def _block(effect: Effect, recording: int, size: int) -> FloatArray:
     return np.eye(effect.count)[shifted]
 
 
-@dataclass(frozen=True)
-class Part:
-    """One recording of several, evaluated.
-
-    Parameters
-    ----------
-    number
-        Of the recording.
-    model, value, at
-        Its own model, at its values.
-    mixing
-        Its values by those of all, shape (own values, values of all).
-    """
-
-    number: int
-    model: Model
-    value: FloatArray
-    at: Evaluated
-    mixing: FloatArray
-
-    @cached_property
-    def own(self) -> FloatArray:
-        """Derivatives of its readings by its own values."""
-        return jacobian(self.model, self.value, self.at)
+class _OfSeveral(Part):
+    """One recording; an effect may have a size of its own in it."""
 
     def responses(
         self, effect: Effect, changes: Sequence[tuple[FloatArray, FloatArray]]
@@ -130,8 +107,7 @@ class Part:
         if isinstance(effect, Differs):
             return np.array([self.own @ (block @ (high - low)) for low, high in changes])
         pairs = [(block @ low, block @ high) for low, high in changes]
-        pendulum = self.model.pendulum(self.value)
-        return responses(_single(effect), pairs, self.at, pendulum)
+        return super().responses(_single(effect), pairs)
 
 
 @dataclass(frozen=True)
@@ -268,7 +244,7 @@ class Stack(Model):
         parts = []
         for number, (member, mixing) in enumerate(zip(self.members, self.mixings(), strict=True)):
             own = np.clip(mixing @ value, *member.bounds())
-            parts.append(Part(number, member, own, member.evaluate(own), mixing))
+            parts.append(_OfSeveral(number, member, own, member.evaluate(own), mixing))
         spans = [part.at.span for part in parts]
         loudest = max(parts, key=lambda part: part.at.span.first_amplitude).at
         span = Span(

@@ -3,3 +3,22 @@
 `pendpipe.report.page.render` makes it from the stages' results; the other modules each
 prepare one part of it. Nothing is computed here that a stage has not computed before.
 """
+
+import base64
+import hashlib
+from pathlib import Path
+from typing import Final
+
+from markupsafe import Markup
+
+TEMPLATES: Final = Path(__file__).parent / "templates"
+
+
+def own_files() -> dict[str, str]:
+    """The package's own style and script; the policy names the script by its hash."""
+    script = (TEMPLATES / "script.js").read_text(encoding="utf-8").strip()
+    return {
+        "style": Markup((TEMPLATES / "style.css").read_text(encoding="utf-8").strip()),
+        "script": Markup(script),
+        "script_hash": base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
+    }

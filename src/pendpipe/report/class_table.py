@@ -294,7 +294,7 @@ def class_page(fits: Sequence[Fitted], links: Sequence[str | None] | None = None
     """Return the table as a page; each name is a link where there is one."""
     from urllib.parse import quote
 
-    from pendpipe.report.page import own_files
+    from pendpipe.report import own_files
     from pendpipe.templates import render
 
     names = told_apart([each.file for each in fits])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import io
 import json
 import math
@@ -24,6 +23,7 @@ from pendpipe.figures.data import NothingToDrawError, error, number, used
 from pendpipe.files import read_json, without_folders
 from pendpipe.quantities import compact, with_error
 from pendpipe.recording import Recording, read_plain
+from pendpipe.report import own_files
 from pendpipe.report.captions import (
     CAPTIONS,
     EQUATIONS,
@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     from pendpipe.diagnosis.result import Diagnosis
     from pendpipe.report.charts import Chart
 
-TEMPLATES: Final = Path(__file__).parent / "templates"
 BUDGET_BYTES: Final = 5_000_000
 """The page stays below this at 1,000 records; what no longer fits is on a record's own page."""
 MANY: Final = 100
@@ -353,16 +352,6 @@ def _own_page(
     return fill_template(
         "pendpipe.report", "record_page.html", line=own, home=back, campaign=campaign, **shared
     )
-
-
-def own_files() -> dict[str, str]:
-    """The package's own style and script; the policy names the script by its hash."""
-    script = (TEMPLATES / "script.js").read_text(encoding="utf-8").strip()
-    return {
-        "style": Markup((TEMPLATES / "style.css").read_text(encoding="utf-8").strip()),
-        "script": Markup(script),
-        "script_hash": base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-    }
 
 
 def page_files(comparison: Content, folder: Path, figures: Path) -> list[Path]:

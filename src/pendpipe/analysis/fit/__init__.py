@@ -18,11 +18,12 @@ from pendpipe.analysis.fit.by_waveform import (
     waveform_result,
 )
 from pendpipe.analysis.fit.decrement import Light
+from pendpipe.analysis.fit.fitted import Baseline, Method
 from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.goodness import LEVEL
 from pendpipe.analysis.fit.printed import period_text
 from pendpipe.analysis.fit.quality import without_swings
-from pendpipe.analysis.fit.result import Baseline, FitResult, Method, read_fit, with_scale
+from pendpipe.analysis.fit.result import FitResult, read_fit, with_scale
 from pendpipe.analysis.torque import may_be_sine, restoring_of, told_apart
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.find import turning_points_of

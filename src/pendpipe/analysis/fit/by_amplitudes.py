@@ -10,19 +10,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from pendpipe.analysis.fit.by_points import Decay, EnvelopeFit, fit_envelope, numbers_of
-from pendpipe.analysis.fit.damping import fast_beside
+from pendpipe.analysis.fit.fitted import PARAMETERS, Baseline, fast_beside
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness
 from pendpipe.analysis.fit.period import Period
+from pendpipe.analysis.fit.prediction import pendulum_decay
 from pendpipe.analysis.fit.quality import without_swings
-from pendpipe.analysis.fit.result import PARAMETERS, result_of
+from pendpipe.analysis.fit.result import FitResult, result_of
 from pendpipe.analysis.noise import quantisation_rms
-from pendpipe.analysis.torque import TOP, elliptic
+from pendpipe.analysis.torque import TOP
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import Drag, Restoring
@@ -33,9 +34,6 @@ from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 from pendpipe.quantities import after_number
 from pendpipe.recording import Quantity, Recording, sizes_of
 
-if TYPE_CHECKING:
-    from pendpipe.analysis.fit.result import Baseline, FitResult
-
 _FEWEST: Final = 5
 """Amplitudes: a, b, c and the first are four numbers."""
 _FINEST: Final = 1e-6
@@ -43,9 +41,6 @@ _FINEST: Final = 1e-6
 _DRAGS: Final[tuple[Drag, ...]] = ("energy", "speed")
 _SLIGHT: Final = 0.05
 """Probability below which a description does not widen an interval."""
-_NODES: Final = 2000
-"""Of a decay, to `_LEAST` of the first amplitude: the sums are right to 1e-6."""
-_LEAST: Final = 1e-3
 PLACES: Final = [0, 1, 2, 4]
 """Of a, b, c and the amplitude among `PARAMETERS`."""
 
@@ -183,54 +178,6 @@ def _averaged(each: Sequence[Numbers], weight: FloatArray) -> Numbers:
     kept = [ends for (*_, ends), w in zip(each, weight, strict=True) if w > _SLIGHT]
     both = [list(zip(*one, strict=True)) for one in zip(*kept, strict=True)]
     return value, matrix, [(min(low), max(high)) for low, high in both]
-
-
-def pendulum_decay(
-    share: float, drag: Drag, time_s: FloatArray, amplitude0: float, a: float, b: float, c: float
-) -> tuple[FloatArray, FloatArray]:
-    """Amplitude of a pendulum of sin x whose losses in a swing are small, with its derivatives.
-
-    ``sin(y) dy/dt = -E(y)/(2 K)``: a half swing, which lasts 2 K(k)/omega with k = sin(y/2), loses
-    E/omega of the energy ``1 - cos y``. With a, b_h, b_v, c of one E is 4 pi y k^2 (or
-    3 pi (sin y - y cos y) of v|v|), 2 pi y k, 16 (E(k) - (1 - k^2) K(k)) and pi y: at small
-    amplitude Eq. 13.
-
-    Parameters
-    ----------
-    share
-        The hysteretic part of b.
-    drag
-        ``"energy"`` or ``"speed"``.
-    time_s, amplitude0, a, b, c
-        As in `pendpipe.physics.decay.amplitude`; times from the first on.
-
-    Returns
-    -------
-    amplitude, gradient
-        y in rad, shape (n,), and dy/d(y0, a, b, c), shape (n, 4).
-    """
-    y = np.geomspace(amplitude0, _LEAST * amplitude0, _NODES)
-    k2 = np.sin(0.5 * y) ** 2
-    first, second = elliptic(k2)
-    dragged = 4.0 * math.pi * y * k2 if drag == "energy" else _of_speed(y)
-    viscous = 16.0 * (second - (1.0 - k2) * first)
-    linear = share * 2.0 * math.pi * y * np.sqrt(k2) + (1.0 - share) * viscous
-    losses = np.stack([dragged, linear, math.pi * y]) / (2.0 * first * np.sin(y))
-    loss = np.maximum(np.array([a, b, c]) @ losses, 1e-300)
-    parts = np.concatenate([np.ones((1, len(y))), losses / loss]) / loss * y
-    step = math.log(_LEAST) / (1 - len(y))
-    sums = np.zeros(parts.shape)
-    np.cumsum(0.5 * step * (parts[:, 1:] + parts[:, :-1]), axis=1, out=sums[:, 1:])
-    elapsed, *integrals = sums
-    found = np.exp(np.interp(time_s, elapsed, np.log(y)))
-    slopes = [loss / loss[0], *(-loss * each for each in integrals)]
-    return found, np.stack([np.interp(time_s, elapsed, each) for each in slopes], axis=1)
-
-
-def _of_speed(y: FloatArray) -> FloatArray:
-    """3 pi (sin y - y cos y), without the cancellation at small y."""
-    series = y**3 * (1.0 - 0.1 * y**2 * (1.0 - y**2 / 28.0))
-    return np.asarray(math.pi * np.where(y < 0.1, series, 3.0 * (np.sin(y) - y * np.cos(y))))
 
 
 def _students(freedom: int) -> float:

@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.fit.fitted import Baseline
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import LEVEL, Goodness, tail
 from pendpipe.analysis.fit.least_squares import (
@@ -23,7 +24,7 @@ from pendpipe.analysis.fit.least_squares import (
     moved,
 )
 from pendpipe.analysis.fit.period import Period, fit_period
-from pendpipe.analysis.fit.result import Baseline, FitResult, result_of
+from pendpipe.analysis.fit.result import FitResult, result_of
 from pendpipe.analysis.torque import TOP, clear, elliptic
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates

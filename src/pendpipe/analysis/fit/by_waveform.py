@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.fit.fitted import Baseline, DragForm
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness, combined, judge
 from pendpipe.analysis.fit.least_squares import (
@@ -22,7 +23,7 @@ from pendpipe.analysis.fit.least_squares import (
     intervals95,
     minimise,
 )
-from pendpipe.analysis.fit.result import Baseline, DragForm, FitResult, result_of
+from pendpipe.analysis.fit.result import FitResult, result_of
 from pendpipe.analysis.fit.rounding import best_noise
 from pendpipe.analysis.fit.share import Marginal, marginalised
 from pendpipe.analysis.fit.start import Start, start_values, usable_span

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -24,15 +24,13 @@ from pendpipe.analysis.fit.decrement import (
     Light,
     loss_of,
 )
-from pendpipe.analysis.fit.quality import relative_loss_sd
+from pendpipe.analysis.fit.fitted import Fit, Fitted
+from pendpipe.analysis.fit.quality import qualities, relative_loss_sd, small_period
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact
-
-if TYPE_CHECKING:
-    from pendpipe.analysis.fit.result import FitResult
 
 _FEWEST: Final = 6
 """Turning points of which a period is asked."""
@@ -45,7 +43,7 @@ _SAME: Final = 0.01
 """Part of the best known change of a, b, c below which the backbone does not tell one."""
 
 
-def judged(result: FitResult, points: TurningPoints, law: Eq8, *, enlarged: float) -> FitResult:
+def judged(result: Fit, points: TurningPoints, law: Eq8, *, enlarged: float) -> Fit:
     """Light a fit; where its law is refuted, measure the backbone and let the errors cover it.
 
     Parameters
@@ -65,7 +63,7 @@ def judged(result: FitResult, points: TurningPoints, law: Eq8, *, enlarged: floa
     return replace(result, light=light, light_reason=reason, quotable=quotable)
 
 
-def _spread(result: FitResult, shown: Backbone, enlarged: float) -> FitResult:
+def _spread(result: Fit, shown: Backbone, enlarged: float) -> Fit:
     """Give the numbers of a law the errors that the backbone asks for.
 
     They are those of the noise, as the turning points scatter; and what a, b, c and the frequency
@@ -88,7 +86,7 @@ def _spread(result: FitResult, shown: Backbone, enlarged: float) -> FitResult:
         found = parameters[name]
         factor = sd / found.sd if found.sd > 0.0 else 1.0
         parameters[name] = replace(scaled(found, factor, name), sd=sd)
-    limit, b = result.quality_factor_limit, result["b"]
+    limit, b = result.quality_factor_limit, result.parameters["b"]
     factor = parameters["b"].sd / b.sd if b.sd > 0.0 else 1.0
     return replace(
         result,
@@ -98,7 +96,7 @@ def _spread(result: FitResult, shown: Backbone, enlarged: float) -> FitResult:
     )
 
 
-def _asked(result: FitResult, shown: Backbone, noise: FloatArray) -> FloatArray:
+def _asked(result: Fitted, shown: Backbone, noise: FloatArray) -> FloatArray:
     """What the backbone adds to the covariance of a, b, c, shape (3, 3)."""
     seen = shown.amplitude_rad >= shown.seen_rad[1] * (1.0 - 1e-9)
     y, sd = shown.amplitude_rad[seen], shown.decrement_sd[seen]
@@ -125,10 +123,10 @@ def scaled(estimate: Estimate, factor: float, name: str) -> Estimate:
     return replace(estimate, sd=factor * estimate.sd, interval95=ends)
 
 
-def _quotable(result: FitResult, clear: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _quotable(result: Fitted, clear: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What may be quoted, and why the rest may not."""
     checks, unit = result.decrement_check, result.parameters["amplitude"].unit
-    period, timeless = result.period, math.isnan(result.value("frequency"))
+    period, timeless = small_period(result), math.isnan(result.value("frequency"))
     problems, quotable = [], []
     if result.method == "amplitudes":
         # Its period is given, or there is none.
@@ -160,12 +158,12 @@ def _quotable(result: FitResult, clear: int) -> tuple[tuple[str, ...], tuple[str
         problems.append(f"{name} at {where}: the {seen_in} {shown}")
     if len(checks) >= 3 and not unseen:
         quotable += [] if timeless else ["Q"]
-        if not off and all(each.dominant for each in result.quality_factors):
+        if not off and all(each.dominant for each in qualities(result)):
             quotable += ["losses"] if result.refuted else ["losses", "a", "b", "c"]
     return tuple(quotable), tuple(problems)
 
 
-def unsure(result: FitResult) -> tuple[list[Check], list[Check]]:
+def unsure(result: Fitted) -> tuple[list[Check], list[Check]]:
     """Return where the law has another loss than the turning points, and where none is known well.
 
     Where the one test of fit finds nothing but noise, a difference is its chance, and the loss is
@@ -185,7 +183,7 @@ def unsure(result: FitResult) -> tuple[list[Check], list[Check]]:
     return off, [each for each, loss in seen if not loss.sd <= CONFIRMED * loss.value]
 
 
-def _light(result: FitResult, problems: Sequence[str]) -> tuple[Light, str]:
+def _light(result: Fitted, problems: Sequence[str]) -> tuple[Light, str]:
     """Return the light and its reason, a clause."""
     wrong = [check for check in result.decrement_check if check.contradicts]
     if wrong:

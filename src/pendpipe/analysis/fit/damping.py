@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.fit.fitted import Fitted, fast_beside
+from pendpipe.analysis.fit.quality import qualities
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points_with_jacobian
 from pendpipe.estimate import Estimate
-
-if TYPE_CHECKING:
-    from pendpipe.analysis.fit.result import FitResult
 
 FALLS: Final = {"damping_time_s": math.exp(-1.0), "half_life_s": 0.5}
 """To what part of itself the amplitude falls in each of the times."""
 
 
-def damping_of(result: FitResult) -> dict[str, Estimate]:
+def damping_of(result: Fitted) -> dict[str, Estimate]:
     """Return other measures of the loss at the largest amplitude of `quality.qualities`.
 
     ``half_life_s`` and ``damping_time_s``, the times in which the fitted law (where it is refuted:
@@ -27,7 +26,7 @@ def damping_of(result: FitResult) -> dict[str, Estimate]:
     motion stops before, infinite without a loss. ``logarithmic_decrement``, pi/Q, is that of one
     period at ``amplitude_rad``.
     """
-    found = result.quality_factors
+    found = qualities(result)
     if not found:
         return {}
     large, tau = found[0], found[0].damping_time_s
@@ -39,7 +38,7 @@ def damping_of(result: FitResult) -> dict[str, Estimate]:
     }
 
 
-def is_extrapolated(result: FitResult, amplitude: float) -> bool:
+def is_extrapolated(result: Fitted, amplitude: float) -> bool:
     """Whether the decay that was fitted ends above an amplitude."""
     if result.points is not None:
         return amplitude < float(np.min(result.points.amplitude_rad))
@@ -47,7 +46,7 @@ def is_extrapolated(result: FitResult, amplitude: float) -> bool:
     return bool(checks) and amplitude < checks[-1].amplitude_rad
 
 
-def _falls(result: FitResult, amplitude: float, part: float) -> Estimate:
+def _falls(result: Fitted, amplitude: float, part: float) -> Estimate:
     """The time to a part of an amplitude, with its error."""
     shown = result.lawless
     if shown is not None:
@@ -99,8 +98,3 @@ def fall_time(law: Eq8, amplitude: float, part: float) -> tuple[float, FloatArra
     a, hysteretic, viscous, c = (-float(slope @ time) * (weight @ by_log)).tolist()
     gradient = np.array([a, share * hysteretic + (1.0 - share) * viscous, c])
     return float(weight @ time), gradient
-
-
-def fast_beside(a: float, b: float, c: float, amplitude: float) -> float:
-    """Return an angular frequency to which Eq. 13 holds to 1e-8, beside losses at an amplitude."""
-    return 1e4 * max(a * amplitude + b + c / amplitude, 1e-300)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
-from pendpipe.analysis.fit.result import PARTS, Baseline
+from pendpipe.analysis.fit.fitted import PARTS, Baseline
 from pendpipe.dynamics.eq8 import OMEGA, PLACES, SHARE, Eq8, Restoring, share_of
 from pendpipe.errors import InputError, refuse_if
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from pendpipe.analysis.angles import READ_AS
 from pendpipe.analysis.fit.consequence import unsure
-from pendpipe.analysis.fit.damping import FALLS, is_extrapolated
+from pendpipe.analysis.fit.damping import FALLS, damping_of, is_extrapolated
+from pendpipe.analysis.fit.fitted import Fitted
 from pendpipe.analysis.fit.quality import (
     LEAST_QUALITY,
     LOSSES,
@@ -19,15 +20,13 @@ from pendpipe.analysis.fit.quality import (
     Quality,
     mean_square,
     period_of_frequency,
+    qualities,
     small_period,
 )
 from pendpipe.analysis.torque import TOP, swing_phase
 from pendpipe.analysis.turning_points import BEAT, CUT
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, pretty_unit, stretch, with_error
-
-if TYPE_CHECKING:
-    from pendpipe.analysis.fit.result import FitResult
 
 WITHOUT_LAW: Final = "from the turning points alone"
 _KINDS: Final = {
@@ -70,7 +69,7 @@ def short_size(amplitude: float, unit: str) -> str:
     return degrees(amplitude) if unit == "rad" else compact(amplitude, unit)
 
 
-def lines(result: FitResult, *, name: str = "", law: bool = False) -> list[str]:
+def lines(result: Fitted, *, name: str = "", law: bool = False) -> list[str]:
     """Print a fit: what is known first, what to do next last.
 
     Parameters
@@ -91,7 +90,7 @@ def lines(result: FitResult, *, name: str = "", law: bool = False) -> list[str]:
     ]
 
 
-def html(result: FitResult) -> str:
+def html(result: Fitted) -> str:
     """Return the same for a notebook."""
     from html import escape
 
@@ -108,7 +107,7 @@ def html(result: FitResult) -> str:
     )
 
 
-def heading(result: FitResult, name: str = "") -> str:
+def heading(result: Fitted, name: str = "") -> str:
     """Name the recording and say what was fitted of it, in one line."""
     points, decay = result.points, result.decay
     unit = result.parameters["amplitude"].unit if decay is None else decay.unit
@@ -127,7 +126,7 @@ def heading(result: FitResult, name: str = "") -> str:
     return f"{name}: {kind}, {span}, {swings} from {' to '.join(ends)}"
 
 
-def _remarks(result: FitResult) -> Iterator[str]:
+def _remarks(result: Fitted) -> Iterator[str]:
     """What must be known before any number is read."""
     if result.light != "green":
         yield result.light_reason
@@ -151,26 +150,26 @@ def period_text(frequency: Estimate) -> str:
     return f"{_number(period_of_frequency(frequency))} s"
 
 
-def period_name(result: FitResult) -> str:
+def period_name(result: Fitted) -> str:
     """Return T0, the period of small swings of a pendulum, or T of what swings by x."""
     return "T0" if result.restoring == "sine" else "T"
 
 
-def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
+def facts(result: Fitted, *, law: bool = False) -> Iterator[tuple[str, str]]:
     """Yield what is known, a title and a value each; nothing of two modes beside their own."""
     if result.light_reason.startswith(BEAT):
         return
     unit, has_law = result.parameters["amplitude"].unit, result.light != "red" or law
-    qualities = result.quality_factors
-    period = result.period
+    known = qualities(result)
+    period = small_period(result)
     small = "period, small swings" if result.restoring == "sine" else "period"
     text = with_error(period.value, period.sd, "s", short=True)
     if result.method == "amplitudes":
         text = f"{text}, as given" if math.isfinite(period.value) else _TIMELESS
     elif result.lawless is not None:
         text += f", {WITHOUT_LAW}"
-    elif result.restoring == "sine" and qualities:
-        large = qualities[0]
+    elif result.restoring == "sine" and known:
+        large = known[0]
         text += f"  ({large.period_s:.5g} s at {short_size(large.amplitude_rad, unit)})"
     if unit == "m/s^2":
         if result.restoring == "linear":
@@ -181,10 +180,9 @@ def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
     if by_clock and result.clock_ppm is None:
         moved = with_error(float(f"{_CLOCK * period.value:.1g}"), None, "s")
         yield "clock", f"an error of 50 ppm adds {moved}, not included here (--clock-ppm)"
-    if qualities:
+    if known:
         found = ", ".join(
-            f"{_number(each.quality_factor)} at {size(each.amplitude_rad, unit)}"
-            for each in qualities
+            f"{_number(each.quality_factor)} at {size(each.amplitude_rad, unit)}" for each in known
         )
         lawless = result.light == "red" or result.lawless is not None
         without = f", {WITHOUT_LAW}" if lawless else ""
@@ -200,9 +198,9 @@ def facts(result: FitResult, *, law: bool = False) -> Iterator[tuple[str, str]]:
     yield from _pendulum_line(result)
 
 
-def damping(result: FitResult) -> str:
+def damping(result: Fitted) -> str:
     """Print the times in which the largest amplitude shown falls, and the decrement there."""
-    numbers, unit = result.damping(), result.parameters["amplitude"].unit
+    numbers, unit = damping_of(result), result.parameters["amplitude"].unit
     first = numbers["amplitude_rad"].value
     falls, beyond = [], [is_extrapolated(result, part * first) for part in FALLS.values()]
     for name, to in (("half_life_s", "1/2"), ("damping_time_s", "1/e")):
@@ -217,12 +215,12 @@ def damping(result: FitResult) -> str:
     return f"from {short_size(first, unit)} {', '.join(falls)}{told}{per}"
 
 
-def energy(result: FitResult) -> str:
+def energy(result: Fitted) -> str:
     """Say where the energy goes at the largest amplitude shown, as far as the fit tells.
 
     A loss whose share is not two standard deviations from nothing has its upper limit (95 %).
     """
-    large = result.quality_factors[0]
+    large = qualities(result)[0]
     where = short_size(large.amplitude_rad, result.parameters["amplitude"].unit)
     if large.dominant is None:
         return f"the decay does not separate drag, viscous loss and dry friction (at {where})"
@@ -244,17 +242,17 @@ def percent(share: Estimate) -> str:
     return f"{with_error(100.0 * share.value, 100.0 * share.sd, short=True)} %"
 
 
-def _law(result: FitResult) -> str:
+def _law(result: Fitted) -> str:
     if result.light_reason.startswith(OVERDAMPED) and result.method != "waveform":
         return "a, b, c need more than a cycle to lose it in"
-    text = ", ".join(f"{name} {result[name].or_limit()}" for name in "abc")
+    text = ", ".join(f"{name} {result.parameters[name].or_limit()}" for name in "abc")
     limit = result.quality_factor_limit
     if limit is not None and limit.value > 3.0 * limit.sd:
         text += f"; πf/b {_number(limit)}"
     return text
 
 
-def misfit(result: FitResult) -> str:
+def misfit(result: Fitted) -> str:
     """Say how well the fit follows the swings, as a share of the swing."""
     swing = result.value("amplitude")
     if result.decay is not None and result.method == "waveform":
@@ -272,7 +270,7 @@ def misfit(result: FitResult) -> str:
     return f"{missed}: {story} not the whole story"
 
 
-def sentence(result: FitResult) -> str:
+def sentence(result: Fitted) -> str:
     """Return the sentence to copy."""
     if result.light_reason.startswith(BEAT):
         return f"{result.light_reason.partition(';')[0]}."
@@ -280,9 +278,9 @@ def sentence(result: FitResult) -> str:
         return "nothing of this fit can be quoted."
     unit, said = result.parameters["amplitude"].unit, []
     if "period" in result.quotable:
-        period = result.period
+        period = small_period(result)
         said.append(f"{period_name(result)} = {with_error(period.value, period.sd, 's')}")
-    known = list(result.quality_factors)
+    known = list(qualities(result))
     if result.light != "red":
         doubted = unsure(result)[1]
         checks = result.decrement_check or [None] * len(known)
@@ -291,7 +289,7 @@ def sentence(result: FitResult) -> str:
     if known:
         q = known[0]
         timeless = math.isnan(q.period_s)
-        half = result.damping()["half_life_s"] if timeless else q.quality_factor
+        half = damping_of(result)["half_life_s"] if timeless else q.quality_factor
         number, name = (half, "half-life") if timeless else (half, "Q")
         said.append(f"{name} = {number} at {compact(q.amplitude_rad, unit)}")
         if "losses" in result.quotable and (loss := q.dominant):
@@ -304,7 +302,7 @@ def sentence(result: FitResult) -> str:
     return f"{'; '.join(said)}{without}."
 
 
-def following(result: FitResult) -> str:
+def following(result: Fitted) -> str:
     """Say what to do next."""
     if result.light_reason.startswith(BEAT):
         return "pendpipe diagnose FILE fits both modes"
@@ -315,7 +313,7 @@ def following(result: FitResult) -> str:
     if result.refuted and result.method != "amplitudes":
         return f"{_DIAGNOSE}; pendpipe page FILE makes a sheet to hand out"
     if result.method == "amplitudes":
-        lacks = math.isnan(result.period.value)
+        lacks = math.isnan(small_period(result).value)
         return "--period T gives Q" if lacks else "record the swing itself to see its period"
     if "Q" not in result.quotable:
         return "record more swings: the turning points must show the decrement"
@@ -324,14 +322,14 @@ def following(result: FitResult) -> str:
     return "pendpipe page FILE makes a sheet to hand out; --figure draws it, --json is for programs"
 
 
-def pendulum_of(result: FitResult) -> dict[str, Estimate]:
+def pendulum_of(result: Fitted) -> dict[str, Estimate]:
     """Return ``g`` by the length of a simple pendulum, or its ``length`` by g: omega_0^2 = g/l.
 
     With the torque of sin x the fitted omega is omega_0, that of small swings. Otherwise
     omega_0 = omega 2 K(sin(y/2))/pi at the root-mean-square angle y, where that is known.
     """
     linear = result.restoring == "linear"
-    period = period_of_frequency(result["frequency"]) if linear else small_period(result)
+    period = period_of_frequency(result.parameters["frequency"]) if linear else small_period(result)
     omega = math.tau / period.value * (_lengthening(result) or 1.0)
     relative = 2.0 * period.sd / period.value
     if result.length is not None:
@@ -343,7 +341,7 @@ def pendulum_of(result: FitResult) -> dict[str, Estimate]:
     return {name: Estimate(value, math.hypot(relative, given.sd / given.value) * value, unit)}
 
 
-def _lengthening(result: FitResult) -> float | None:
+def _lengthening(result: Fitted) -> float | None:
     """The swings' period over that of small ones; 1 of the torque of sin x, None of no angle."""
     if result.restoring == "sine":
         return 1.0
@@ -356,7 +354,7 @@ def _lengthening(result: FitResult) -> float | None:
     return float(swing_phase(np.array([min(angle, TOP)] * 2), "sine")[0]) / math.pi
 
 
-def _pendulum_line(result: FitResult) -> Iterator[tuple[str, str]]:
+def _pendulum_line(result: Fitted) -> Iterator[tuple[str, str]]:
     """Print g, or the length, and what is not in it.
 
     A bob of radius r on a light string adds 2 r^2/(5 l^2) to g, air of density rho rho/rho_bob and

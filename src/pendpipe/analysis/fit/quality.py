@@ -8,20 +8,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from pendpipe.analysis.fit.backbone import Backbone
 from pendpipe.analysis.fit.decrement import Light, losses_of
+from pendpipe.analysis.fit.fitted import Fit, Fitted
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Estimate, over
 from pendpipe.quantities import after_number
-
-if TYPE_CHECKING:
-    from pendpipe.analysis.fit.result import FitResult
 
 LEAST_QUALITY: Final = 3.0
 """Below, a cycle leaves less than exp(-pi/3) of the swing, a third: it is no cycle."""
@@ -87,7 +85,7 @@ class Quality:
         }
 
 
-def qualities(result: FitResult) -> tuple[Quality, ...]:
+def qualities(result: Fitted) -> tuple[Quality, ...]:
     """Q and the shares of the losses at the release, a middle and a small amplitude of the decay.
 
     The fitted law's; Q is what the turning points show where the law is refuted, and with a red
@@ -100,7 +98,7 @@ def qualities(result: FitResult) -> tuple[Quality, ...]:
     return tuple(_quality(result, amplitude) for amplitude in wanted)
 
 
-def seen_qualities(result: FitResult) -> tuple[Quality, ...]:
+def seen_qualities(result: Fitted) -> tuple[Quality, ...]:
     """Return the amplitudes and quality factors that the turning points show without a law."""
     if (shown := result.backbone) is None:
         return ()
@@ -110,7 +108,7 @@ def seen_qualities(result: FitResult) -> tuple[Quality, ...]:
     )
 
 
-def _quality(result: FitResult, amplitude: float) -> Quality:
+def _quality(result: Fitted, amplitude: float) -> Quality:
     """The law's, or what the turning points show where it is refuted; with the law's shares."""
     by_law, shown = quality_by_law(result, amplitude), result.lawless
     if shown is None or not shown.reaches(amplitude):
@@ -118,14 +116,14 @@ def _quality(result: FitResult, amplitude: float) -> Quality:
     return replace(_seen_quality(result, shown, amplitude), losses=by_law.losses)
 
 
-def _seen_quality(result: FitResult, shown: Backbone, amplitude: float) -> Quality:
+def _seen_quality(result: Fitted, shown: Backbone, amplitude: float) -> Quality:
     loss, period = shown.loss(amplitude), shown.period(amplitude).value
     period = period if math.isfinite(period) else period_of(result, amplitude)
     time = Estimate(1.0 / loss.value, loss.sd / loss.value**2, "s")
     return Quality(amplitude, time, period, {})
 
 
-def quality_at(result: FitResult, amplitude_rad: float) -> Estimate:
+def quality_at(result: Fitted, amplitude_rad: float) -> Estimate:
     """Return Q at an amplitude, ``pi/(T loss)`` with the period and the loss there.
 
     Of the law, or what the turning points show where it is refuted.
@@ -164,7 +162,7 @@ def quality_at(result: FitResult, amplitude_rad: float) -> Estimate:
     return _seen_quality(result, shown, amplitude_rad).quality_factor
 
 
-def released_quality(result: FitResult) -> Estimate:
+def released_quality(result: Fitted) -> Estimate:
     """Return Q at the first turning point kept; with a red light at the largest where it is seen.
 
     NaN where the turning points of a decay without a law do not show it.
@@ -175,7 +173,7 @@ def released_quality(result: FitResult) -> Estimate:
     return seen[0].quality_factor if seen else Estimate(math.nan, math.nan, "")
 
 
-def without_swings(result: FitResult) -> FitResult:
+def without_swings(result: Fit) -> Fit:
     """Hold back what has no meaning where Q at the release is below 3: there no period is left.
 
     A cycle would lose two thirds of the amplitude. Q is then not that of any cycle, and Eq. 14,
@@ -194,7 +192,7 @@ def without_swings(result: FitResult) -> FitResult:
     return replace(result, light=light, light_reason=said, quotable=kept)
 
 
-def quality_by_law(result: FitResult, amplitude: float) -> Quality:
+def quality_by_law(result: Fitted, amplitude: float) -> Quality:
     """Evaluate the fitted law at one amplitude."""
     loss, parts = losses_of(result.law, amplitude)
     losses, total = dict(zip("abc", parts.tolist(), strict=True)), float(parts.sum())
@@ -209,7 +207,10 @@ def quality_by_law(result: FitResult, amplitude: float) -> Quality:
         period,
         {
             name: _share(
-                share, _sd(np.eye(3)[index] - share, covariance), result[name], by_rate[index]
+                share,
+                _sd(np.eye(3)[index] - share, covariance),
+                result.parameters[name],
+                by_rate[index],
             )
             for index, (name, share) in enumerate(shares.items())
         },
@@ -224,7 +225,7 @@ def _share(share: float, sd: float, rate: Estimate, by_rate: float) -> Estimate:
     return Estimate(share, sd, "", (max(low, 0.0), min(high, 1.0)), rate.at_bound)
 
 
-def relative_loss_sd(result: FitResult, amplitude: float) -> float:
+def relative_loss_sd(result: Fitted, amplitude: float) -> float:
     """Relative standard deviation of the law's loss, and so of Q, at one amplitude."""
     return _sd(np.ones(3), _covariance_of_losses(result, amplitude))
 
@@ -235,7 +236,7 @@ def _sd(weights: FloatArray, covariance: FloatArray) -> float:
     return math.sqrt(max(float(weights @ covariance @ weights), 0.0))
 
 
-def _covariance_of_losses(result: FitResult, amplitude: float) -> FloatArray:
+def _covariance_of_losses(result: Fitted, amplitude: float) -> FloatArray:
     """Return the covariance of a y, b and c/y, over their sum squared, shape (3, 3)."""
     slope = np.array([amplitude, 1.0, 1.0 / amplitude])
     loss = float(slope @ [result.value(name) for name in "abc"])
@@ -245,7 +246,7 @@ def _covariance_of_losses(result: FitResult, amplitude: float) -> FloatArray:
     return relative[:, None] * result.covariance_of("a", "b", "c") * relative
 
 
-def period_of(result: FitResult, amplitude: float) -> float:
+def period_of(result: Fitted, amplitude: float) -> float:
     """Period at one amplitude, s; that of small amplitudes where the law cannot swing there."""
     if not math.isfinite(result.value("frequency")):
         return math.nan
@@ -261,13 +262,13 @@ def _times(estimate: Estimate, factor: float, unit: str) -> Estimate:
     return Estimate(factor * estimate.value, factor * estimate.sd, unit)
 
 
-def mean_square(result: FitResult) -> float:
+def mean_square(result: Fitted) -> float:
     """Mean of the squares of a large, a middle and a small amplitude, by which the period grows."""
     seen = [check.amplitude_rad for check in result.decrement_check]
     return float(np.mean(np.square(seen or [result.value("amplitude")])))
 
 
-def small_period(result: FitResult) -> Estimate:
+def small_period(result: Fitted) -> Estimate:
     """Period 1/f of Eq. 8's frequency, s: with the torque of sin x that of small amplitudes.
 
     Where the law is refuted that of the turning points, extrapolated to small swings.
@@ -278,7 +279,7 @@ def small_period(result: FitResult) -> Estimate:
     return period_of_frequency(result.parameters["frequency"])
 
 
-def small_frequency(result: FitResult) -> Estimate:
+def small_frequency(result: Fitted) -> Estimate:
     """Frequency of small swings, Hz: the law's, or where that is refuted 1/T of `small_period`."""
     small, fitted = small_period(result), result.parameters["frequency"]
     return fitted if small == period_of_frequency(fitted) else over(1.0, small, "Hz")

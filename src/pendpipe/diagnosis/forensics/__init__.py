@@ -19,8 +19,8 @@ from pendpipe.diagnosis.forensics import (
     tracking,
 )
 from pendpipe.diagnosis.forensics.evidence import Evidence
+from pendpipe.diagnosis.found import Finding
 from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR
-from pendpipe.diagnosis.result import Finding
 
 _CLEAN: Final = 1.3
 """chi^2 per reading up to which hardly more than noise is left."""

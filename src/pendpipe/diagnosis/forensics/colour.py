@@ -17,9 +17,8 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.blocks import blocks_of
 from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.tails import tail_of_squares
+from pendpipe.diagnosis.found import COLOURED_NOISE, Finding, Location
 from pendpipe.diagnosis.projection import tangent_basis
-from pendpipe.diagnosis.result import Finding, Location
-from pendpipe.diagnosis.summary import COLOURED_NOISE
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, compact
 

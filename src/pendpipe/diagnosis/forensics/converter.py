@@ -19,7 +19,7 @@ from pendpipe.diagnosis.forensics.codes import (
     read_codes,
 )
 from pendpipe.diagnosis.forensics.local import local_residual
-from pendpipe.diagnosis.result import Finding, Location
+from pendpipe.diagnosis.found import Finding, Location
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number
 

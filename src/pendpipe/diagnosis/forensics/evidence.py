@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pendpipe.diagnosis.forensics.local import Local, local_residual
-from pendpipe.diagnosis.result import Location
+from pendpipe.diagnosis.found import Location
 from pendpipe.diagnosis.unwrapped import unwrapped
 
 if TYPE_CHECKING:

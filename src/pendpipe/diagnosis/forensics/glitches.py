@@ -13,9 +13,9 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.local import Local, local_residual, whitened_in_time
 from pendpipe.diagnosis.forensics.tails import Tail, fit_tail
+from pendpipe.diagnosis.found import Finding, Location
 from pendpipe.diagnosis.noise import TAPS
 from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR
-from pendpipe.diagnosis.result import Finding, Location
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number
 

@@ -15,8 +15,8 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.slips import beside
+from pendpipe.diagnosis.found import Confirmation, Finding, Location
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import Confirmation, Finding, Location
 from pendpipe.diagnosis.unwrapped import alignment
 from pendpipe.estimate import Estimate
 

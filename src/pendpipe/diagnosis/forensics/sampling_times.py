@@ -12,7 +12,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.forensics.codes import read_codes
 from pendpipe.diagnosis.forensics.local import whitened_series
 from pendpipe.diagnosis.forensics.tails import tail_of_squares
-from pendpipe.diagnosis.result import Finding
+from pendpipe.diagnosis.found import Finding
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import with_error
 

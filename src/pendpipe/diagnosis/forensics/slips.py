@@ -19,8 +19,8 @@ from pendpipe.analysis.half_cycles import find_extremes
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray, scaled_qr
 from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.found import Confirmation, Finding, Location
 from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.result import Confirmation, Finding, Location
 from pendpipe.effects.model import jacobian
 from pendpipe.estimate import Estimate
 

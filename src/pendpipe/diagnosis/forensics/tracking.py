@@ -8,7 +8,7 @@ import numpy as np
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.forensics.evidence import Evidence
-from pendpipe.diagnosis.result import Confirmation, Finding, Location
+from pendpipe.diagnosis.found import Confirmation, Finding, Location
 from pendpipe.estimate import Estimate
 
 _SMOOTH: Final = 5

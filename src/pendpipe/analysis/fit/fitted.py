@@ -1,0 +1,235 @@
+"""What a fit holds: its numbers with errors, what they were checked against, and its light."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
+
+import numpy as np
+
+from pendpipe.analysis.fit.backbone import Backbone, backbone_of
+from pendpipe.analysis.fit.decrement import Check, Light
+from pendpipe.analysis.fit.goodness import LEVEL
+from pendpipe.analysis.turning_points import TurningPoints
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics import Eq8, Release
+from pendpipe.dynamics.eq8 import Restoring
+from pendpipe.estimate import Estimate
+
+if TYPE_CHECKING:
+    from pendpipe.recording import Recording
+
+Method = Literal["waveform", "turning-points", "amplitudes"]
+Baseline = Literal["eq8", "viscous"]
+DragForm = Literal["energy", "speed", "undecided"]
+Fit = TypeVar("Fit", bound="Fitted")
+PARTS: Final = ("quality_factor_hysteretic", "quality_factor_viscous")
+OPTIONAL: Final = ("zero_drift", "other_frequency", "length", "gravity")
+PARAMETERS: Final = ("a", "b", "c", "frequency", "amplitude", "phase", "offset")
+
+
+_RATES: Final = {
+    "1": ("1/s", "1/s"),
+    "rad/s": ("1/rad", "rad/s^2"),
+    "rad/s^2": ("s/rad", "rad/s^3"),
+    "m/s": ("1/m", "m/s^2"),
+    "m/s^2": ("s/m", "m/s^3"),
+}
+"""Units of a and c where that of the motion has the second in it."""
+
+
+def units(unit: str) -> dict[str, str]:
+    """Unit of each parameter, for motions in a unit."""
+    a, c = _RATES.get(unit, (f"1/({unit} s)", f"{unit}/s"))
+    return {
+        "a": a,
+        "b": "1/s",
+        "c": c,
+        "frequency": "Hz",
+        "amplitude": unit,
+        "phase": "rad",
+        "offset": unit,
+    }
+
+
+@dataclass(frozen=True, repr=False)
+class Fitted:
+    """What was fitted of one recording, with its errors, and how far it may be believed.
+
+    Parameters
+    ----------
+    method, baseline
+        How it was fitted (to all readings, to turning points, or to amplitudes alone, whose
+        frequency, phase and noise are NaN), and with which model.
+    parameters
+        The seven of `PARAMETERS`: the rates of Eq. 13, Eq. 8's frequency omega/(2 pi),
+        |y| at the first turning point kept, the phase at the first sample kept (the motion
+        is there ``offset + amplitude cos(phase)`` to first order), and the level.
+    quality_factor_limit
+        pi f/b: the Q that the exponential losses alone would give; None for b = 0.
+    quality_factor_hysteretic, quality_factor_viscous
+        The parts of b that are held; None elsewhere: one recording does not tell them apart.
+    covariance_order, covariance
+        Names and matrix, shape (n, n).
+    noise_rms_rad, residual_rms_rad, chi2_per_dof
+        Noise of one reading (never below step/sqrt(12)); what the model leaves; and their
+        comparison.
+    samples, turning_points
+        How many of each were used.
+    cuts
+        Spans left out: ``start_s``, ``stop_s``, ``reason``.
+    provenance, warnings
+        Where it comes from; and what the reader should know.
+    restoring
+        Which restoring torque the numbers belong to.
+    settled
+        Whether the search came to its end; a fit that did not is no result.
+    decrement_check
+        The law's loss beside that of the turning points, the large amplitude first.
+    fit_p_value
+        Of the one test of fit, over all its questions (`goodness`, `decrement`).
+    drag_form
+        Which form of the drag the readings prefer; undecided where neither is a thousand times as
+        likely as the other: then the errors cover both.
+    drag
+        The form that `law` has: the likelier.
+    zero_drift
+        By how much the zero rises in a second, where the readings ask for it.
+    other_frequency
+        Eq. 8's frequency with the other torque, where the readings can't
+        decide between the two and the frequencies differ by more than their error.
+    torque_odds
+        Logarithm of the likelihood of the fitted torque over the other's; None where it was not
+        asked for.
+    light, light_reason
+        How far the numbers may be believed, by what the misfit does to them (`consequence`), and
+        why.
+    quotable
+        What may be quoted: ``"period"``, ``"Q"``, ``"losses"``, ``"a"``, ``"b"``, ``"c"``.
+    shown
+        The backbone, where it is known already (`backbone`).
+    hysteretic_share
+        Part of b that the fitted law has as hysteretic; hardly any recording tells it.
+    clock_ppm
+        What the clock may be off by, in parts per million, where that is in the error of the
+        period.
+    scale_percent
+        What the scale of the readings (V/rad, a camera's) may be off by, in percent; None where
+        that is not in the errors.
+    length, gravity
+        Of a simple pendulum, where it was given: the other of the two is a number of the fit.
+    name
+        Of the file that was fitted.
+    motion
+        The waveform's law at its minimum, where b has its parts, and the turning point from which
+        it moves; None where the fit was read from a file.
+    points, decay
+        The turning points and the readings of the fitted decay; None where the fit was read
+        from a file.
+    drawn_by
+        Imports what draws it (`pendpipe.api`): a result knows no figures.
+    """
+
+    method: Method
+    baseline: Baseline
+    parameters: Mapping[str, Estimate]
+    quality_factor_limit: Estimate | None
+    covariance_order: tuple[str, ...]
+    covariance: FloatArray
+    noise_rms_rad: float
+    residual_rms_rad: float
+    chi2_per_dof: float
+    samples: int
+    turning_points: int
+    quality_factor_hysteretic: Estimate | None = None
+    quality_factor_viscous: Estimate | None = None
+    cuts: tuple[Mapping[str, Any], ...] = ()
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    restoring: Restoring = "linear"
+    settled: bool = True
+    decrement_check: tuple[Check, ...] = ()
+    fit_p_value: float | None = None
+    drag_form: DragForm = "energy"
+    drag: Literal["energy", "speed"] = "energy"
+    zero_drift: Estimate | None = None
+    other_frequency: Estimate | None = None
+    torque_odds: float | None = None
+    light: Light = "amber"
+    light_reason: str = "the decrement was not checked"
+    quotable: tuple[str, ...] = ()
+    shown: Backbone | None = field(default=None, repr=False, compare=False)
+    hysteretic_share: float = 0.5
+    clock_ppm: float | None = None
+    scale_percent: float | None = None
+    length: Estimate | None = None
+    gravity: Estimate | None = None
+    name: str = field(default="", compare=False)
+    motion: tuple[Eq8, Release] | None = field(default=None, repr=False, compare=False)
+    points: TurningPoints | None = field(default=None, repr=False, compare=False)
+    decay: Recording | None = field(default=None, repr=False, compare=False)
+    drawn_by: Callable[[], Any] | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def refuted(self) -> bool:
+        """Whether the readings differ from the law by more than noise explains."""
+        return self.fit_p_value is not None and self.fit_p_value < LEVEL
+
+    @cached_property
+    def backbone(self) -> Backbone | None:
+        """Period and decrement against amplitude, as the turning points show them without a law.
+
+        None of too few of them, and of two modes that beat.
+
+        Examples
+        --------
+        >>> import pendpipe as pp
+        >>> fit = pp.fit("examples/rod-pendulum.csv")
+        >>> print(fit.backbone.small_period, fit.backbone.loss(0.05))
+        (1.145475 ± 0.000027) s (0.019411 ± 0.000063) s⁻¹
+        """
+        if self.shown is not None or self.points is None or not self.decrement_check:
+            return self.shown
+        return backbone_of(self.points, self.law)
+
+    @property
+    def lawless(self) -> Backbone | None:
+        """The backbone, where period and Q are quoted from it: the law is refuted."""
+        return self.backbone if self.refuted or self.light == "red" else None
+
+    @property
+    def equation(self) -> str:
+        """Name of the law that was fitted."""
+        if self.restoring == "sine":
+            return "Eq. 8 with the torque of sin x"
+        return "Eq. 8" if self.method == "waveform" else "Eq. 14"
+
+    @property
+    def law(self) -> Eq8:
+        """Eq. 8 with the fitted numbers; b is divided as the readings like it best."""
+        held, frequency = self.quality_factor_hysteretic, self.value("frequency")
+        a, b, c = map(self.value, "abc")
+        best = self.hysteretic_share * b
+        share = best if held is None else math.pi * frequency / held.value
+        hysteretic = min(max(share, 0.0), b)
+        omega = math.tau * frequency
+        if not math.isfinite(omega):
+            omega = fast_beside(a, b, c, self.value("amplitude"))
+        return Eq8(omega, a, hysteretic, b - hysteretic, c, self.restoring, self.drag)
+
+    def value(self, name: str) -> float:
+        """Value of one parameter."""
+        return self.parameters[name].value
+
+    def covariance_of(self, *names: str) -> FloatArray:
+        """Covariance of some parameters, in their order."""
+        place = [self.covariance_order.index(name) for name in names]
+        return self.covariance[np.ix_(place, place)]
+
+
+def fast_beside(a: float, b: float, c: float, amplitude: float) -> float:
+    """Return an angular frequency to which Eq. 13 holds to 1e-8, beside losses at an amplitude."""
+    return 1e4 * max(a * amplitude + b + c / amplitude, 1e-300)

@@ -1,0 +1,92 @@
+"""What a diagnosis ends with, as numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from pendpipe.analysis.fit.result import FitResult
+from pendpipe.diagnosis.found import LEVEL, FittedModel, FoundEffect, Verdict
+from pendpipe.dynamics.eq8 import Restoring
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.cycles import SmallSwings
+    from pendpipe.diagnosis.held_out import HeldOut
+    from pendpipe.diagnosis.hypothesis import Hypothesis
+    from pendpipe.diagnosis.remainder import Remainder
+
+
+@dataclass(frozen=True, repr=False)
+class Outcome:
+    """Where model and recording differ, and what is missing.
+
+    Parameters
+    ----------
+    baseline_name, baseline, improved
+        The model that was asked for, and the one with the effects that were found.
+    noise_rms_rad
+        Of one reading, never below step/sqrt(12).
+    verdict, p_value
+        Global: of the largest score over the whole catalogue.
+    effects
+        What the baseline has, and the missing in the order in which they were added.
+    held_out
+        None where nothing was added.
+    unexplained_rms_rad, unexplained_p_value
+        What the improved model leaves.
+    remainder
+        The same in parts: its size over the noise, and where it lies.
+    small_swings
+        How the frequency differs from the improved model's at the smallest amplitudes, if it does.
+    details
+        All that was found, one paragraph: what the summary leaves out too.
+    name
+        Of the recording.
+    fit
+        The fit that the diagnosis began with.
+    scanned
+        What was looked for, with its p-value on the baseline's residual.
+    search
+        The fits and readings behind it, for the figures.
+    alone, recordings
+        Of several recordings: each one's own diagnosis, and what is said of it.
+    drawn_by
+        Imports what draws it (`pendpipe.api`): a result knows no figures.
+    restoring, drag_form
+        The baseline's torque, and the form of drag that the readings prefer.
+    level
+        The p-value from which chance explains a misfit.
+    """
+
+    baseline_name: str
+    baseline: FittedModel
+    improved: FittedModel
+    noise_rms_rad: float
+    verdict: Verdict
+    p_value: float
+    effects: tuple[FoundEffect, ...]
+    held_out: HeldOut | None
+    unexplained_rms_rad: float
+    unexplained_p_value: float
+    details: str
+    warnings: tuple[str, ...] = ()
+    figures: tuple[str, ...] = ()
+    remainder: Remainder | None = None
+    small_swings: SmallSwings | None = None
+    restoring: Restoring = "linear"
+    drag_form: str = "energy"
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    name: str = ""
+    fit: FitResult | None = field(default=None, repr=False, compare=False)
+    scanned: tuple[tuple[str, float], ...] = ()
+    search: Hypothesis | None = field(default=None, repr=False, compare=False)
+    alone: tuple[Outcome, ...] = field(default=(), repr=False, compare=False)
+    recordings: tuple[dict[str, Any], ...] = ()
+    level: float = LEVEL
+    drawn_by: Callable[[], Any] | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def missing(self) -> tuple[FoundEffect, ...]:
+        """The effects that the baseline lacks."""
+        return tuple(each for each in self.effects if not each.presumed)
