@@ -70,6 +70,7 @@ _ENDS: Final = 1 << 15
 _BLOCK: Final = 1 << 20
 """So many are hashed at a time."""
 _RAW: Final = re.compile(rb'\A\{"format": "pendpipe-raw"')
+_RECORDED: Final = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#.*\r?\n)*?# recorded_by: pendpipe ")
 _OUT: Final = ("-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
 _STREAM: Final = re.compile(r"/dev/stderr|(/dev|/proc/self)/fd/\d+")
 
@@ -138,6 +139,12 @@ def check_output(path: str | Path) -> None:
     )
     remedy = "name another one, or add --force to replace it"
     if head and not call.force:
+        refuse_if(
+            _RECORDED.match(head),
+            target,
+            "it is a recording",
+            "name another file; --force replaces this table, its raw file stays",
+        )
         refuse_if(found is None, target, "pendpipe did not make this file", remedy)
         refuse_if(edited, target, "it was edited since pendpipe made it", remedy)
         if found is not None and found.stated in ("", _BLANK):

@@ -191,6 +191,49 @@ def test_init_lists_recordings_of_ones_own(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "name",
+    [
+        *("calibration", "figures", "logs", "chunks", "pendulums", "con", "con.a", "nul.b"),
+        *(
+            "n" * 150,
+            "tab\there",
+            "line\nbreak",
+            'say "so"',
+            "#1",
+            "simulated",
+            "-",
+            "été",
+            "a\u2028b",
+        ),
+    ],
+)
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such names")
+def test_what_init_writes_a_campaign_accepts(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Names of the campaign's own folders, of Windows, too long twice, with signs of tables."""
+    monkeypatch.chdir(tmp_path)
+    files = [Path(folder, f"{name}.csv") for folder in ("x", "y")]
+    for path in files:
+        path.parent.mkdir()
+        path.write_text("", encoding="utf-8")
+    assert main(["init", "mine", *map(str, files)]) == 0
+    records = read_records("mine/config/records.tsv")
+    found = [Path("mine", record.source).resolve() for record in records]
+    assert found == [path.resolve() for path in files]
+
+
+def test_init_refuses_a_name_that_a_table_cannot_hold(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answer_of: Any
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("decay.csv ").write_text("", encoding="utf-8")
+    (line,) = answer_of(["init", "mine", "decay.csv "], 2).err.splitlines()
+    assert "rename the file" in line
+    assert not Path("mine").exists()
+
+
+@pytest.mark.parametrize(
     ("words", "said"),
     [
         ([], "pendpipe init writes one"),

@@ -256,6 +256,13 @@ def test_the_jobs_get_numbers_where_the_command_line_gave_text(
     assert jobs.store(again, tmp_path) == jobs.store(load_campaign(content, "--config"), tmp_path)
 
 
+def test_null_on_the_command_line_blanks_a_key(content: dict[str, Any]) -> None:
+    """Snakemake hands on `--config typical_record=null` as the text null."""
+    assert content["typical_record"]
+    blank = load_campaign(content | {"typical_record": "null"}, "--config")
+    assert blank.configuration.typical_record is None
+
+
 def test_a_change_of_the_truth_touches_the_records_it_concerns(content: dict[str, Any]) -> None:
     """Another water changes the water records' acquisition and leaves the air's."""
     before = load_campaign(content, "config.yaml")

@@ -3,6 +3,8 @@
 What stands above a function declares its arguments; its docstring is what ``--help`` says.
 """
 
+import csv
+import io
 import json
 import math
 import os
@@ -274,7 +276,7 @@ def _beginning(folder: Path, own: list[Path]) -> dict[str, bytes]:
     table = (templates / "records.tsv").read_text(encoding="utf-8")
     if own:
         head = table[: table.index("\nstring\t")]
-        table = "\n".join([head, *_rows(folder, own)]) + "\n"
+        table = f"{head}\n{_rows(folder, own)}"
     return {
         CONFIGURATION.as_posix(): (templates / "config.yaml").read_bytes(),
         "config/records.tsv": table.encode(),
@@ -282,24 +284,30 @@ def _beginning(folder: Path, own: list[Path]) -> dict[str, bytes]:
     }
 
 
-def _rows(folder: Path, own: list[Path]) -> list[str]:
+def _rows(folder: Path, own: list[Path]) -> str:
     """A row of the table for each recording, named after its file."""
-    from pendpipe.configuration.load import LONGEST_NAME
+    from pendpipe.configuration.load import LONGEST_NAME, unfit
 
-    rows: dict[str, str] = {}
+    text, taken = io.StringIO(newline=""), set[str]()
+    table = csv.writer(text, delimiter="\t", lineterminator="\n")
     for path in own:
         refuse_if(not path.is_file(), path, "there is no such file", "check the path")
-        plain = re.sub(r"[^A-Za-z0-9._-]+", "-", path.stem).strip("-._")[:LONGEST_NAME] or "record"
-        name = next(
-            each
-            for each in (plain, *(f"{plain}-{number}" for number in range(2, len(own) + 2)))
-            if each.lower() not in rows
-        )
+        plain = re.sub(r"[^A-Za-z0-9._-]+", "-", path.stem).strip("-._")[: LONGEST_NAME - 20]
+        begin = f"record-{plain}".strip("-._") if any(unfit(plain)) else plain
+        numbered = (f"{begin}-{number}" for number in range(2, len(own) + 2))
+        name = next(each for each in (begin, *numbered) if each.lower() not in taken)
+        taken.add(name.lower())
         source = Path(os.path.relpath(path, folder)).as_posix()
         # A file may have the name of what is no file.
         there = "./" * (source == "simulated" or source.startswith("dataq:"))
-        rows[name.lower()] = f"{name}\t{there}{source}"
-    return list(rows.values())
+        refuse_if(
+            source != source.strip(),
+            repr(str(path)),
+            "a table can't hold a name with a blank at its begin or end",
+            "rename the file",
+        )
+        table.writerow([name, there + source])
+    return text.getvalue()
 
 
 @command(

@@ -5,6 +5,7 @@ known name.
 """
 
 import csv
+import io
 import json
 import math
 import re
@@ -102,13 +103,13 @@ def read_records(path: str | Path) -> list[Record]:
     """
     place = Path(path)
     text = read_text(place, "see config/README.md", absent="table")
+    lines = (line if line[:1] != "#" else "\n" for line in io.StringIO(text, newline=""))
+    table = csv.reader(lines, delimiter="\t")
     rows = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), start=1)
-        if line.strip() and not line.startswith("#")
+        (table.line_num, [cell.strip() for cell in row]) for row in table if "".join(row).strip()
     ]
     refuse_if(not rows, place, "the table is empty", f"begin with the columns {', '.join(COLUMNS)}")
-    names = [name.strip() for name in rows[0][1].split("\t")]
+    names = rows[0][1]
     for name in ("record", "source", *names):
         for wrong, problem, remedy in (
             (name not in names, f"the column '{name}' is missing", "separate columns by tabs"),
@@ -118,8 +119,7 @@ def read_records(path: str | Path) -> list[Record]:
             refuse_if(wrong, f"{place}, line {rows[0][0]}", problem, remedy)
     records: list[Record] = []
     last = rows[-1][0]
-    for number, line in rows[1:]:
-        cells = [cell.strip() for cell in next(csv.reader([line], delimiter="\t"))]
+    for number, cells in rows[1:]:
         where = f"{place}, line {number}"
         refuse_if(
             len(cells) > len(names),
@@ -160,31 +160,32 @@ def _record(where: str, row: dict[str, str]) -> Record:
         raise as_input_error(where, fault) from None
 
 
-def _check_name(where: str, name: str) -> None:
-    """Refuse what can't be the name of a folder on Linux, Windows and macOS alike."""
-    for wrong, problem, remedy in (
-        (
-            len(name) > LONGEST_NAME,
+def unfit(name: str) -> tuple[str, str]:
+    """Why this can't be a folder on Linux, Windows and macOS alike, and a remedy; else blank."""
+    found = {
+        len(name) > LONGEST_NAME: (
             f"the record's name has {len(name)} characters",
             f"use at most {LONGEST_NAME}",
         ),
-        (
-            not NAME.fullmatch(name) or name.endswith("."),
+        not NAME.fullmatch(name) or name.endswith("."): (
             f"'{name}' is no name for a folder",
             "use letters, digits, . _ -, and no dot at the end",
         ),
-        (
-            _OF_WINDOWS.fullmatch(name),
+        _OF_WINDOWS.fullmatch(name) is not None: (
             f"Windows keeps the name '{name}' for itself",
             "rename the record",
         ),
-        (
-            name.lower() in _OF_THE_CAMPAIGN,
+        name.lower() in _OF_THE_CAMPAIGN: (
             f"the campaign has a file or folder '{name}' of its own",
             "rename the record",
         ),
-    ):
-        refuse_if(wrong, where, problem, remedy)
+    }
+    return found.get(True, ("", ""))
+
+
+def _check_name(where: str, name: str) -> None:
+    problem, remedy = unfit(name)
+    refuse_if(problem, where, problem, remedy)
 
 
 _NOT_IN_A_FOLDER: Final = frozenset("{}*?[]\"'`$;&|<>!#%^\x7f")
@@ -304,8 +305,10 @@ def load_campaign(content: Mapping[str, Any], place: str | Path) -> Campaign:
     InputError
         On the first error: the place, what is wrong, what to do.
     """
+    # Snakemake's --config hands `null` on as text.
+    given = {key: None if value == "null" else value for key, value in content.items()}
     try:
-        configuration = Configuration.model_validate(content)
+        configuration = Configuration.model_validate(given)
     except ValidationError as fault:
         raise as_input_error(place, fault, Configuration) from None
     _check_results(configuration.results, place)
