@@ -1,8 +1,10 @@
 """A job does a stage for a chunk of records: what is done stays done, whatever happens."""
 
+import contextlib
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -53,17 +55,32 @@ def write_decay(path: Path, seed: int) -> None:
     path.write_text(text, encoding="utf-8")
 
 
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a campaign that was fitted, once a run: five decays in one chunk."""
+    home = tmp_path_factory.mktemp("five")
+    rows = "".join(f"{name}\t{name}.csv\n" for name in RECORDS)
+    (home / "records.tsv").write_text(f"record\tsource\n{rows}", encoding="utf-8")
+    (home / "config.yaml").write_text("title: Five\nrecords: records.tsv\n", encoding="utf-8")
+    with contextlib.chdir(home):
+        for seed, name in enumerate(RECORDS):
+            write_decay(Path(f"{name}.csv"), seed)
+        run(*ORDER)
+    return home
+
+
 @pytest.fixture
-def campaign(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Campaign:
-    """Five files of decays in one chunk, without a diagnosis."""
-    monkeypatch.chdir(tmp_path)
-    lines = ["record\tsource"]
-    for seed, name in enumerate(RECORDS):
-        write_decay(Path(f"{name}.csv"), seed)
-        lines.append(f"{name}\t{name}.csv")
-    Path("records.tsv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    Path("config.yaml").write_text("title: Five\nrecords: records.tsv\n", encoding="utf-8")
+def done(fitted: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Campaign:
+    """A copy of it, with its times."""
+    monkeypatch.chdir(shutil.copytree(fitted, tmp_path / "five"))
     return loaded()
+
+
+@pytest.fixture
+def campaign(done: Campaign) -> Campaign:
+    """The same before its first job."""
+    shutil.rmtree("results")
+    return done
 
 
 def loaded() -> Campaign:
@@ -95,15 +112,14 @@ def changed(before: dict[str, int]) -> list[str]:
 
 
 @pytest.fixture
-def before(campaign: Campaign) -> dict[str, int]:
-    """All records are fitted; when each fit was written."""
-    run(*ORDER)
+def before(done: Campaign) -> dict[str, int]:
+    """When the fit of each record was written."""
     return written(fits())
 
 
-def test_what_is_done_is_not_done_again(campaign: Campaign, before: dict[str, int]) -> None:
+def test_what_is_done_is_not_done_again(done: Campaign, before: dict[str, int]) -> None:
     assert set(before) == set(RECORDS)
-    STAGES["fit"].path(campaign, "all").unlink()  # as Snakemake does before the job
+    STAGES["fit"].path(done, "all").unlink()  # as Snakemake does before the job
     run("fit")
     assert written(fits()) == before
 
@@ -198,27 +214,26 @@ def in_the_future(path: Path) -> None:
     ],
 )
 def test_a_plan_notices_what_a_job_then_makes_again(
-    campaign: Campaign,
+    done: Campaign,
     change: Callable[[Path], None],
     name: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    run(*ORDER)
     output = Path(name).name
     (stage,) = (each for each in STAGES.values() if each.output == output)
-    files, records = [Path("results", each, output) for each in RECORDS], chunks_of(campaign)["all"]
-    sound = plan(campaign, stage, "all", records).found
+    files, records = [Path("results", each, output) for each in RECORDS], chunks_of(done)["all"]
+    sound = plan(done, stage, "all", records).found
     assert (sound.repaired, sound.damages) == ("", ())
     before, times = [sha256(path) for path in files], [path.stat().st_mtime_ns for path in files]
     change(Path("results/two", name))
-    found = plan(campaign, stage, "all", records).found
+    found = plan(done, stage, "all", records).found
     (damage,) = found.damages
     assert damage.path == Path("results/two", name)
     assert found.repaired != sound.repaired, "a changed parameter runs the job"
     run(stage.name)
     assert ("; set aside as " in capsys.readouterr().err) == (damage.found != "missing")
     assert [sha256(path) for path in files] == before
-    after = plan(campaign, stage, "all", records).found
+    after = plan(done, stage, "all", records).found
     assert (after.damages, after.repaired) == ((), found.repaired), "and runs it once"
     anew = [path.stat().st_mtime_ns != time_ns for path, time_ns in zip(files, times, strict=True)]
     assert anew == [name == "two" for name in RECORDS]
@@ -286,12 +301,11 @@ def test_records_of_an_instrument_have_a_chunk_each(campaign: Campaign) -> None:
 
 
 @pytest.mark.slow
-def test_a_chunk_that_is_killed_ends_the_same_and_repeats_nothing(campaign: Campaign) -> None:
-    """Killed -9 ten times, wherever it is: what was finished stays, and all ends as undisturbed."""
-    run(*ORDER)
+def test_a_chunk_that_is_killed_ends_the_same_and_repeats_nothing(done: Campaign) -> None:
+    """Killed -9 four times, anywhere: what was finished stays, and all ends as undisturbed."""
     undisturbed = {name: sha256(path) for name, path in fits().items()}
     draw = random.Random(1)
-    for _ in range(10):
+    for _ in range(4):
         for name, path in fits().items():
             path.unlink()
             (path.parent / "manifest/fit.json").unlink()
