@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from pendpipe.arrays import AnyArray, BoolArray, ByteArray, FloatArray
 from pendpipe.cells import inert, original
 from pendpipe.errors import InputError, refuse_if
+from pendpipe.facts import KINDS, Fact, guesses
 from pendpipe.files import MADE_BY, MARK, RECORDED_BY, read_text, replaced
 
 Quantity = Literal["angle_rad", "volts", "displacement_m", "reading"]
@@ -84,9 +85,8 @@ class Recording:
         The step between neighbouring readings in the unit of `values`, where known.
     notes
         What a reader guessed or noticed, a clause each, for the user to see.
-    weak_guesses
-        What it guessed on slender grounds, with the option that overrides it: whoever
-        prints an answer prints these first.
+    facts
+        What is known of the file, and whether it is stated, shown or guessed.
     radius_excess
         Where the angles are those of positions: the distance from the pivot over its median,
         less 1, shape (n,). A string keeps it, so that it shows the errors of the tracking.
@@ -117,7 +117,7 @@ class Recording:
     metadata: Mapping[str, str] = field(default_factory=dict)
     resolution: float | None = None
     notes: tuple[str, ...] = ()
-    weak_guesses: tuple[str, ...] = ()
+    facts: tuple[Fact, ...] = ()
     radius_excess: FloatArray | None = None
 
     def __init__(
@@ -129,7 +129,7 @@ class Recording:
         metadata: Mapping[str, str] | None = None,
         resolution: float | None = None,
         notes: tuple[str, ...] = (),
-        weak_guesses: tuple[str, ...] = (),
+        facts: tuple[Fact, ...] = (),
         radius_excess: FloatArray | None = None,
         *,
         angle_rad: ArrayLike | None = None,
@@ -175,7 +175,7 @@ class Recording:
             f"{len(times)} times and {len(readings)} readings",
             "give one time for each reading",
         )
-        kept = (times, readings, quantity, quality, metadata, resolution, notes, weak_guesses)
+        kept = (times, readings, quantity, quality, metadata, resolution, notes, facts)
         for name, value in zip(self.__dataclass_fields__, (*kept, radius_excess), strict=True):
             object.__setattr__(self, name, value)
         if given:
@@ -192,7 +192,24 @@ class Recording:
     @property
     def unit_is_stated(self) -> bool:
         """Whether the unit is known, and not guessed."""
-        return not any("(--unit)" in guess for guess in self.weak_guesses)
+        known = self.fact("unit")
+        return known is None or known.how != "guessed"
+
+    @property
+    def weak_guesses(self) -> tuple[str, ...]:
+        """What was guessed, a clause each, with the option that overrides it."""
+        return guesses(self.facts)
+
+    def fact(self, kind: str) -> Fact | None:
+        """The fact of a kind, the last where there are several; ``None`` without any."""
+        return next((fact for fact in self.facts[::-1] if fact.kind == kind), None)
+
+    def knowing(self, fact: Fact) -> Self:
+        """Return the same recording with a fact more."""
+        if fact in self.facts:
+            return self
+        notes = (*self.notes, fact.said) if fact.said and fact.how != "guessed" else self.notes
+        return replace(self, facts=(*self.facts, fact), notes=notes)
 
     @cached_property
     def holds_amplitudes(self) -> bool:
@@ -303,13 +320,16 @@ class Recording:
     def _in_radians(self, volts_per_radian: float | None, place: str | Path) -> Self:
         if self.quantity == "angle_rad":
             values, notes = from_below(self.values)
-            return replace(self, values=values, notes=self.notes + notes) if notes else self
+            known = self
+            for note in notes:
+                known = known.knowing(Fact("turns", "undone", "shown", note))
+            return replace(known, values=values) if notes else self
         if self.quantity != "volts":
             return self
         constant = volts_per_radian or self.number("volts_per_radian", place)
         if constant is None:
-            guess = "no sensor constant: a, c and the amplitude are in volts (--volts-per-radian)"
-            return replace(self, weak_guesses=tuple(dict.fromkeys((*self.weak_guesses, guess))))
+            said = "no sensor constant: a, c and the amplitude are in volts"
+            return self.knowing(Fact("sensor constant", "none", "guessed", said))
         refuse_if(
             not constant,
             place,
@@ -475,8 +495,10 @@ def plain_lines(recording: Recording, *, original: bool = False) -> Iterator[str
         "radius_excess": recording.radius_excess,
     }
     there = {name: values for name, values in columns.items() if values is not None}
-    guesses = enumerate(recording.weak_guesses, start=1)
-    told = [*recording.metadata.items(), *((f"{_WEAK}{number}", said) for number, said in guesses)]
+    weak = (
+        (_WEAK + f.kind, f"{f.value}; {f.words}") for f in recording.facts if f.how == "guessed"
+    )
+    told = [*recording.metadata.items(), *weak]
     return table_lines(told, there, made=RECORDED_BY if original else MARK)
 
 
@@ -538,10 +560,26 @@ def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
         radius_excess=column.get("radius_excess"),
         metadata={key: text for key, text in metadata.items() if not key.startswith(_WEAK)},
         notes=notes,
-        weak_guesses=tuple(text for key, text in metadata.items() if key.startswith(_WEAK)),
+        facts=tuple(
+            _guess_of(key, text) for key, text in metadata.items() if key.startswith(_WEAK)
+        ),
     )
     check(place, recording, first_line=first + 2)
     return replace(recording, resolution=converter_step(recording, place))
+
+
+def _guess_of(key: str, text: str) -> Fact:
+    """Read back a guess: ``# weak_guess_unit: V; 'x' has no unit: taken to be volts (--unit)``."""
+    kind = key.removeprefix(_WEAK)
+    value, _, words = text.partition("; ")
+    said, _, option = (words or value).removesuffix(")").rpartition(" (")
+    return Fact(
+        kind if kind in KINDS else "rows",
+        value,
+        "guessed",
+        said or option,
+        option=option if said else "",
+    )
 
 
 def whole_lines(text: str) -> tuple[list[str], tuple[str, ...]]:

@@ -25,6 +25,7 @@ from pendpipe import cli
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
+from pendpipe.facts import Fact
 from pendpipe.figures.style import ShownFigure
 from pendpipe.process import _AHEAD
 from pendpipe.recording import Recording, read_plain, write_plain
@@ -360,13 +361,14 @@ def test_a_reading_of_any_unit_keeps_it_in_the_plain_form(tmp_path: Path) -> Non
         np.array([4.0, 5.0, 6.0]),
         "reading",
         metadata={"unit": "counts"},
-        weak_guesses=("the column is a guess",),
+        facts=(Fact("reading", "counts", "guessed", "the column is a guess"),),
     )
     write_plain(tmp_path / "counts.csv", recording)
     again = read_plain(tmp_path / "counts.csv")
     assert (again.quantity, again.unit) == ("reading", "counts")
     assert again.as_motion() is again
-    assert again.weak_guesses == recording.weak_guesses
+    assert again.facts == recording.facts
+    assert again.weak_guesses == ("the column is a guess (--column)",)
     assert dict(again.metadata) == {"unit": "counts"}
     np.testing.assert_array_equal(again.values, recording.values)
 

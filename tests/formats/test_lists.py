@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -239,7 +240,10 @@ def test_json_has_the_contracts_form(tmp_path: Path, answer_of: Any) -> None:
         "clipped_samples": 0,
         **{key: found[key] for key in ("warnings", "chosen", "unit", "level", "weak_guesses")},
         "kind": found["kind"],
+        "facts": found["facts"],
     }
+    reading = {"kind": "reading", "value": "'channel 1'", "how": "stated"}
+    assert reading.items() <= found["facts"][0].items()
     assert found == expected
     assert list(found) == list(expected)
 
@@ -286,8 +290,10 @@ def test_why_prints_a_line_a_decision(tmp_path: Path, answer_of: Any) -> None:
     printed = [line.strip() for line in answer_of(["inspect", "--why", str(path)]).out.splitlines()]
     assert "column 1 't': time, in s" in printed
     assert "column 2 'theta': angle, no unit stated" in printed
-    assert "columns separated by semicolons, decimal commas" in printed
-    assert any(line.startswith("'theta' is in radians: its period") for line in printed)
+    facts = [re.split("  +", line) for line in printed if "  " in line]
+    shown = [(kind, value, how) for kind, value, how, *_ in facts]
+    assert ("layout", "columns separated by semicolons, decimal commas", "shown") in shown
+    assert ("unit", "rad", "shown (p = 0.002)") in shown
     assert printed[-1] == "so 2000 readings of theta, in rad"
 
 

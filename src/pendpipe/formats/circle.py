@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.facts import Fact
 from pendpipe.formats.lists import one_way
 from pendpipe.formats.table import Column, periods, swing_of
 from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
@@ -42,8 +43,7 @@ class Seen:
 
     angle_rad: FloatArray
     radius_excess: FloatArray
-    notes: tuple[str, ...]
-    weak_guesses: tuple[str, ...] = ()
+    fact: Fact
 
 
 def seen_from_pivot(x: Column, y: Column, time_s: FloatArray) -> Seen:
@@ -54,7 +54,7 @@ def seen_from_pivot(x: Column, y: Column, time_s: FloatArray) -> Seen:
     this period under gravity decides; where that agrees with neither, the better circle is a guess.
     """
     left, up, seen = x.values, y.values, "the position seen from (0, 0)"
-    pivot, weak = pivot_of(left, up), tuple[str, ...]()
+    pivot, guess = pivot_of(left, up), ""
     if pivot is None and (better := _better_circle(left, up)) is not None:
         period_s = float(np.median(periods(time_s, left)[0]))
         length_m = STANDARD_GRAVITY_M_PER_S2 * (period_s / (2.0 * np.pi)) ** 2
@@ -63,9 +63,9 @@ def seen_from_pivot(x: Column, y: Column, time_s: FloatArray) -> Seen:
         if not agree[0]:
             pivot = better
         if agree == [False, False]:
-            weak = (
+            guess = (
                 f"the pivot is not (0, 0) but ({better[0]:.4g}, {better[1]:.4g}), about which"
-                " the positions lie on a circle (--column x for the position itself)",
+                " the positions lie on a circle"
             )
     if pivot is not None:
         left, up = left - pivot[0], up - pivot[1]
@@ -74,7 +74,11 @@ def seen_from_pivot(x: Column, y: Column, time_s: FloatArray) -> Seen:
     note = f"angle = atan2({x.label}, {sign}{y.label}), {seen}"
     radius = np.hypot(left, up)
     excess = radius / np.nanmedian(radius) - 1.0
-    return Seen(np.arctan2(left, down * up), excess, (note,), weak)
+    where = "({:.5g}, {:.5g})".format(*((0.0, 0.0) if pivot is None else pivot))
+    fact = Fact(
+        "pivot", where, "guessed" if guess else "shown", f"{guess}; {note}" if guess else note
+    )
+    return Seen(np.arctan2(left, down * up), excess, fact)
 
 
 _LENGTHS: Final = (1.0, 0.01, 1e-3, 0.0254)

@@ -13,6 +13,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
+from pendpipe.facts import Fact, How
 from pendpipe.formats.circle import on_a_circle, pivot_of
 from pendpipe.formats.lists import Listed, counts_samples, list_in, one_way
 from pendpipe.formats.table import Column, ReadOptions, Table, derivative_slope, evenness
@@ -51,8 +52,8 @@ class Choice:
         The reading; or two, the position (x, y) seen from a pivot.
     channels
         All that could have been chosen as the reading.
-    notes, weak_guesses
-        What was guessed, and what of it on slender grounds.
+    facts
+        How the time, the reading and a list were found.
     listed
         What list the table is, where it is no recording.
     """
@@ -61,8 +62,7 @@ class Choice:
     counts: bool
     readings: tuple[Column, ...]
     channels: tuple[Column, ...]
-    notes: tuple[str, ...] = ()
-    weak_guesses: tuple[str, ...] = ()
+    facts: tuple[Fact, ...] = ()
     listed: Listed | None = None
 
 
@@ -131,19 +131,23 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
     if not parts and options.channel is not None:
         picked = [find(table, channels, options.channel, range(1, len(channels) + 1))]
     mine: Sequence[Column] = channels
-    others, notes, weak = "", tuple[str, ...](), tuple[str, ...]()
-    readings = tuple(picked)
+    others, readings = "", tuple(picked)
+    label = " and ".join(column.label for column in picked)
+    facts = [Fact("reading", label, "stated")] if picked else []
     if not picked:
         time, mine, others = _of_one_run(channels, time)
-        readings, notes, weak = _readings(mine, time)
+        readings, facts = _readings(mine, time)
     names = listing([column.label for column in table.columns])
     found = list_in((*([time] if time else []), *mine), readings, time, counts=counts)
     if found is not None and found.remedy:
         refuse_if(reading and not picked, table.place, found.problem, found.remedy)
     elif found is not None:
         sizes = replace(found.column, values=sizes_of(found.column.values), role="unknown")
-        readings, weak = (sizes,), ()
-        notes = (f"{found.problem}: analysed as amplitudes against time",)
+        said = f"{found.problem}: analysed as amplitudes against time"
+        readings, facts = (
+            (sizes,),
+            [Fact("amplitudes", sizes.label, "shown", said, found.error_rate)],
+        )
     refuse_if(
         reading and not readings,
         table.place,
@@ -151,8 +155,13 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         "name it with --column (and its unit with --unit)",
     )
     if others:
-        notes = (*notes, f"one of several runs is read; choose with --column: {others}")
-    return Choice(time, counts, readings, channels, notes, weak, found)
+        said = f"one of several runs is read; choose with --column: {others}"
+        facts.append(Fact("rows", "one run", "shown", said))
+    if time is not None:
+        told = options.columns[0] is not None or time.role in ("time", "index")
+        rate = None if told else 0.5 ** min(len(time.values) - 2, 1000)
+        facts.insert(0, Fact("time column", time.label, "stated" if told else "shown", "", rate))
+    return Choice(time, counts, readings, channels, tuple(facts), found)
 
 
 def find(table: Table, columns: Sequence[Column], key: str, numbers: Sequence[int] = ()) -> Column:
@@ -315,7 +324,7 @@ def _of_one_run(
 
 def _readings(
     channels: Sequence[Column], time: Column | None
-) -> tuple[tuple[Column, ...], tuple[str, ...], tuple[str, ...]]:
+) -> tuple[tuple[Column, ...], list[Fact]]:
     """Choose the reading by its name, then by how it swings."""
     alive = [c for c in channels if _moves(c) and _WORTH[c.role] > 0]
     any_clear = any(column.swing.clear for column in alive)
@@ -327,7 +336,7 @@ def _readings(
     if pair is not None:
         candidates.append((_PAIR, pair))
     if not candidates:
-        return (), (), ()
+        return (), []
     most = max(entry[0] for entry in candidates)
     chosen, why = _of_equals([entry[1] for entry in candidates if entry[0] == most])
     clock = time.values if time is not None else None
@@ -341,8 +350,9 @@ def _readings(
     unclear = any_clear and not chosen[0].swing.clear
     if (nameless and not why) or unclear:
         what = "its name does not say what it holds" if not unclear else "it hardly oscillates"
-        return chosen, (), (f"{note}: {what} (--column)",)
-    return chosen, (note,), ()
+        return chosen, [Fact("reading", labels, "guessed", f"{note}: {what}")]
+    known: How = "stated" if chosen[0].role not in ("unknown", "index") else "shown"
+    return chosen, [Fact("reading", labels, known, note)]
 
 
 def _of_equals(equals: Sequence[tuple[Column, ...]]) -> tuple[tuple[Column, ...], str]:

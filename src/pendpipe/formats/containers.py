@@ -178,7 +178,7 @@ def _of_sheets(place: Path, sheets: _Sheets, options: ReadOptions) -> Table:
 def _noted(table: Table, note: str, others: list[str], without: int = 0) -> Table:
     """Name the part that was read, and those that were not, before the table's other notes."""
     left = f" (not {', '.join(others[:8])})" if others else ""
-    return replace(table, notes=(note + left, *table.notes[without:]))
+    return replace(table, notes=(note + left, *table.notes), facts=table.facts[without:])
 
 
 def _refuse_large_workbook(archive: zipfile.ZipFile) -> None:

@@ -30,12 +30,15 @@ class Listed:
         What is said of it, and what to give.
     column
         The column that shows it.
+    error_rate
+        How often a swing would look like it.
     """
 
     kind: str
     problem: str
     remedy: str
     column: Column
+    error_rate: float | None = None
 
 
 def list_in(

@@ -17,15 +17,10 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, nearest, refuse_if
+from pendpipe.facts import KINDS, Fact, guesses, remarks
 from pendpipe.files import names_in
 from pendpipe.formats.columns import choose
-from pendpipe.formats.lists import (
-    NOT_FREE,
-    SETTINGS,
-    WAVEFORM,
-    holds_settings,
-    steady,
-)
+from pendpipe.formats.lists import SETTINGS, WAVEFORM, holds_settings, steady
 from pendpipe.formats.plugin import HEAD
 from pendpipe.formats.table import (
     Column,
@@ -84,8 +79,8 @@ _PACKED: Final[tuple[tuple[bytes, Callable[[], Any]], ...]] = (
 def read(path: str | Path, options: ReadOptions = _ANYTHING) -> Recording:
     """Read one channel of any supported file; ``-`` is standard input.
 
-    Every guess stands in the recording's ``notes``, or, where it is a weak one, in its
-    ``weak_guesses``, and gives way to `options`.
+    What is stated, shown or guessed on the way stands in the recording's ``facts``; each gives way
+    to its option.
 
     Raises
     ------
@@ -236,39 +231,40 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
         refuse_text(table, column, "correct the row, or leave it blank")
     base = time_base(table, choice, options)
     found = readings(table, choice, options, base)
-    notes = [*table.notes, *choice.notes, *base.notes, *found.notes]
+    facts = [*table.facts, *choice.facts, *base.facts, *found.facts]
     given = found.values[base.rows]
     values = without_marks(given)
     _refuse_absurd(table, base, values)
     missing = np.isnan(values)
     lost = given[missing & ~np.isnan(given)] / found.factor
     start = base.time_s[0] if base.time_s.size else 0.0
-    for said, note in (
-        (
-            lost.size,
-            f"{lost.size} reading(s) that stand out"
-            f" ({', '.join(f'{mark:.6g}' for mark in np.unique(lost)[:3])}): taken as lost",
-        ),
-        (missing.any(), f"{missing.sum()} row(s) without a reading, marked missing"),
-        (start < 0, f"the times begin at {start:.6g} s, before their zero"),
-        (
-            found.unit == "m/s^2" and not found.weak_guesses and pulls(values),
+    if lost.size:
+        marks = ", ".join(f"{mark:.6g}" for mark in np.unique(lost)[:3])
+        said = f"{lost.size} reading(s) that stand out ({marks}): taken as lost"
+        facts.append(Fact("lost readings", marks, "shown", said))
+    if missing.any():
+        said = f"{missing.sum()} row(s) without a reading, marked missing"
+        facts.append(Fact("lost readings", f"{missing.sum()}", "shown", said))
+    if start < 0:
+        said = f"the times begin at {start:.6g} s, before their zero"
+        facts.append(Fact("clock", f"from {start:.6g} s", "stated", said))
+    if found.unit == "m/s^2" and not guesses(found.facts) and pulls(values):
+        said = (
             "the readings hang about 9.8 m/s^2, as a pull along the string does, which swings twice"
-            " in a period of the pendulum",
-        ),
-    ):
-        notes += [note] * bool(said)
+            " in a period of the pendulum"
+        )
+        facts.append(Fact("pull", "9.8 m/s^2", "shown", said))
     quality = np.where(missing, MISSING, GOOD).astype(np.uint8)
     kept = {key: value for key, value in table.metadata.items() if key in _KEPT}
-    marks = {
+    events = {
         f"marker_{number}": f"{mark.sample}; {mark.time_s!r} s; {mark.comment}"
         for number, mark in enumerate(table.markers, start=1)
     }
-    metadata = {**kept, **base.metadata, **marks}
+    metadata = {**kept, **base.metadata, **events}
     if choice.listed is not None and choice.listed.kind == "amplitudes":
         metadata["holds"] = "amplitudes"
     elif said := steady(base.time_s, values, choice.channels):
-        notes.append(said)
+        facts.append(Fact("drive", "steady or driven", "shown", said))
     if found.quantity == "reading":
         metadata["unit"] = found.unit
     own_step = choice.readings[0].resolution
@@ -276,7 +272,8 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     limits = choice.readings[0].limits
     limits = limits and (limits[0] * found.factor, limits[1] * found.factor)
     if cut := clipped_samples(values, step, limits):
-        notes.append(f"{cut} reading(s) at the end of the sensor's range: its turns are cut off")
+        said = f"{cut} reading(s) at the end of the sensor's range: its turns are cut off"
+        facts.append(Fact("saturation", f"{cut} readings", "shown", said))
     recording = Recording(
         time_s=np.ascontiguousarray(base.time_s),
         values=np.ascontiguousarray(values),
@@ -284,8 +281,8 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
         quality=quality if quality.any() else None,
         metadata=metadata,
         resolution=step,
-        notes=tuple(notes),
-        weak_guesses=(*choice.weak_guesses, *base.weak_guesses, *found.weak_guesses),
+        notes=(*table.notes, *remarks(facts)),
+        facts=tuple(facts),
         radius_excess=None if found.radius_excess is None else found.radius_excess[base.rows],
     )
     check(table.place, recording)
@@ -309,6 +306,8 @@ _KEPT: Final = ("volts_per_radian", "bits", "range_volts", "range_low_volts", "r
 """Of a file's own remarks those that the plain form knows."""
 
 
+_IN_PLAIN: Final = {"time column": "time_s", "unit of time": "s", "unit": ""}
+"""What the header of the plain form states."""
 _STEERING: Final = ("channel", "column", "unit", "sample_rate", "decimal", "delimiter")
 _READINGS: Final = ("angle", "volts", "length", "velocity", "acceleration", "signal")
 
@@ -336,11 +335,17 @@ def read_if_plain(place: Path, data: bytes, options: ReadOptions) -> Recording |
             "name the reading's column, or choose it with --column and --unit",
         )
     recording = read_plain(place, data)
+    for kind, value in _IN_PLAIN.items():
+        if recording.fact(kind) is None:
+            recording = recording.knowing(Fact(kind, value or recording.unit, "stated"))
     if recording.holds_amplitudes:  # as our own table of turning points
         values, said = sizes_of(recording.values), "it only falls: amplitudes against time"
         metadata = {**recording.metadata, "holds": "amplitudes"}
-        notes = (*recording.notes, *([] if "holds" in recording.metadata else [said]))
-        recording = replace(recording, values=values, metadata=metadata, notes=notes)
+        stated = "holds" in recording.metadata
+        fact = Fact(
+            "amplitudes", recording.quantity, "stated" if stated else "shown", said * (not stated)
+        )
+        recording = replace(recording.knowing(fact), values=values, metadata=metadata)
     return replace(recording, resolution=recording.resolution or find_step(recording.values))
 
 
@@ -409,8 +414,8 @@ class Inspection:
         The column or columns that the readings are taken from.
     level
         The median of the readings, in `unit`: where the pendulum hangs.
-    weak_guesses
-        What was guessed on slender grounds, with the option that overrides it.
+    facts
+        What is known of the file, and how.
     why
         How the file was understood, one line per decision.
     kind
@@ -432,9 +437,14 @@ class Inspection:
     columns: tuple[int, ...] = ()
     chosen: str = ""
     level: float = 0.0
-    weak_guesses: tuple[str, ...] = ()
+    facts: tuple[Fact, ...] = ()
     why: tuple[str, ...] = ()
     kind: str = "motion"
+
+    @property
+    def weak_guesses(self) -> tuple[str, ...]:
+        """What was guessed, with the option that overrides it."""
+        return guesses(self.facts)
 
     def as_json(self) -> dict[str, Any]:
         """Return the object that ``inspect --json`` prints."""
@@ -461,6 +471,7 @@ class Inspection:
             "level": self.level if isfinite(self.level) else None,
             "weak_guesses": list(self.weak_guesses),
             "kind": self.kind,
+            "facts": [fact.as_json() for fact in self.facts],
         }
 
 
@@ -484,16 +495,16 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
         "add the readings",
     )
     choice = replace(choice, readings=choice.readings or choice.channels[:1])
-    column, weak = choice.readings[0], tuple[str, ...]()
+    column, facts = choice.readings[0], (*table.facts, *choice.facts)
     kind = choice.listed.kind if choice.listed else "motion"
     try:
         recording = recording_of(table, options) if plain is None else plain
         time, values = recording.time_s[recording.usable], recording.values[recording.usable]
-        unit, step, weak = recording.unit, recording.resolution, recording.weak_guesses
+        unit, step, facts = recording.unit, recording.resolution, recording.facts
         notes = list(recording.notes)
         if recording.holds_amplitudes:
             kind = "amplitudes"
-        elif any(note.endswith(NOT_FREE) for note in notes):
+        elif recording.fact("drive"):
             kind = "steady or driven"
     except InputError as fault:
         try:
@@ -502,7 +513,7 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
             raise fault from None
         time, values = base.time_s, column.values[base.rows]
         unit, step = column.unit, column.resolution or find_step(values)
-        notes = [*table.notes, *choice.notes, f"the readings can't be analysed: {fault.problem}"]
+        notes = [*table.notes, *remarks(facts), f"the readings can't be analysed: {fault.problem}"]
     known = unit_of(column.unit) if column.unit else None
     scale = known.factor if known is not None and unit in ("rad", "V", "m") else 1.0
     limits = (column.limits[0] * scale, column.limits[1] * scale) if column.limits else None
@@ -523,7 +534,7 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
         columns=tuple(column.number for column in choice.channels),
         chosen=", ".join(column.label for column in choice.readings),
         level=float(np.median(finite)) if len(finite) else float("nan"),
-        weak_guesses=weak,
+        facts=facts,
         why=(
             f"read as {table.format}",
             *(
@@ -534,8 +545,8 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
                     key=lambda c: c.number,
                 )
             ),
-            *notes,
-            *(f"a guess: {guess}" for guess in weak),
+            *(note for note in notes if note not in {fact.said for fact in facts}),
+            *(fact.row for fact in sorted(facts, key=lambda fact: [*KINDS].index(fact.kind))),
             f"so {len(time)} readings of {', '.join(c.label for c in choice.readings)}, in "
             + (unit if unit != "1" else "their own unit"),
         ),

@@ -17,6 +17,7 @@ from scipy.special import ellipk
 
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import refuse_if
+from pendpipe.facts import Fact
 from pendpipe.formats.words import Role
 from pendpipe.recording import is_uniform
 
@@ -436,6 +437,8 @@ class Table:
         Time between samples, where the file gives it apart from a time column.
     markers, metadata, notes
         Events; what stood beside the numbers; what was guessed or repaired.
+    facts
+        What is known of the layout, apart from the notes.
     """
 
     place: Path
@@ -446,6 +449,7 @@ class Table:
     markers: tuple[Marker, ...] = ()
     metadata: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    facts: tuple[Fact, ...] = ()
 
     def where(self, row: int) -> str:
         """Name a row for a message."""

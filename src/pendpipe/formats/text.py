@@ -10,6 +10,7 @@ import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.errors import InputError, refuse_if
+from pendpipe.facts import Fact
 from pendpipe.formats.clock import column_of_clock_times
 from pendpipe.formats.grammar import (
     MOST_DAMAGED,
@@ -211,7 +212,8 @@ def _table(place: Path, lines: list[str], first: int, layout: Layout, form: str)
         lines=numbers,
         interval_s=header.interval_s,
         metadata=header.metadata,
-        notes=(layout.description, *header.notes, *notes, *cut),
+        notes=(*header.notes, *notes, *cut),
+        facts=(Fact("layout", layout.description, "shown", layout.description),),
     )
 
 

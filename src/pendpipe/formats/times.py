@@ -9,6 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.errors import InputError, refuse_if
+from pendpipe.facts import Fact, How
 from pendpipe.formats.columns import Choice
 from pendpipe.formats.grammar import MOST_DAMAGED
 from pendpipe.formats.lists import counts_samples, one_way
@@ -30,6 +31,17 @@ _LONGEST_S: Final = 300.0
 """Period beyond which a time without a unit is hardly in seconds: no pendulum is so slow."""
 _SHORTEST_S: Final = 5e-4
 """Period below which it is hardly in seconds either."""
+_SWINGS_S: Final = (0.02, 100.0)
+"""Shortest and longest period of what is read without a unit of time, s; units of clocks are a
+thousand apart, so that of a second's swing one fits."""
+_TICKS: Final = (
+    (1.0, "seconds"),
+    (1e-3, "milliseconds"),
+    (1e-6, "microseconds"),
+    (1e-9, "nanoseconds"),
+)
+_OTHER_PERIODS: Final = 0.01
+"""How often a swing lies outside: two of 190 files of strangers do, one a balance of 211 s."""
 
 
 @dataclass
@@ -50,15 +62,22 @@ class TimeBase:
     time_s: FloatArray
     rows: IntArray
     lines: IntArray | None = None
-    notes: list[str] = field(default_factory=list)
-    weak_guesses: list[str] = field(default_factory=list)
+    facts: list[Fact] = field(default_factory=list)
     metadata: dict[str, str] = field(default_factory=dict)
 
-    def keep(self, rows: slice | BoolArray | IntArray, *notes: str) -> None:
+    def say(
+        self, kind: str, value: str, said: str, how: How = "shown", rate: float | None = None
+    ) -> None:
+        """Add a fact."""
+        self.facts.append(Fact(kind, value, how, said, rate))
+
+    def keep(self, rows: slice | BoolArray | IntArray, said: str = "") -> None:
         """Keep some of the rows, or put them into another order, and say so."""
+        before = len(self.time_s)
         self.time_s, self.rows = self.time_s[rows], self.rows[rows]
         self.lines = None if self.lines is None else self.lines[rows]
-        self.notes.extend(notes)
+        if said:
+            self.say("rows", f"{len(self.time_s)} of {before}", said)
 
 
 # Differences of infinite cells, which are refused in the end, are no numbers.
@@ -78,10 +97,14 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     reading = choice.readings[0] if choice.readings else table.columns[0]
     every = np.arange(len(reading.values))
     if options.sample_rate is not None:
-        note = f"times are counted at the given {options.sample_rate:g} Hz from the first row"
-        return TimeBase(every.astype(np.float64) / options.sample_rate, every, notes=[note])
+        rate = f"{options.sample_rate:g} Hz"
+        base = TimeBase(every.astype(np.float64) / options.sample_rate, every)
+        base.say(
+            "clock", rate, f"times are counted at the given {rate} from the first row", "stated"
+        )
+        return base
     if reading.time_s is not None:
-        return TimeBase(reading.time_s, every)
+        return TimeBase(reading.time_s, every, facts=[Fact("clock", "the instrument's", "stated")])
     column = choice.time
     if column is not None and not choice.counts:
         return _from_column(table, choice, column, reading, options)
@@ -95,9 +118,10 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
         "give --sample-rate, or name the time with --column TIME:READING",
     )
     number = every.astype(np.float64) if column is None else column.values - column.values[0]
-    note = f"no time column: times from the header's {1 / interval_s:g} Hz"
-    note += f" and '{column.label}'" if column is not None else ""
-    base = TimeBase(number * interval_s, every, notes=[note])
+    rate = f"{1 / interval_s:g} Hz"
+    also = f" and '{column.label}'" if column is not None else ""
+    base = TimeBase(number * interval_s, every)
+    base.say("clock", rate, f"no time column: times from the header's {rate}{also}", "stated")
     return _in_order(table, choice, base, interval_s, options)
 
 
@@ -120,20 +144,22 @@ def _from_column(
         "the time is missing or NaN",
         "correct or drop the row",
     )
-    factor, note, weak = _time_unit(column, reading, options)
-    if weak and table.interval_s is not None:
+    factor, unit = _time_unit(choice, column, reading, options)
+    if unit.how == "guessed" and table.interval_s is not None:
         # A clock without a unit ticks in some decimal part of a second.
         factor = table.interval_s / float(np.median(np.abs(np.diff(column.values[filled]))))
-        factor, rate, weak = 10.0 ** np.rint(np.log10(factor)), 1.0 / table.interval_s, False
-        note = f"'{column.label}' ticks every {factor:g} s, by the header's {rate:g} Hz"
+        factor, rate = 10.0 ** np.rint(np.log10(factor)), 1.0 / table.interval_s
+        said = f"'{column.label}' ticks every {factor:g} s, by the header's {rate:g} Hz"
+        unit = Fact("unit of time", f"{factor:g} s", "shown", said, _OTHER_PERIODS)
     rows = np.flatnonzero(filled)
     lines = None if table.lines is None or len(table.lines) < len(filled) else table.lines[rows]
-    base = TimeBase(column.values[rows] * factor, rows, lines)
-    if few:
-        base.notes.append(f"{len(bad)} row(s) without a time left out")
-    if left := len(filled) - len(rows) - few * len(bad):
-        base.notes.append(f"{left} row(s) with neither time nor reading left out")
-    (base.weak_guesses if weak else base.notes).extend([note] * bool(note))
+    base = TimeBase(column.values[rows] * factor, rows, lines, [unit])
+    for left, what in (
+        (few * len(bad), "without a time"),
+        (len(filled) - len(rows) - few * len(bad), "with neither time nor reading"),
+    ):
+        if left:
+            base.say("rows", f"{left} left out", f"{left} row(s) {what} left out")
     return _in_order(table, choice, base, factor, options)
 
 
@@ -143,27 +169,33 @@ def refuse_text(table: Table, column: Column, remedy: str) -> None:
     refuse_if(column.garbled, table.where(row), f"'{text}' is not a number", remedy)
 
 
-def _time_unit(column: Column, reading: Column, options: ReadOptions) -> tuple[float, str, bool]:
-    """Find the seconds in one unit of the time column, the reason, and whether it is weak."""
+def _time_unit(
+    choice: Choice, column: Column, reading: Column, options: ReadOptions
+) -> tuple[float, Fact]:
+    """Find the seconds in one unit of the time column: given, in the header, or by the swing."""
     if (asked := options.units[0]) is not None:
         given = unit_of(asked) or Unit("none", 1.0)
         refuse_if(
             given.kind != "time", "--unit", f"'{asked}' is not a unit of time", "give s, ms, us"
         )
-        return given.factor, "", False
+        return given.factor, Fact("unit of time", asked, "stated")
     values = column.values[np.isfinite(column.values)]
     largest = float(np.abs(values).max(initial=0.0))
-    period = _period(reading, values)
     for word in filter(unit_of, (column.unit, column.name)):
         unit = unit_of(word)
         fits = unit is not None and unit.kind == "time" and largest * unit.factor <= _LATEST
         if unit and fits and (word == column.unit or plain(word) not in ("t", "h", "min")):
-            return unit.factor, "", False
+            return unit.factor, Fact("unit of time", word, "stated")
+    listed = choice.listed is not None and choice.listed.kind == "amplitudes"
+    period = 0.0 if listed else _period(reading, values)
     for least, factor, name in _EPOCHS:
         ticks = factor < 1.0 and float(np.ptp(values)) > 0.1 * largest
         if largest > least and not ticks and factor * period < _LONGEST_S:
-            return factor, f"'{column.label}' counts {name} since 1970", False
-    return _time_by_size(column, period, values)
+            said = f"'{column.label}' counts {name} since 1970"
+            return factor, Fact("unit of time", name, "shown", said, _OTHER_PERIODS)
+    # The amplitudes of a list are a swing apart or more.
+    apart = float(np.median(np.abs(np.diff(values)))) if listed and len(values) > 1 else 0.0
+    return _time_by_size(column, period, apart, values)
 
 
 def _period(reading: Column, values: FloatArray) -> float:
@@ -173,22 +205,34 @@ def _period(reading: Column, values: FloatArray) -> float:
     return cycle * span / max(1, len(values) - 1)
 
 
-def _time_by_size(column: Column, period: float, values: FloatArray) -> tuple[float, str, bool]:
-    """Take seconds, unless no pendulum would be so slow."""
-    whole = bool(np.all(values[:1000] == np.rint(values[:1000])))
-    taken = f"'{column.label}' is taken to be in"
+def _time_by_size(
+    column: Column, period: float, apart: float, values: FloatArray
+) -> tuple[float, Fact]:
+    """Take seconds, unless no pendulum would be so slow; sure where no other unit gives a swing."""
+    kind, said = "unit of time", f"'{column.label}' is taken to be in seconds"
+    short, long = _SWINGS_S
+    fits = [
+        size
+        for size, _ in _TICKS
+        if short <= size * (period or apart) <= (long if period else np.inf)
+    ]
     if period > _LONGEST_S:
-        ticks = ((3e7, 1e-9, "nanoseconds"), (3e4, 1e-6, "microseconds"), (0, 1e-3, "milliseconds"))
-        factor, name = next((size, name) for least, size, name in ticks if period > least)
-        note = f"'{column.label}' has no unit: taken to be {name} by a period of {period:.4g}"
-        return factor, f"{note} (--unit s: for seconds)", True
+        # The coarsest of those that make it a swing; a hundred milliseconds are one too.
+        fitting = ((size, name) for size, name in _TICKS if size * period < _LONGEST_S / 10.0)
+        factor, name = next(fitting, _TICKS[-1])
+        said = f"'{column.label}' has no unit: taken to be {name} by a period of {period:.4g}"
+        return factor, Fact(kind, name, "guessed", said)
     if 0.0 < period < _SHORTEST_S < 86400.0 * period < _LONGEST_S * 1e3:
         dated = 2e4 < float(np.abs(values).max(initial=0.0)) < 1e6
-        return 86400.0, f"{taken} days, as spreadsheets count (--unit s: for s)", not dated
-    if period and (whole or not 0.02 < period < 60.0):
-        said = f"{taken} seconds: a period of {period:.4g} s (--unit ms: for milliseconds)"
-        return 1.0, said, True
-    return 1.0, f"{taken} seconds", False
+        said = f"'{column.label}' is taken to be in days, as spreadsheets count"
+        return 86400.0, Fact(
+            kind, "days", "shown" if dated else "guessed", said, _OTHER_PERIODS if dated else None
+        )
+    whole = bool(np.all(values[:1000] == np.rint(values[:1000])))
+    if (fits == [1.0] and not (whole and period)) or not (period or apart):
+        return 1.0, Fact(kind, "s", "shown", said, _OTHER_PERIODS)
+    said += f": a period of {period:.4g} s" if period else ""
+    return 1.0, Fact(kind, "s", "guessed", said, option="--unit ms: for milliseconds")
 
 
 def _in_order(
@@ -200,7 +244,8 @@ def _in_order(
     if len(base.time_s) and abs(base.time_s[0]) > _EPOCH:
         start = float(base.time_s[0])
         base.metadata["recorded_at"] = f"{start:.6f} s since 1970"
-        base.notes.append(f"times are counted from the first row ({start:.6f} s on its clock)")
+        said = f"times are counted from the first row ({start:.6f} s on its clock)"
+        base.say("clock", f"from {start:.6f} s", said, "stated")
         base.time_s = base.time_s - start
     if np.diff(base.time_s).min(initial=1.0) <= 0:
         # What lies before --start, or behind --stop, need not be in order.
@@ -253,10 +298,12 @@ def _count_rows(_choice: Choice, base: TimeBase) -> None:
         lost = f", with {frames} missing" if frames else ""
         until = f" until {even[-1]:.6g} s" if rows < whole else ""
         exact = min(interval, np.ptp(base.time_s[:rows] - even))
-        base.notes.append(
+        base.say(
+            *("clock", f"{1.0 / interval:.6g} Hz"),
             f"time stamps are rounded and repeat{until}: rows are counted at"
             f" {1.0 / interval:.6g} Hz{lost}, which all stamps agree with: the rate is known to"
-            f" {100.0 * exact / np.ptp(even):.1g} %"
+            f" {100.0 * exact / np.ptp(even):.1g} %",
+            rate=0.5 ** min(len(even), 1000),
         )
         base.time_s = np.append(even, base.time_s[rows:])
         return
@@ -281,11 +328,14 @@ def _count_late_rows(choice: Choice, base: TimeBase) -> None:
         late = float(np.std(base.time_s - even))
         # Of exact times the periods agree to the last digit.
         better = float(min(scatter[0] / max(scatter[1], 1e-300), 1000.0))
-        base.weak_guesses.append(
+        rate = 1.0 / (even[1] - even[0])
+        base.say(
+            *("clock", f"{rate:.6g} Hz"),
             f"time stamps scatter by {late:.2g} s, as of arrival: rows are counted at"
-            f" {1.0 / (even[1] - even[0]):.6g} Hz, by which the periods agree"
+            f" {rate:.6g} Hz, by which the periods agree"
             f" {better:.0f} times better{' or more' * (better == 1000.0)}; the rate is known"
-            f" to {100.0 * late / np.ptp(even):.1g} % (--sample-rate)"
+            f" to {100.0 * late / np.ptp(even):.1g} %",
+            "guessed",
         )
         base.time_s = even
 
@@ -332,9 +382,11 @@ def _first_of_stacked(_choice: Choice, base: TimeBase) -> None:
     again = np.abs(base.time_s[starts] - base.time_s[0]) < 0.05 * np.ptp(base.time_s)
     if not 0 < len(starts) <= 50 or lengths.min() < 50 or not again.all():
         return
-    base.weak_guesses.append(
+    base.say(
+        *("rows", f"the first {lengths[0]}"),
         f"{len(lengths)} runs stand below one another: the first is read ({lengths[0]} rows);"
-        " put each into a file of its own for the others"
+        " put each into a file of its own for the others",
+        "guessed",
     )
     base.keep(slice(starts[0]))
 
@@ -353,7 +405,8 @@ def _interpolate_torn(_choice: Choice, base: TimeBase) -> None:
     few = 0 < len(wrong) <= 0.05 * len(good)
     if few and inside and not soon and steps.min(initial=0.0) >= 0.0:
         base.time_s = np.interp(np.arange(len(base.time_s)), good, base.time_s[good])
-        base.notes.append(f"{len(wrong)} time stamp(s) that fall out of order interpolated")
+        said = f"{len(wrong)} time stamp(s) that fall out of order interpolated"
+        base.say("clock", f"{len(wrong)} interpolated", said)
 
 
 def _rounded(time: FloatArray, lines: IntArray | None = None) -> FloatArray | None:

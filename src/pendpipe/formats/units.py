@@ -8,6 +8,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
+from pendpipe.facts import Fact, How
 from pendpipe.formats.circle import seen_from_pivot
 from pendpipe.formats.columns import Choice
 from pendpipe.formats.table import (
@@ -36,24 +37,24 @@ _QUANTITIES: dict[str, Quantity] = {
 
 @dataclass(frozen=True)
 class Readings:
-    """Values of all rows, shape (n,), in the unit of `quantity`; scale; what was guessed."""
+    """Values of all rows, shape (n,), in the unit of `quantity`; scale; how it is known."""
 
     values: FloatArray
     quantity: Quantity
     factor: float
     unit: str
-    notes: tuple[str, ...] = ()
-    weak_guesses: tuple[str, ...] = ()
+    facts: tuple[Fact, ...] = ()
     radius_excess: FloatArray | None = None
 
 
 @dataclass(frozen=True)
 class _Guess:
-    """A unit, its reason, and whether it is a weak guess."""
+    """A unit, its reason, and how it is known."""
 
     unit: Unit
     why: str = ""
-    weak: bool = False
+    how: How = "stated"
+    error_rate: float | None = None
 
 
 def readings(table: Table, choice: Choice, options: ReadOptions, base: TimeBase) -> Readings:
@@ -76,7 +77,7 @@ def readings(table: Table, choice: Choice, options: ReadOptions, base: TimeBase)
     if len(choice.readings) == 2:
         seen = seen_from_pivot(*choice.readings, time_s)
         return Readings(
-            *(seen.angle_rad, "angle_rad", 1.0, "rad", seen.notes, seen.weak_guesses),
+            *(seen.angle_rad, "angle_rad", 1.0, "rad", (seen.fact,)),
             radius_excess=seen.radius_excess,
         )
     column = choice.readings[0]
@@ -86,17 +87,12 @@ def readings(table: Table, choice: Choice, options: ReadOptions, base: TimeBase)
         values, notes = from_below(values)
     elif unit.name == "counts":
         values, notes = _over_the_turn(values)
-    stated = f"'{column.label}' {guess.why}"
-    if guess.why and not guess.weak:
-        notes = (stated, *notes)
-    return Readings(
-        values,
-        _QUANTITIES[unit.kind],
-        unit.factor,
-        unit.name,
-        notes,
-        (f"{stated} (--unit)",) if guess.weak else (),
+    said = f"'{column.label}' {guess.why}" if guess.why else ""
+    facts = (
+        Fact("unit", unit.name, guess.how, said, guess.error_rate),
+        *(Fact("turns", "undone", "shown", note) for note in notes),
     )
+    return Readings(values, _QUANTITIES[unit.kind], unit.factor, unit.name, facts)
 
 
 def _unit(
@@ -133,19 +129,30 @@ def _unit(
     if named.kind in ("length", "volts") and role in ("unknown", named.kind):
         return _Guess(named, f"is in {headed}, by the header")
     if np.all(finite == np.rint(finite)) and re.search(r"(?i)enc|count|tick|raw|adc", column.name):
-        return _Guess(Unit("own", 1.0, "counts"), "holds whole numbers: analysed as counts", True)
+        return _Guess(
+            Unit("own", 1.0, "counts"), "holds whole numbers: analysed as counts", "guessed"
+        )
     if role == "volts" and (options.volts_per_radian or _VOLTS.search(column.name)):
-        return _Guess(Unit("volts", 1.0, "V"), "has no unit: taken to be volts", True)
+        return _Guess(Unit("volts", 1.0, "V"), "has no unit: taken to be volts", "guessed")
     # A phone's sensor: of a position it knows nothing.
     names = {other.name.lower() for other in choice.channels if not other.unit}
     sensed = role == "length" and {"x", "y", "z"} <= names
     what = " (one of x, y, z)" if sensed else f" ({role})" if role in _OF_SENSORS else ""
     found = None if what else _angle_unit(table, choice, column, time_s)
     return found or _Guess(
-        _UNKNOWN, f"{what.strip()} has no unit: analysed in its own".strip(), True
+        _UNKNOWN, f"{what.strip()} has no unit: analysed in its own".strip(), "guessed"
     )
 
 
+_BY_SINE: Final = 0.002
+"""How often the period of what is in another unit lengthens so: units lie a factor of 6 or more
+apart, their slopes one of 39, and a slope is known to 0.15 where it must lie within 0.35."""
+_BY_SIZE: Final = 0.01
+"""How often readings of another unit stay within a turn of 2 pi and jump by it."""
+_NEAR: Final = 0.06
+"""Chance that a number lies within 0.03 of a whole one."""
+_DIGITS: Final = 20
+"""Readings of which `_printed_digit` looks at as many at least."""
 _VOLTS: Final = re.compile(r"(?i)volt|spannung|tensi|напряж|电压|電圧|^(u|ch(annel)? ?\d|ampl)$")
 """Names of voltages, and of the channels of an oscilloscope."""
 
@@ -173,7 +180,7 @@ def _contradicted(column: Column, written: Unit, time_s: FloatArray) -> _Guess |
         slope = follows_sine(time_s, column.values, other.factor) if doubtful else None
         if slope is not None and abs(slope - 1.0) <= 0.25:
             why = f"is headed in {headed}, but its period grows as a swing in {name} does"
-            return _Guess(other, f"{why}: taken as such", weak=True)
+            return _Guess(other, f"{why}: taken as such", "guessed")
     return None
 
 
@@ -199,7 +206,11 @@ def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray
         _by_rate(choice, column, time_s)
         or _by_period(column, time_s)
         or (_by_digits(finite) if column.role != "length" else None)
-        or (_Guess(_RADIAN, "jumps by 2 pi: it is in radians") if jumps_of_a_turn(finite) else None)
+        or (
+            _Guess(_RADIAN, "jumps by 2 pi: it is in radians", "shown", _BY_SIZE)
+            if jumps_of_a_turn(finite)
+            else None
+        )
     )
 
 
@@ -218,7 +229,8 @@ def _by_period(column: Column, time_s: FloatArray) -> _Guess | None:
             # Of a pendulum 1 m long (2 s) metres look the same.
             usual = float(np.median(periods(time_s, column.values)[0]))
             metres = unit == _RADIAN and column.role != "angle" and abs(usual - 2.0) < 0.3
-            return _Guess(unit, why + ", or in metres, with a string of 1 m" * metres, weak=metres)
+            why += ", or in metres, with a string of 1 m" * metres
+            return _Guess(unit, why, "guessed" if metres else "shown", None if metres else _BY_SINE)
     return None
 
 
@@ -232,7 +244,8 @@ def _by_digits(finite: FloatArray) -> _Guess | None:
     ):
         if digit := _printed_digit(finite, scale):
             why = f"converted to {other}, its values are multiples of {digit:.4g}"
-            return _Guess(unit, f"is in {name} ({why})")
+            chance = _NEAR ** min(len(finite), _DIGITS)
+            return _Guess(unit, f"is in {name} ({why})", "shown", chance)
     return None
 
 
@@ -260,7 +273,8 @@ def _by_rate(choice: Choice, column: Column, time_s: FloatArray) -> _Guess | Non
         slope = derivative_slope(time_s, column.values, other.values) or 0.0
         for guess, name in ((_RADIAN, "radians"), (_DEGREE, "degrees")):
             if abs(unit.factor * abs(slope) / guess.factor - 1.0) < 0.25:
-                return _Guess(guess, f"is taken to be in {name} (by '{other.label}' beside it)")
+                why = f"is taken to be in {name} (by '{other.label}' beside it)"
+                return _Guess(guess, why, "shown", _BY_SINE)
     return None
 
 
