@@ -3,11 +3,15 @@
 import functools
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import pendpipe as pp
+import pendpipe.diagnosis.quoted
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.quoted import LISTED, descriptions_of, printed_by, quoted
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.result import Diagnosis
@@ -30,9 +34,12 @@ from .records import (
     prepared,
     pulled,
     recording,
+    with_effects,
 )
 
 T0_S = 1.0 / FREQUENCY_HZ
+ANGLE = 5
+"""Place of the angle of the release among the values of `TRUTH`."""
 INPUTS = Path("../shared/inputs4")
 END_S = float(TIME_S[-1])
 
@@ -195,6 +202,32 @@ def test_each_description_has_the_effects_of_its_name_and_its_probability() -> N
     for one in described:
         again = refine(one.fit.model, found.data, found.noise, one.fit.value, held=found.held)
         assert one.fit.chi2 < again.chi2 + 1.0
+
+
+@pytest.mark.slow
+def test_a_set_of_effects_whose_fit_is_stuck_is_no_description(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Worse than the law without them, it says nothing of how probable they are."""
+    readings = with_effects("frequency-drift", "tone-pickup")
+    outcome = diagnose_recording(recording(readings, 1), restoring="linear")
+    found = outcome.search
+    # The drift's last mate or nothing, without the tone: the first was never fitted so.
+    odds = [[0.5, 0.5], [0.0, 1.0]]
+    weighed = [
+        each._replace(weights=np.array([*np.zeros(len(each.weights) - 2), *chances]))
+        for each, chances in zip(weighed_of(outcome), odds, strict=True)
+    ]
+
+    def stuck(model: Model, data: Data, noise: Noise, starts: Any, **_: Any) -> Fit:
+        far = starts[0] * np.where(np.arange(model.size) == ANGLE, 1.5, 1.0)
+        return refine(model, data, noise, far, rounds=0)
+
+    fitted = descriptions_of(found, weighed)
+    monkeypatch.setattr(pendpipe.diagnosis.quoted, "best_fit", stuck)
+    described = descriptions_of(found, weighed)
+    assert len(fitted) == 2
+    assert [each.fit.value is found.baseline.value for each in described] == [True]
 
 
 def test_what_chance_excludes_is_no_description_beside_one_that_leaves_noise() -> None:

@@ -124,7 +124,10 @@ def _known(found: Hypothesis, weighed: Sequence[Weighed]) -> dict[tuple[str, ...
 
 
 def _fitted(found: Hypothesis, chosen: _Chosen, fits: Sequence[Fit]) -> Fit | None:
-    """Fit a set of effects, each from its last values, beside the baseline of other fits."""
+    """Fit a set of effects, each from its last values, beside the baseline of other fits.
+
+    None of a fit that is stuck where it is worse than without them.
+    """
     model, held = found.fit.model.bare(), found.beginning.held
     here = {id(effect): found.fit.value[place] for effect, place in found.fit.model.places()}
     values = list[FloatArray]()
@@ -136,7 +139,8 @@ def _fitted(found: Hypothesis, chosen: _Chosen, fits: Sequence[Fit]) -> Fit | No
         last = rival.fit.value[len(rival.fit.value) - effect.count :]
         values.append(here.get(id(effect), last))
     starts = [np.concatenate([fit.value[: model.first], *values]) for fit in fits]
-    return best_fit(model, found.data, found.noise, starts, held=held)
+    fit = best_fit(model, found.data, found.noise, starts, held=held)
+    return fit if fit and fit.chi2 <= found.baseline.chi2 else None
 
 
 @dataclass(frozen=True)
