@@ -17,7 +17,7 @@ from pendpipe.campaign.diagnose import (
     quoted_coefficient,
     search,
 )
-from pendpipe.campaign.effects import CATALOGUE, Surface, confined
+from pendpipe.campaign.effects import CATALOGUE
 from pendpipe.campaign.fit import (
     Candidate,
     Measured,
@@ -31,6 +31,7 @@ from pendpipe.campaign.fit import (
     only,
     predict,
 )
+from pendpipe.campaign.tank import Surface, by_depth, confined, told
 
 from .campaigns import data, default
 
@@ -318,6 +319,38 @@ def test_walls_between_the_computed_ones_are_those_of_the_tank(
         drag, mass = confined(tank, surface, np.array(close), np.array(depth), np.array(higher))
         assert drag == pytest.approx(exact.drag_factor, abs=0.004)
         assert mass + 0.5 + 2.25 * depth == pytest.approx(exact.added_mass_coefficient, abs=0.004)
+
+
+def test_the_paper_s_container_has_a_third_more_drag_wherever_the_sphere_hangs() -> None:
+    """11 cm x 23 cm x 5 cm, along the 23: more than twice the excess that was measured."""
+    tank, sphere = DESIGN.apparatus.tank, DESIGN.apparatus.sphere
+    deep = physics.penetration_depth(2.0 * np.pi * 0.516, 1.0016e-3, 1000.0)
+    walls = by_depth(tank, 0.5 * sphere.diameter_m, deep)
+    depth, clean = np.array(walls["depth_m"]), np.array(walls["clean"])
+    assert np.all(np.diff(clean) < 0.0)
+    assert np.interp(tank.depth_m, depth, clean) > 1.32
+    assert np.all(np.array(walls["film"]) > clean)
+    # Twelve per cent takes more water than the container holds.
+    assert np.interp(-1.12, -clean, depth) == pytest.approx(0.074, abs=1e-3)
+    for height in (0.021, 0.023, 0.027, 0.029):
+        moved = tank.model_copy(update={"height_m": height, "height_sd_m": 0.0})
+        assert told(moved, 0.5 * sphere.diameter_m, np.array([deep])).factor > 1.32
+
+
+def test_the_drag_in_the_told_tank_holds_what_is_uncertain_of_it() -> None:
+    tank = DESIGN.apparatus.tank
+    about, deep = told(tank, 0.019, np.array([6e-4, 8e-4, 2e-3])), np.array([8e-4])
+    exact = {"depth_sd_m": 0.0, "height_sd_m": 0.0}
+    assert about.factor[1] == pytest.approx(told(tank, 0.019, deep).factor[0], abs=2e-3)
+    moved = [
+        told(tank.model_copy(update={"depth_m": tank.depth_m + off, **exact}), 0.019, deep)
+        for off in (-tank.depth_sd_m, tank.depth_sd_m)
+    ]
+    assert about.sd[1] > 0.4 * (moved[0].factor - moved[1].factor)
+    far = tank.model_copy(
+        update={"length_m": 9.0, "width_m": 8.0, "depth_m": 4.0, "off_centre_m": 0.0, **exact}
+    )
+    assert told(far, 0.019, deep).factor == pytest.approx(1.0, abs=1e-4)
 
 
 def test_a_sphere_that_hangs_low_has_walls_too() -> None:

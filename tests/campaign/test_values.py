@@ -11,6 +11,7 @@ from pendpipe.analysis.fit.result import FitResult
 from pendpipe.campaign.design import Design
 from pendpipe.campaign.effects import DRAG_OF_ONE_RECORD, RATE_EXPONENT
 from pendpipe.campaign.fit import Candidate, Measured, coefficient, loss_torques, named, only
+from pendpipe.campaign.tank import told
 from pendpipe.campaign.values import WORST_LINE, Values, campaign_values
 from pendpipe.configuration.load import Record
 from pendpipe.configuration.models import Fluid
@@ -47,6 +48,16 @@ def test_an_exact_campaign_gives_its_k_and_its_drag(inertia_exponent: float, fac
     history = found.history_coefficient.estimate.value
     low, high = sorted(factor + (factor - 1.0) / end for end in (x.min(), x.max()))
     assert low - 1e-8 <= history <= high + 1e-8
+    # With walls, Eq. 16 is exceeded by as much less.
+    in_tank, sphere = found.theory_factor_in_tank, design.apparatus.sphere
+    walls = told(design.apparatus.tank, 0.5 * sphere.diameter_m, found.penetration_m).factor
+    assert walls.min() < factor / in_tank.value < walls.max()
+    assert in_tank.sd > found.theory_factor.estimate.sd
+    shallow = design.apparatus.tank.model_copy(update={"depth_m": sphere.diameter_m})
+    tight = replace(
+        found.fit.design, apparatus=design.apparatus.model_copy(update={"tank": shallow})
+    )
+    assert Values(replace(found.fit, design=tight), found.benchmark).walls is None
 
 
 def test_an_exact_campaign_gives_its_history_coefficient() -> None:

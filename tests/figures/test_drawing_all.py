@@ -45,7 +45,7 @@ def test_every_figure_is_there_as_svg_and_png_however_many_processes_draw(
     content, folder = small
     alone = draw_all(content, folder, tmp_path / "one")
     assert alone.left_out == {"causes": "the records were not diagnosed together"}
-    for name in PAPER:
+    for name in (*PAPER, "walls"):
         assert ET.parse(tmp_path / f"one/{name}.svg").getroot().tag.endswith("svg")
         assert (tmp_path / f"one/{name}.png").read_bytes().startswith(b"\x89PNG")
     for entry in content["records"]:
@@ -119,7 +119,7 @@ def test_the_command_draws_and_says_what_it_left_out(
     words = ["figures", "--campaign", str(folder / "c.json"), "--out", str(out), "--comparison"]
     assert "fig03 is not drawn" in answer_of([*words, comparison]).err
     # The workflow counts on figures 3 to 10: the reason stands in the place of figure 3.
-    assert {path.stem for path in out.glob("*.svg")} == set(PAPER)
+    assert {path.stem for path in out.glob("*.svg")} == {*PAPER, "walls"}
     assert "no calibration" in "".join(ET.parse(out / "fig03.svg").getroot().itertext())
     assert (out / "fig04.svg").as_posix() in (out / "drawn.json").read_text()
     assert answer_of([*words, str(folder / "nowhere.json")], 2).err.count("\n") == 1

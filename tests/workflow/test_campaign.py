@@ -134,6 +134,7 @@ def test_the_summary_has_the_contracts_keys(campaign: Campaign) -> None:
         "hysteretic_coefficient",
         "reference_inertia",
         "theory_factor",
+        "theory_factor_in_tank",
         "drag_factor",
         "history_coefficient",
         "volts_per_radian",

@@ -3,13 +3,11 @@
 A function takes the equation of motion of every record (`Terms`), or the inputs it is made of,
 and a size of shape (..., 1), and returns them with the effect in it; it may ask for the `design`,
 and for the `shape` where the effect has a discrete property (a branch, a mode's frequency).
-Patterns, fits and the statement follow from it. Of a tank's walls `confined` says first what they
-do, as a smooth function of how close they are.
+Patterns, fits and the statement follow from it.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from inspect import signature
 from typing import Any, Final, Literal
 
@@ -17,144 +15,9 @@ import numpy as np
 
 from pendpipe import physics
 from pendpipe.arrays import FloatArray
-from pendpipe.campaign.design import Design, Inputs, Terms, height_sd
-from pendpipe.configuration.models import Tank
+from pendpipe.campaign.design import Design, Inputs, Terms
+from pendpipe.campaign.tank import DEPTHS, Surface, confined
 from pendpipe.effects.effect import Parameter
-
-Surface = Literal["slip", "film"]
-CLOSENESS: Final = np.array([0.03, 0.08, 0.16, 0.28, 0.42, 0.5])
-"""(2 a/H)^3 of the tanks that are computed; 0.44 is the paper's 3.8 cm in 5 cm."""
-DEPTHS: Final = np.array([0.02, 0.06, 0.14, 0.3])
-"""Penetration depths, in radii: those of water between 1 Hz and 0.05 Hz, and of glycerol."""
-_FEW_NEAR: Final = CLOSENESS[[0, 2, 3, 5]]
-_FEW_DEPTHS: Final = DEPTHS[::3]
-"""Those at which other heights are computed, which change less."""
-_ORDER: Final = 10
-"""Of the multipoles: 1e-5 of the force at the closest walls."""
-
-
-def confined(
-    tank: Tank,
-    surface: Surface,
-    closeness: FloatArray,
-    depth: FloatArray,
-    higher: FloatArray | float = 0.0,
-) -> tuple[FloatArray, FloatArray]:
-    """Drag over that of Eq. 2, and added mass above that without walls.
-
-    Tanks of the given one's proportions, from far away (closeness 0) to close: the excesses are a
-    polynomial in the closeness and in delta/a that goes through `physics.sphere_in_tank`, and a
-    parabola in the height of the sphere.
-
-    Parameters
-    ----------
-    tank
-        Its proportions, and where the sphere hangs in it.
-    surface
-        ``"slip"`` (a level surface that is clean) or ``"film"`` (a lid, or a contaminated one).
-    closeness
-        (2 a/H)^3 with H the depth of the fluid; walls nearer than the closest computed count
-        as these.
-    depth
-        delta/a; broadcasts with the closeness.
-    higher
-        Height of the sphere above the configured one, in depths of the fluid; broadcasts too.
-
-    Returns
-    -------
-    drag, mass
-        The drag's factor; the added mass less ``1/2 + 9 delta/(4 a)``, in the displaced fluid.
-    """
-    nodes, scale = _nodes(tank), _closest(tank)
-    near, thick = np.broadcast_arrays(np.minimum(closeness / scale, 1.0), depth)
-    proportions = tuple(
-        size / tank.depth_m for size in (tank.length_m, tank.width_m, tank.off_centre_m)
-    )
-    whole = _table(surface, proportions, nodes[1], scale)
-    excess = _powers(near, thick, len(CLOSENESS), len(DEPTHS)) @ whole
-    up = np.asarray(higher) / max(nodes[1] - nodes[0], 1e-9)
-    # Lagrange's parabola through three heights; the middle one is `whole`.
-    for weight, height in ((up * (up - 1.0) / 2.0, nodes[0]), (up * (up + 1.0) / 2.0, nodes[2])):
-        if np.any(weight):
-            moved = _moved(surface, proportions, (nodes[1], height), scale)
-            rows = _powers(near, thick, len(_FEW_NEAR), len(_FEW_DEPTHS))
-            excess = excess + weight[..., None] * (rows @ moved)
-    return np.asarray(1.0 + excess[..., 0]), np.asarray(excess[..., 1])
-
-
-def _nodes(tank: Tank) -> tuple[float, float, float]:
-    """The heights that are computed, in depths: the configured one, and one sd to each side."""
-    height = 0.5 if tank.height_m is None else tank.height_m / tank.depth_m
-    step = min(height_sd(tank), 0.2 * min(height, 1.0 - height))
-    return height - step, height, height + step
-
-
-def _closest(tank: Tank) -> float:
-    """The largest closeness at which floor, surface and side walls are outside the sphere."""
-    nodes = _nodes(tank)
-    aside = (0.5 * tank.width_m - tank.off_centre_m) / tank.depth_m
-    ahead = 0.5 * tank.length_m / tank.depth_m
-    room = 2.0 * min(nodes[0], 1.0 - nodes[-1], aside, ahead)
-    return float(min(CLOSENESS[-1], (0.95 * room) ** 3))
-
-
-def _powers(closeness: FloatArray, depth: FloatArray, nears: int, depths: int) -> FloatArray:
-    """The polynomial's terms: every one has the closeness as a factor."""
-    rows = np.polynomial.polynomial.polyvander2d(closeness, depth, [nears, depths - 1])
-    return np.asarray(rows[..., depths:], dtype=np.float64)
-
-
-@cache
-def _table(
-    surface: Surface, proportions: tuple[float, ...], height: float, closest: float
-) -> FloatArray:
-    """Coefficients of the drag's and the added mass's excess; sizes in depths of the fluid."""
-    near, depth = (each.ravel() for each in np.meshgrid(CLOSENESS / CLOSENESS[-1], DEPTHS))
-    found = _excess(surface, proportions, height, closest * near, depth)
-    return np.asarray(np.linalg.solve(_powers(near, depth, len(CLOSENESS), len(DEPTHS)), found))
-
-
-@cache
-def _moved(
-    surface: Surface, proportions: tuple[float, ...], heights: tuple[float, float], closest: float
-) -> FloatArray:
-    """Coefficients of the change of both from one height to another, at fewer nodes."""
-    near, depth = (each.ravel() for each in np.meshgrid(_FEW_NEAR / CLOSENESS[-1], _FEW_DEPTHS))
-    before = _powers(near, depth, len(CLOSENESS), len(DEPTHS)) @ _table(
-        surface, proportions, heights[0], closest
-    )
-    after = _excess(surface, proportions, heights[1], closest * near, depth)
-    rows = _powers(near, depth, len(_FEW_NEAR), len(_FEW_DEPTHS))
-    return np.asarray(np.linalg.solve(rows, after - before))
-
-
-def _excess(
-    surface: Surface,
-    proportions: tuple[float, ...],
-    height: float,
-    closeness: FloatArray,
-    depth: FloatArray,
-) -> FloatArray:
-    """Excess of drag and added mass in tanks, shape (tanks, 2)."""
-    length, width, aside = proportions
-    found = []
-    for close, delta in zip(closeness.tolist(), depth.tolist(), strict=True):
-        deep = 2.0 * close ** (-1.0 / 3.0)  # in radii
-        force = physics.sphere_in_tank(
-            1.0,
-            height * deep,
-            delta,
-            surface_m=(1.0 - height) * deep,
-            length_m=length * deep,
-            width_m=width * deep,
-            off_centre_m=aside * deep,
-            surface=surface,
-            order=_ORDER,
-        )
-        free = physics.POTENTIAL_FLOW_ADDED_MASS + 2.25 * delta
-        found.append((force.drag_factor - 1.0, force.added_mass_coefficient - free))
-    return np.array(found)
-
 
 Acts = Callable[..., Any]
 Shapes = Sequence[Any] | Callable[[Design], Sequence[Any]]
@@ -258,7 +121,7 @@ def history(terms: Terms, size: FloatArray) -> Terms:
 @campaign_effect(
     "inputs",
     "viscosity-temperature",
-    "a more viscous fluid than its temperature says",
+    "another viscosity than the temperature gives",
     r"\eta \to (1 + \epsilon)\, \eta(T)",
     Parameter("viscosity_excess", "", -0.5, 1.0),
     0.05,

@@ -7,7 +7,7 @@ each reading and each prior, so that an error can be traced to its sources.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from typing import Any, Final, NamedTuple
@@ -27,6 +27,8 @@ from pendpipe.campaign.fit import (
     only,
     terms_with,
 )
+from pendpipe.campaign.tank import by_depth, room_m, told
+from pendpipe.configuration.models import Tank
 from pendpipe.estimate import Estimate, chi_square_p_value, quality_of_rate
 
 WORST_LINE: Final = 1e-6
@@ -187,6 +189,46 @@ class Values:
         """Inverse-variance mean of Q_v of Eq. 16 over Q_v measured, by the records' own errors."""
         ones = np.ones(len(self.wet))
         return self.line(ones, 0.0 * self.sources["factor"][self.wet], "factor")
+
+    @cached_property
+    def penetration_m(self) -> FloatArray:
+        """Delta of the records in the fluid."""
+        nothing = np.zeros(len(self.design.nuisances))
+        density, viscosity = self.design.fluids(self.design.inputs(nothing).warmer_k)
+        omega = 2.0 * np.pi * self.quantities["frequency"]
+        with np.errstate(divide="ignore"):
+            return np.asarray(physics.penetration_depth(omega, viscosity, density)[self.wet])
+
+    @property
+    def _tank(self) -> tuple[Tank, float] | None:
+        """The tank that is told, with room for the sphere, and the sphere's radius."""
+        tank, sphere = self.design.apparatus.tank, self.design.apparatus.sphere
+        if tank is None or sphere is None or room_m(tank, 0.5 * sphere.diameter_m) <= 0.0:
+            return None
+        return tank, 0.5 * sphere.diameter_m
+
+    @cached_property
+    def theory_factor_in_tank(self) -> Estimate | None:
+        """As `theory_factor`, over Eq. 16 with the walls of the tank that is told."""
+        if self._tank is None:
+            return None
+        walls = told(*self._tank, self.penetration_m)
+        found = self.line(walls.factor, 0.0 * self.sources["factor"][self.wet], "factor").estimate
+        relative = float(np.median(walls.sd / walls.factor))
+        return replace(found, sd=math.hypot(found.sd, found.value * relative))
+
+    @property
+    def walls(self) -> dict[str, Any] | None:
+        """The drag over Eq. 2 by the depth of the fluid, at the median frequency (`by_depth`)."""
+        if self._tank is None:
+            return None
+        tank, radius_m = self._tank
+        return {
+            "frequency_hz": float(np.median(self.quantities["frequency"][self.wet])),
+            "told_depth_m": tank.depth_m,
+            "told_depth_sd_m": tank.depth_sd_m,
+            **by_depth(tank, radius_m, float(np.median(self.penetration_m))),
+        }
 
     @cached_property
     def history_coefficient(self) -> Line:

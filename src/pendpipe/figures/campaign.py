@@ -25,6 +25,7 @@ from pendpipe.figures.data import (
 from pendpipe.figures.decays import draw_decay, draw_fig07, draw_fig08, read_decay
 from pendpipe.figures.style import (
     BLUE,
+    BRANCHES,
     GREEN,
     GREY,
     INK,
@@ -95,6 +96,7 @@ def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int 
             "fig09": partial(draw_fig09, comparison),
             "fig10": partial(draw_fig10, comparison),
             "causes": partial(draw_causes, folder / "campaign_diagnosis.json"),
+            "walls": partial(draw_walls, comparison),
         }
     tasks = [
         partial(_drawn, name, draw, out / name, keep_place=has_theory and name.startswith("fig"))
@@ -393,7 +395,7 @@ def _viscous(comparison: Mapping[str, Any], name: str) -> list[Mark]:
 @styled
 def draw_fig09(comparison: Mapping[str, Any]) -> Figure:
     """Draw the limiting Q with Eq. 16 and the hysteretic part together, and their ratio."""
-    names, spread = branches(comparison), _theory_spread(comparison)
+    names = branches(comparison)
     full = [
         curve(*theory(comparison, name, "quality_factor_limit_theory"), branch(name).colour)
         for name in names
@@ -412,7 +414,7 @@ def draw_fig09(comparison: Mapping[str, Any]) -> Figure:
         Panel(
             [
                 level(1.0),
-                strip(1.0 - spread, 1.0 + spread),
+                *(_theory_band(comparison, name) for name in names),
                 *(_ratio(comparison, name) for name in names),
             ],
             {"xlabel": "Frequency (Hz)", "ylabel": "Q, measured\nover theory", "ymargin": 0.15},
@@ -444,9 +446,45 @@ def draw_causes(path: Path) -> Figure:
     )
 
 
+@styled
+def draw_walls(comparison: Mapping[str, Any]) -> Figure:
+    """Draw what a tank's walls do to the drag by the depth of the fluid, and what was measured."""
+    walls, factor = comparison.get("walls"), comparison.get("theory_factor")
+    if not walls or not factor:
+        raise NothingToDrawError("no tank is told, or no drag was measured")
+    depth = 100.0 * np.array(walls["depth_m"])
+    told, told_sd = 100.0 * walls["told_depth_m"], 100.0 * walls["told_depth_sd_m"]
+    wide = 1.96 * error(factor)
+    return figure_of(
+        3.8,
+        Panel(
+            [
+                strip(number(factor) - wide, number(factor) + wide),
+                level(number(factor), GREY, label="measured, 95 %"),
+                curve(depth, walls["clean"], BLUE, label="walls, clean surface"),
+                curve(depth, walls["film"], VERMILION, "--", label="walls, film on the surface"),
+                methodcaller("axvspan", told - told_sd, told + told_sd, color=GREEN, alpha=0.18),
+                methodcaller("axvline", told, color=GREEN, label="depth that is told"),
+            ],
+            {
+                "xlabel": "Depth of the fluid (cm)",
+                "ylabel": "Drag over Eq. 16",
+                "ylim": (1.0, None),
+            },
+            key=2,
+        ),
+    )
+
+
+_COLOURS: Final = 7
+"""Of the nine of a figure; the first two are the branches'."""
+
+
 def _in_class(patterns: Mapping[str, Any], within: bool) -> Iterator[Mark]:
-    """The records, and up to eight causes that are told apart from them or not."""
-    shown = [cause for cause in patterns["causes"] if cause["in_class"] == within][:8]
+    """The records, and causes that are told apart from them or not, each of its own colour."""
+    ranked = sorted(patterns["causes"], key=lambda cause: not cause["in_class"])
+    coloured = [(c, f"C{n}") for n, c in enumerate(ranked[:_COLOURS], len(BRANCHES))]
+    shown = [(cause, colour) for cause, colour in coloured if cause["in_class"] == within]
     names = list(dict.fromkeys(record["branch"] for record in patterns["records"]))
     for name in names:
         # A line ends with its branch: the other one is another set of weights.
@@ -466,10 +504,10 @@ def _in_class(patterns: Mapping[str, Any], within: bool) -> Iterator[Mark]:
             mfc="none",
             zorder=3,
         )
-        for colour, cause in enumerate(shown):
+        for cause, colour in shown:
             label = cause["name"] if name == names[0] else None
             excess = [100.0 * cause["excess"][n] for n in at]
-            yield curve(frequency, excess, f"C{colour}", label=label)
+            yield curve(frequency, excess, colour, label=label)
     if shown:
         below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)}
         yield methodcaller("legend", fontsize=6.5, **below)
@@ -497,11 +535,15 @@ def limits_measured(comparison: Mapping[str, Any]) -> list[Mark]:
     ]
 
 
-def _theory_spread(comparison: Mapping[str, Any]) -> float:
-    """Relative standard deviation of Eq. 16 itself, from distances and diameter."""
-    theories = [entry.get("quality_factor_viscous_theory") for entry in used(comparison)]
-    spreads = [error(entry) / number(entry) for entry in theories if entry and number(entry) > 0.0]
-    return float(np.median(spreads)) if spreads else 0.0
+def _theory_band(comparison: Mapping[str, Any], name: str) -> Mark:
+    """One standard deviation of the theory itself, from all inputs and the loss torque."""
+    rows = sorted(
+        (number(e["frequency"]), number(e.get("quality_factor_limit_theory_sd")) / theory)
+        for e in of_branch(comparison, name)
+        if np.isfinite(theory := number(e.get("quality_factor_limit_theory")))
+    )
+    frequency, sd = np.array(rows, dtype=np.float64).reshape(-1, 2).T
+    return band(frequency, np.ones(len(frequency)), sd, branch(name).colour)
 
 
 def _ratio(comparison: Mapping[str, Any], name: str) -> Mark:

@@ -60,8 +60,9 @@ CAPTIONS: Final = {
         "The limiting Q of every record in water, with the sum of Eq. 16 and the hysteretic loss of"
         " figure 4. No parameter is adjusted to these points.",
         "Lower panel: measured over theory, at each record's own geometry. A common shortfall"
-        " means that the drag is larger than Eq. 16 by the factor printed there; the grey band is"
-        " the uncertainty of the theory from distances and diameter. At low frequency the points"
+        " means that the drag is larger than Eq. 16 by the factor printed there; the bands are one"
+        " standard deviation of the theory, from all inputs and from the loss torque, which may"
+        " differ between air and water. At low frequency the points"
         " are closer to 1 because hysteresis, not water, damps the motion.",
     ),
     "fig10": Caption(
@@ -78,6 +79,14 @@ CAPTIONS: Final = {
         " cannot distinguish, right those that they reject.",
         "A cause explains the mismatch only if its line has the sign, the size and the frequency"
         " dependence of the points; the table gives the size that it would need.",
+    ),
+    "walls": Caption(
+        "The tank's walls",
+        "What walls, floor and surface of a tank of the told length and width do to the drag of a"
+        " sphere half way up in it, against the depth of the fluid, at the median frequency; the"
+        " grey band is the drag measured over Eq. 16 (95 %).",
+        "Half way up the drag is the least. Where the curves lie above the band at the told depth,"
+        " the walls as told would explain more than there is.",
     ),
     "residual_map": Caption(
         "Residual, before and after",

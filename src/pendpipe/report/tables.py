@@ -299,6 +299,11 @@ def headline(comparison: Comparison, truth: Mapping[str, Any]) -> list[Row]:
             truth.get("drag_factor"),
         ),
         _row(
+            "Drag measured over Eq. 16 with the walls of the told tank",
+            comparison.get("theory_factor_in_tank"),
+            "",
+        ),
+        _row(
             "Drag over Eq. 16 as one factor in the fit of all records",
             comparison.get("drag_factor"),
             "theory_factor",

@@ -190,10 +190,12 @@ def _theory(
     if found is None or result.record.record not in found.records:
         return content
     number = [run.record for run in found.design.runs].index(result.record.record)
+    limit = found.quality("limit_theory_rate", number)
     return content | {
         "quality_factor_viscous_theory": found.quality("theory_rate", number).as_json(),
         "quality_factor_viscous_steady": found.quality("steady_rate", number).value,
-        "quality_factor_limit_theory": found.quality("limit_theory_rate", number).value,
+        "quality_factor_limit_theory": limit.value,
+        "quality_factor_limit_theory_sd": limit.sd,
         "drag_over_theory": float(found.quantities["factor"][number]),
     }
 
@@ -227,9 +229,10 @@ def _campaign_numbers(found: Values | None) -> dict[str, Any]:
     """The numbers that describe the whole campaign."""
     names = ("viscous_exponents", "theory_factor", "history_coefficient", "checks", "budget")
     if found is None:
-        return dict.fromkeys((*names, "steady_stokes_percent"))
-    # Of the drag measured over that of the steady law, less 1.
-    excess = 100.0 * (found.quantities["over_steady"][found.wet] - 1.0)
+        return dict.fromkeys((*names, "theory_factor_in_tank", "walls", "steady_stokes_percent"))
+    # Of Eq. 2 over Eq. 1, less 1: the paper compares theory with theory.
+    excess = 100.0 * (found.quantities["theory_over_steady"][found.wet] - 1.0)
+    in_tank = found.theory_factor_in_tank
     return {
         "viscous_exponents": {
             branch: {
@@ -243,6 +246,8 @@ def _campaign_numbers(found: Values | None) -> dict[str, Any]:
             for branch, fitted in found.exponents.items()
         },
         "theory_factor": _flags(found.theory_factor),
+        "theory_factor_in_tank": in_tank and in_tank.as_json(),
+        "walls": found.walls,
         "history_coefficient": _flags(found.history_coefficient),
         "checks": found.checks(),
         "budget": [
@@ -288,6 +293,7 @@ def campaign_summary(comparison: dict[str, Any]) -> dict[str, Any]:
         "drag_factor": _number(comparison["drag_factor"]),
         "viscous_exponents": {branch: _number(exponents.get(branch)) for branch in ("low", "high")},
         "theory_factor": _number(comparison["theory_factor"]),
+        "theory_factor_in_tank": _number(comparison["theory_factor_in_tank"]),
         "history_coefficient": _number(comparison["history_coefficient"]),
         "volts_per_radian": _number(calibration and calibration["volts_per_radian"]),
         "joint": comparison["joint"],

@@ -35,6 +35,7 @@ def record_entry(
         else None,
         "quality_factor_viscous_steady": truth.steady if wet else None,
         "quality_factor_limit_theory": 1 / (1 / truth.viscous + 1 / hysteretic) if wet else None,
+        "quality_factor_limit_theory_sd": 0.01 * truth.viscous if wet else None,
         "a_over_delta": truth.depth_ratio if wet else None,
         "moment_of_inertia": estimate(truth.inertia, 1e-4 * truth.inertia, "kg m^2"),
         "moment_of_inertia_from_frequency": estimate(
@@ -165,6 +166,15 @@ def comparison(
         | {"sd_own": 0.0011, "sd_common": 0.0061, "chi2": 13.1, "dof": 14},
         "history_coefficient": estimate(1.121, 0.007, "")
         | {"sd_own": 0.0012, "sd_common": 0.0069, "chi2": 13.4, "dof": 14},
+        "theory_factor_in_tank": estimate(0.83, 0.06, ""),
+        "walls": {
+            "frequency_hz": 0.5,
+            "told_depth_m": 0.05,
+            "told_depth_sd_m": 0.003,
+            "depth_m": [0.04, 0.05, 0.06, 0.08, 0.11],
+            "clean": [1.83, 1.33, 1.20, 1.10, 1.06],
+            "film": [1.97, 1.37, 1.21, 1.11, 1.06],
+        },
         "steady_stokes_percent": [940.0, 3540.0],
         "budget": [
             {"source": "sphere distance from the axis", "relative_sd": 0.0022},
