@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from inspect import signature
 from pathlib import Path
 from typing import Any
@@ -67,6 +68,25 @@ def test_a_mistyped_command_gets_the_nearest_one(answer_of: Any) -> None:
     err = answer_of(["inspekt"], 2).err
     assert err.count("\n") == 1
     assert "did you mean 'pendpipe inspect'?" in err
+
+
+@pytest.mark.parametrize(
+    ("short", "whole"),
+    [
+        (["help"], ["--help"]),
+        (["help", "fit"], ["fit", "--help"]),
+        (["examples/rod-pendulum.csv"], ["fit", "examples/rod-pendulum.csv"]),
+    ],
+)
+def test_help_helps_and_a_file_is_fitted(
+    short: list[str], whole: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    printed = []
+    for words in (short, whole):
+        with suppress(SystemExit):
+            assert main(words) == 0
+        printed.append(capsys.readouterr().out)
+    assert printed[0] == printed[1] != ""
 
 
 def test_no_arguments_show_where_to_begin(answer_of: Any) -> None:

@@ -16,6 +16,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Final, NoReturn
 
 from pendpipe.errors import OF_DISKS, InputError
@@ -59,7 +60,7 @@ FIRST_STEPS: Final = """\
 pendpipe analyses free decays of pendulums. With a recording in FILE:
 
   pendpipe inspect FILE                       what the file holds
-  pendpipe fit FILE                           a, b, c, Q and the period
+  pendpipe FILE                               a, b, c, Q and the period: pendpipe fit FILE
   pendpipe diagnose FILE --out diagnosis      what physics is missing from the fit
 
 Without a recording: pendpipe acquire --device simulated:di2108 --duration 20 --out try.csv
@@ -116,8 +117,16 @@ def command_of(name: str) -> Any:
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """Parse the words of one call; argparse ends the program with 2 on bad usage."""
+    """Parse the words of one call; argparse ends the program with 2 on bad usage.
+
+    ``help fit`` is ``fit --help``, and a file in the place of a command is one to fit.
+    """
+    if argv[:1] == ["help"]:
+        argv = [*argv[1:], "--help"]
     command = command_of(argv[0]) if argv and not argv[0].startswith("-") else None
+    if command is None and argv and Path(argv[0]).is_file():
+        argv = ["fit", *argv]
+        command = command_of("fit")
     if command is not None:
         parser = _Parser(
             prog=f"pendpipe {argv[0]}",
