@@ -79,9 +79,13 @@ CAMPAIGN = re.compile(r"^pendpipe campaign\b", re.MULTILINE)
 def test_the_commands_of_the_pages_run(page: Path, tmp_path: Path) -> None:
     """Those that need an instrument have options that there are; CI does what the set-up says.
 
-    A campaign is planned: `tests/workflow` runs one that `init` began.
+    A campaign is planned: `tests/workflow` runs one that `init` began. What records takes 2 s.
     """
-    blocks = re.findall(r"```sh\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    blocks = re.findall(
+        r"```sh\n(.*?)```",
+        page.read_text(encoding="utf-8").replace("--duration 20 ", "--duration 2 "),
+        re.DOTALL,
+    )
     shutil.copytree(README.parent / "examples", tmp_path / "examples")
     (tmp_path / "data").mkdir()
     time_s = np.arange(600) / 20.0

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
-from scipy.interpolate import CubicSpline
 
 from pendpipe.analysis.turning_points.measure import prepare as prepare_samples
 from pendpipe.arrays import FloatArray
@@ -232,22 +231,6 @@ def test_noise_is_not_described() -> None:
     fit, data, noise = null_fit()
     state, _ = run_search(hypothesis_of(fit, data, noise, (), fit), task_of())
     assert state.steps == ()
-
-
-def test_a_rolling_shutter_is_no_second_mode() -> None:
-    """A row that lies x higher is read kappa x later: a second harmonic that falls as A^2."""
-    finer = np.arange(-0.2, TIME_S[-1] + 0.2, 0.2 * INTERVAL_S)
-    angle = CubicSpline(finer, other_engine(TRUTH, finer) - TRUTH[7])
-    late_s = -0.008 * angle(TIME_S)
-    outcome = diagnose_recording(recording(angle(TIME_S + late_s) + TRUTH[7], 1))
-    (found,) = outcome.effects
-    assert found.identifier == "rolling-shutter"
-    kappa = found.parameters["kappa"]
-    assert abs(kappa.value + 0.008) < 4.0 * kappa.sd
-    # What led without it is next: it may be added where the rare name predicts worse.
-    first, second = outcome.search.steps[0].rivals[:2]
-    assert first.lead.effect.rare
-    assert not second.lead.effect.rare
 
 
 @pytest.mark.slow

@@ -504,11 +504,11 @@ def test_weak_steps_and_knocks_lie_within_their_intervals(identifier: str, size:
     """At Delta chi^2 of some 40, chi^2 has minima in several half cycles."""
     narrow: list[bool] = []
     wide: list[bool] = []
-    for seed in range(30):
+    for seed in range(15):
         by_fit, over_cycles, truth = told(identifier, size, seed)
         narrow += holds(by_fit, truth)
         wide += holds(over_cycles, truth)
-    # 95 % of 60, and three standard deviations below it.
+    # 95 % of 30, and three standard deviations below it.
     assert np.mean(wide) > 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / len(wide))
     assert np.mean(wide) > np.mean(narrow)
 

@@ -99,13 +99,11 @@ def quality_factor(rate: float) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", ["hysteretic", "viscous"])
-def test_no_part_of_the_loss_is_more_than_the_whole(part: str) -> None:
+def test_no_part_of_the_loss_is_more_than_the_whole() -> None:
     """One part given by itself, and too large, is reported; b was free to be larger only."""
-    name = f"quality_factor_{part}"
-    given = {name: quality_factor(1.2 * float(TRUTH[B]))}
+    given = {"quality_factor_hysteretic": quality_factor(1.2 * float(TRUTH[B]))}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
-    assert [effect.identifier for effect in outcome.effects] == [f"parameter-{name}"]
+    assert names(outcome) == {"parameter-quality_factor_hysteretic"}
     least = outcome.baseline.parameters["b"]
     assert least.at_bound
     assert least.value == pytest.approx(1.2 * TRUTH[B], rel=1e-4)  # by the apparent frequency
@@ -130,8 +128,7 @@ def test_a_viscous_baseline_has_one_part_and_holds_it() -> None:
     given = {"quality_factor_viscous": quality_factor(1.1 * float(LINEAR[B]))}
     record = recording(other_engine(LINEAR), 4)
     outcome = diagnose_recording(record, baseline="viscous", fixed=given)
-    names = [effect.identifier for effect in outcome.effects]
-    assert names == ["parameter-quality_factor_viscous"]
+    assert names(outcome) == {"parameter-quality_factor_viscous"}
     assert outcome.baseline.parameters["b"].sd == 0.0
 
 
@@ -165,10 +162,9 @@ def test_the_seed_decides_the_draws_and_nothing_else() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2))
-def test_red_noise_beside_sin_x_is_noise(seed: int) -> None:
+def test_red_noise_beside_sin_x_is_noise() -> None:
     """Ten times what neighbouring readings show: no tone, drift or curve is missing."""
-    wander = lfilter([1.0], [1.0, -0.97], white(seed + 50))
+    wander = lfilter([1.0], [1.0, -0.97], white(50))
     angle = with_effects("circular-error", base=np.r_[TRUTH[:5], 0.8, TRUTH[6:]])
     found = diagnose_recording(Recording(TIME_S, angle + wander, "angle_rad"))
     assert not found.search.steps
@@ -265,7 +261,7 @@ def test_nothing_is_missing_from_a_pendulum_with_hysteretic_loss(
         assert low - 2.0 * fit[name].sd <= value <= high + 2.0 * fit[name].sd
 
 
-@pytest.mark.parametrize("rate_hz", [45.0, 60.0, 120.0, 500.0])
+@pytest.mark.parametrize("rate_hz", [45.0, 500.0])
 def test_the_noise_is_that_of_a_reading_whatever_was_averaged(rate_hz: float) -> None:
     fit, answer = judged(simulated(rate_hz, amplitude=0.1))
     left = answer["baseline"]
@@ -309,10 +305,9 @@ def names(outcome: Diagnosis) -> set[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factor", [0.6, 1.25])
-def test_a_wrong_loss_is_no_drift_and_comes_out_right(factor: float) -> None:
-    """Of whatever size: to first order a drift or a curve may look the better."""
-    given = {"b": factor * float(TRUTH[B])}
+def test_a_wrong_loss_is_no_drift_and_comes_out_right() -> None:
+    """However far off: to first order a drift or a curve may look the better."""
+    given = {"b": 0.6 * float(TRUTH[B])}
     outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
     assert names(outcome) == {"parameter-b"}
     assert outcome.effects[0].kind == "parameter"
@@ -339,10 +334,9 @@ def test_of_several_predictions_the_wrong_one_is_reported() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("excess", [5.5e-4, 5e-3])
-def test_a_wrong_frequency_and_circular_error_are_both_reported(excess: float) -> None:
+def test_a_wrong_frequency_and_circular_error_are_both_reported() -> None:
     """The one shifts the frequency throughout, the other with the amplitude's square."""
-    given = {"frequency": (1.0 + excess) * FREQUENCY_HZ}
+    given = {"frequency": 1.005 * FREQUENCY_HZ}
     outcome = diagnose_recording(recording(with_effects("circular-error"), 3), fixed=given)
     assert names(outcome) == {"parameter-frequency", "circular-error"}
     found = outcome.improved.parameters["frequency"]

@@ -46,7 +46,6 @@ from .records import (
     INTERVAL_S,
     TIME_S,
     TRUTH,
-    Magnet,
     diagnosed,
     null_fit,
     other_engine,
@@ -145,18 +144,6 @@ def test_a_pendulum_is_one_though_its_torque_is_off_by_less_than_a_hundredth() -
     assert other > 2.0 * own
     own, other, _ = probabilities([cubic, far], 1e8 - 5.0)
     assert other <= own
-
-
-@pytest.mark.slow
-def test_a_pendulum_over_a_magnet_is_a_pendulum_beside_the_curve() -> None:
-    """Without the curve of the magnet's torque others would seem likelier than sin x."""
-    values = np.append(np.where(TRUTH == 0.15, 0.3, TRUTH), [1.0, -0.5, 0.05])
-    effects = by_identifier("circular-error"), Magnet()
-    readings = Model(TIME_S, INTERVAL_S, effects, order=20).reading(values)
-    found = diagnose_recording(recording(readings, 3))
-    assert found.effects[0].identifier == "circular-error"
-    assert found.effects[0].presumed
-    assert [each.identifier for each in found.missing] == ["unnamed-restoring"]
 
 
 @pytest.mark.structure

@@ -49,10 +49,10 @@ def test_the_reference_agrees_with_taylor_series_in_time() -> None:
 @pytest.mark.slow
 def test_the_reference_record_to_a_ten_billionth() -> None:
     with mp.workdps(DIGITS):
-        times, angles = MpmathPendulum.of(REFERENCE).turning_points(0.068, 310)
+        times, angles = MpmathPendulum.of(REFERENCE).turning_points(0.068, 100)
     release = Release(0.0, 0.068)
-    points = turning_points(REFERENCE, release, count=310)
-    found = (points.time_s, points.angle_rad), turning_points_in_stretches(REFERENCE, release, 310)
+    points = turning_points(REFERENCE, release, count=100)
+    found = (points.time_s, points.angle_rad), turning_points_in_stretches(REFERENCE, release, 100)
     for time_s, angle_rad in found:
         ratios = [float(a / b) for a, b in zip(map(mpf, angle_rad), angles, strict=True)]
         phase = [W * abs(float(a - b)) for a, b in zip(map(mpf, time_s), times, strict=True)]
@@ -218,7 +218,7 @@ def test_turning_points_change_as_forty_digit_differences_say(model: Eq8) -> Non
 
 @pytest.mark.slow
 def test_samples_change_as_forty_digit_differences_say() -> None:
-    times = np.array([0.7, 2.3, 4.1])
+    times = np.array([0.7, 4.1])
     step = mpf(10) ** -8
     with mp.workdps(22):
         pendulum = MpmathPendulum.of(MODEL)

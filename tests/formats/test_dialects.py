@@ -210,7 +210,7 @@ def factor_to_si(unit: str, factor: float) -> float:
     return {"mV": 1e-3, "mm": 1e-3}.get(unit, 1.0) * factor
 
 
-SEED, FILES = 20261122, 150
+SEED, FILES = 20261122, 75
 
 
 def outcome(path: Path, sample: Sample) -> tuple[str, str]:

@@ -95,8 +95,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
 
 def copied_library(folder: Path) -> Path:
     """A copy of the library, for a run of its own."""
-    ignore = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(LIBRARY / "pendpipe", folder / "src/pendpipe", ignore=ignore)
+    shutil.copytree(LIBRARY / "pendpipe", folder / "src/pendpipe")
     return folder / "src"
 
 
