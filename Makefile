@@ -17,7 +17,7 @@ campaign: .venv/installed
 test: .venv/installed
 	$(RUN) pytest -q -n $(CORES)
 
-# What to run while you work: all but the tests of more than a second of processor.
+# What to run while you work: all but the tests of more than half a second of processor.
 quick: .venv/installed
 	$(RUN) pytest -q -n $(CORES) -m "not slow"
 

@@ -32,7 +32,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=quick)
 
 
-SLOW_S: Final = 1.0
+SLOW_S: Final = 0.5
 """Processor seconds from which on a test carries the mark `slow`."""
 MARGIN: Final = 2.0
 """A processor whose other thread is busy, or that is half as fast, takes so many times as long."""

@@ -166,6 +166,7 @@ sys.exit(main())
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_a_signal_ends_a_recording_and_what_was_recorded_is_written(
     name: str, tmp_path: Path

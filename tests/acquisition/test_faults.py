@@ -454,6 +454,7 @@ def test_names_of_ports_and_links_to_devices_pass(tmp_path: Path) -> None:
 # The measured scan rate: true whatever delays the arrivals, and honest about its error.
 
 
+@pytest.mark.slow
 @given(
     rate_hz=st.floats(1.0, 1e4),
     delay_s=st.floats(0.0, 10.0),
@@ -614,6 +615,7 @@ def test_a_clock_that_is_set_right_slowly_is_no_change_of_the_rate() -> None:
         assert len(find_changes(arrival_s, scans, 60.0)) == found
 
 
+@pytest.mark.slow
 def test_delays_that_wander_are_no_change_of_the_rate() -> None:
     generator, scans, found = np.random.default_rng(5), np.arange(1.0, 6001.0), 0
     for _ in range(100):

@@ -138,6 +138,7 @@ def test_files_of_version_1_are_still_read() -> None:
     assert len(decode_recording(bytes(damaged))) == 40
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["di154", "di2108"])
 def test_damage_in_a_raw_file_costs_a_gap_and_shifts_nothing(kind: str) -> None:
     whole = recorded_bytes(kind)

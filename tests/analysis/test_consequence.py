@@ -127,6 +127,7 @@ def test_white_readings_overrule_turning_points_that_contradict_and_say_so(
     assert fit.to_dict()["decrement_check"][0]["overruled"] == first.overruled
 
 
+@pytest.mark.slow
 def test_small_and_noisy_swings_of_the_law_itself_are_green() -> None:
     """Sixteen decays whose turning points show Q to 3 to 10 %: chance lights nothing."""
     lights = []
@@ -137,6 +138,7 @@ def test_small_and_noisy_swings_of_the_law_itself_are_green() -> None:
     assert lights.count("green") >= 15
 
 
+@pytest.mark.slow
 def test_red_keeps_the_period_and_q_of_the_turning_points() -> None:
     fit = fitted(viscous(TIME), fixed={"b": 2.0 * LOSS})
     assert fit.light == "red"

@@ -96,6 +96,7 @@ def test_pulls_are_standard() -> None:
     assert np.all(np.abs(np.std(pulls, axis=0) - 1.0) < 3.5 / math.sqrt(600))
 
 
+@pytest.mark.slow
 def test_an_absent_loss_lies_at_its_bound_with_a_one_sided_interval() -> None:
     time = np.arange(200) * (math.pi / OMEGA)
     exact = np.asarray(amplitude(time, 0.068, 0.45, 0.0119, 0.0))
@@ -231,6 +232,7 @@ HALF_95 = 1.959963984540054
 ENTRY = st.floats(-2.0, 2.0)
 
 
+@pytest.mark.slow
 @given(
     root=hnp.arrays(np.float64, (4, 4), elements=ENTRY),
     gradient=hnp.arrays(np.float64, 4, elements=st.floats(-5.0, 5.0)),
@@ -302,6 +304,7 @@ def test_what_readings_do_not_tell_apart_stays_within_its_bounds() -> None:
     assert column @ step == pytest.approx(5.0, rel=1e-4)
 
 
+@pytest.mark.slow
 @given(
     root=hnp.arrays(np.float64, (3, 3), elements=ENTRY),
     score=hnp.arrays(np.float64, 3, elements=st.floats(-5.0, 5.0)),

@@ -175,6 +175,7 @@ def test_a_b_c_and_the_frequency_of_a_pendulum_that_swings_far(release: float) -
     assert np.all(np.std(pulls, axis=0) < 2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("release", [0.6, 1.5, 2.5])
 def test_drag_in_its_true_form_is_lost_as_the_law_says(release: float) -> None:
     # Not the energy form of the fit: the readings tell, and the losses agree all the same.
@@ -289,6 +290,7 @@ def test_swings_too_small_to_tell_their_size_say_so() -> None:
     assert fit["g"].value == pytest.approx(9.81, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_length_by_another_g_is_no_cubic_torque() -> None:
     """L = g/omega^2 by standard gravity is 3e-4 off where g is 9.81: the readings tell it."""
     omega, time = math.sqrt(9.81 / 0.6), np.arange(0.0, 120.0, 0.02)
@@ -358,6 +360,7 @@ def test_where_only_the_smallest_swings_contradict_the_larger_are_fitted() -> No
     assert re.search(r"below 0\.\d+: there the decay does not follow", bare.light_reason)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/recordings here")
 @pytest.mark.parametrize(
     ("name", "torque"),

@@ -267,6 +267,7 @@ def test_the_commands_write_what_the_contract_asks(tmp_path: Path, answer_of: An
     assert json.loads(out.read_text())["method"] == "turning-points"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.05, 0.2], ids=["hardly any noise", "noise of step/5"])
 def test_rounding_that_is_not_random_is_taken_for_what_it_is(noise: float) -> None:
     """Steps of 1.27 mrad, and a tail that ends within one: chi^2 would err by 2 sd."""
@@ -298,6 +299,7 @@ def test_the_likelihood_of_roundings_has_the_slope_it_says() -> None:
     assert wide == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_step_taken_on_trust_ends_at_the_optimum() -> None:
     """Against the search gone on with until chi^2 can't be lowered by 1e-10."""
     fine = np.arange(32768) * (300.0 / 32768)

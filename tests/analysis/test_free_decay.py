@@ -413,6 +413,7 @@ def test_two_modes_that_beat_are_a_decay_with_two_frequencies_and_losses(rest: b
     assert "0.8640" in note or "0.86399" in note
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("phase", [1.2, 3.0])
 def test_a_beat_that_first_grows_is_not_held_up_by_a_drive(phase: float) -> None:
     """Of modes of 107 and 64, read to 1: the amplitude grows for 7 s, falls, and wavers."""

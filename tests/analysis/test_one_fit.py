@@ -370,6 +370,7 @@ def test_a_plain_record_is_green() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("release", [0.4, 1.2, 2.0, 2.5])
 @pytest.mark.parametrize("rms", [1e-4, 3e-3])
 def test_no_law_of_a_pendulum_that_swings_far_is_green_and_wrong(
@@ -475,6 +476,7 @@ def test_fit_and_diagnosis_print_the_same_baseline(
         assert found.sd == pytest.approx(estimate.sd, rel=0.1)
 
 
+@pytest.mark.slow
 def test_laws_that_are_right_are_green() -> None:
     random, lights = np.random.default_rng(8), []
     for _ in range(40):

@@ -150,6 +150,7 @@ def test_nothing_missing_is_found_where_nothing_is() -> None:
     assert answer.found == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hidden", "size"),
     [
@@ -487,6 +488,7 @@ def test_what_no_cause_explains_widens_k() -> None:
     assert quoted_coefficient(answer).sd == pytest.approx(wider * coefficient(fit).sd)
 
 
+@pytest.mark.slow
 def test_two_causes_are_one_sentence() -> None:
     both = named("uniform-drag-excess", "grease-drag")
     content = campaign_diagnosis(search(DESIGN, data(DESIGN, both, (0.117, 2e-5), seed=5)), {})
@@ -495,6 +497,7 @@ def test_two_causes_are_one_sentence() -> None:
     assert "beside each other" in content["statement"]
 
 
+@pytest.mark.slow
 def test_a_record_that_would_not_swing_in_glycerol_is_said() -> None:
     hidden = named("uniform-drag-excess")
     content = campaign_diagnosis(search(DESIGN, data(DESIGN, hidden, (0.117,), seed=5)), {})

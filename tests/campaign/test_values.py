@@ -33,6 +33,7 @@ def number_of(record: str) -> int:
     return [run.record for run in DESIGN.runs].index(record)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inertia_exponent", [0.0, 1.0])
 @pytest.mark.parametrize("factor", [1.0, 1.117])
 def test_an_exact_campaign_gives_its_k_and_its_drag(inertia_exponent: float, factor: float) -> None:
@@ -195,6 +196,7 @@ def test_a_loss_torque_that_depends_on_the_rate_is_no_line() -> None:
     assert found.benchmark.p_value < WORST_LINE
 
 
+@pytest.mark.slow
 def test_a_record_measures_its_own_drag() -> None:
     """One odd record moves itself, and hardly the others."""
     odd = Candidate(DRAG_OF_ONE_RECORD, "water-low-5")

@@ -247,6 +247,7 @@ def test_a_refused_record_of_a_campaign_is_not_analysable(tmp_path: Path) -> Non
     assert (content["verdict"], content["reason"]) == ("not-analysable", "no decay")
 
 
+@pytest.mark.slow
 def test_the_python_call_gives_the_same_answer(
     linear: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

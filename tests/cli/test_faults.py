@@ -344,6 +344,7 @@ def test_a_name_that_is_no_utf8_is_a_name(words: list[str], tmp_path: Path) -> N
     assert all(path.read_text(encoding="utf-8") for path in tmp_path.iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full device")
 @pytest.mark.parametrize("words", [["fit"], ["inspect", "--json"], ["convert", "-"]])
 def test_a_full_standard_output_is_one_line(words: list[str], tmp_path: Path) -> None:
@@ -399,6 +400,7 @@ def failing(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return library
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("call", "at", "how", "words"),
     [

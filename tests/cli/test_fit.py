@@ -319,6 +319,7 @@ def test_a_commands_answer_is_one_json_object(
 ROD_FILE = Path(__file__).parents[2] / "examples/rod-pendulum.csv"
 
 
+@pytest.mark.slow
 def test_one_page_holds_the_fit_and_refers_to_nothing_outside(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -350,6 +351,7 @@ def test_a_diagnosis_stands_on_the_page_unless_it_is_not_wanted(tmp_path: Path) 
     assert text.count("How to read it.") >= 3
 
 
+@pytest.mark.slow
 def test_several_recordings_get_a_page_each_and_a_table_that_links_to_them(tmp_path: Path) -> None:
     bad = tmp_path / "bad.csv"
     bad.write_text("time_s,angle_rad\n0,0\n1,0\n", encoding="utf-8")

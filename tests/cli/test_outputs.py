@@ -123,6 +123,7 @@ def test_a_recording_that_pendpipe_has_written_is_an_input_as_well(given: dict[s
     assert given["recording"].read_bytes() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_file_of_others_is_replaced_only_with_force(
     given: dict[str, Path],
@@ -298,6 +299,7 @@ def made_in(form: str, given: dict[str, Path], folder: Path) -> Path:
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 def test_what_was_edited_since_is_the_persons(
     given: dict[str, Path], tmp_path: Path, form: str
@@ -322,6 +324,7 @@ def test_what_was_edited_since_is_the_persons(
     check_output(out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 def test_what_an_earlier_version_made_is_ours_once_more(
     given: dict[str, Path], tmp_path: Path, form: str, capsys: pytest.CaptureFixture[str]
@@ -340,6 +343,7 @@ def test_what_an_earlier_version_made_is_ours_once_more(
     assert "an earlier version made it" in said
 
 
+@pytest.mark.slow
 def test_a_png_with_its_digest_is_sound(given: dict[str, Path], tmp_path: Path) -> None:
     from PIL import Image
 

@@ -146,21 +146,18 @@ def test_two_coupled_pendulums_are_two_modes_at_their_frequencies() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("unit", "scale"), [("m", 9.81 / 4.1**2), ("pixels", 300.0)])
-def test_a_pendulum_seen_from_the_side_shows_sin_x_and_no_bent_sensor(
-    unit: str, scale: float
-) -> None:
+def test_a_pendulum_seen_from_the_side_shows_sin_x_and_no_bent_sensor() -> None:
+    """In pixels, 300 of which are its length."""
     time_s = np.arange(0.0, 40.0, 0.02)
     angle = swung(time_s, 0.4, 4.1, 0.004, 0.015)[0]
     noise = 1e-3 * np.random.default_rng(3).standard_normal(len(time_s))
-    values = scale * (0.1 + np.sin(angle) + noise)
-    quantity = "displacement_m" if unit == "m" else "reading"
-    answer = diagnose_recording(Recording(time_s, values, quantity, metadata={"unit": unit}))
+    values = 300.0 * (0.1 + np.sin(angle) + noise)
+    answer = diagnose_recording(Recording(time_s, values, "reading", metadata={"unit": "pixels"}))
     names = [each.identifier for each in answer.effects]
     assert names[0] == "circular-error"
     assert not {"cubic-stiffness", "sensor-cubic"} & set(names)
     curvature = answer.effects[0].parameters["inverse_length_squared"]
-    assert curvature.value**-0.5 == pytest.approx(scale, rel=0.02)
+    assert curvature.value**-0.5 == pytest.approx(300.0, rel=0.02)
 
 
 @pytest.mark.parametrize("torque", [np.sin, float])
@@ -365,9 +362,7 @@ def test_a_fit_of_displacements_is_the_same_fit(name: str, view: str) -> None:
     ("name", "view"),
     [
         ("circular-error", "slower and later"),
-        ("equilibrium-step", "slower and later"),
         ("equilibrium-step", "faster and mirrored"),
-        ("frequency-drift", "faster and mirrored"),
         ("tone-pickup", "later"),
         ("a magnet", "faster and mirrored"),
     ],
@@ -377,6 +372,5 @@ def test_a_diagnosis_of_angles_is_the_same_diagnosis(name: str, view: str) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["equilibrium-step", "frequency-drift"])
-def test_a_diagnosis_of_displacements_is_the_same_diagnosis(name: str) -> None:
-    diagnoses_agree(name, METRES["as it is"], METRES["slow"])
+def test_a_diagnosis_of_displacements_is_the_same_diagnosis() -> None:
+    diagnoses_agree("frequency-drift", METRES["as it is"], METRES["slow"])

@@ -395,6 +395,7 @@ def test_steps_of_any_size_are_seldom_whole(number: int) -> None:
         assert 0.5 * level < np.mean(p_values < level) < 1.5 * level
 
 
+@pytest.mark.slow
 def test_counts_are_lost_from_an_encoder_that_is_read_at_fixed_times(swing: Swing) -> None:
     # Undone in the readings as recorded too: a level one count higher is no end of the range.
     count, random = 2e-3, np.random.default_rng(5)

@@ -133,6 +133,7 @@ def test_a_step_of_the_offset_is_not_a_glitch(clean: FloatArray) -> None:
     assert finding is None or finding.mask is None or np.count_nonzero(finding.mask) < 3
 
 
+@pytest.mark.slow
 def test_the_ends_of_a_range_are_found_where_they_are(clean: FloatArray) -> None:
     readings = rounded(np.clip(clean + drawn_white(generator(), AIR.count), -0.125, 0.13), STEP_16)
     finding = found(fitted(AIR, readings))["clipping"]

@@ -70,6 +70,7 @@ def p_values(kind: str) -> dict[str, FloatArray]:
     return {name: np.array(values) for name, values in found.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", list(NOISES))
 def test_noise_is_no_fault(kind: str) -> None:
     for name, values in p_values(kind).items():

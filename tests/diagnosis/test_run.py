@@ -285,6 +285,7 @@ def test_a_position_is_diagnosed_as_l_sin_x() -> None:
     assert abs(found.baseline.parameters["frequency"].value - 0.5 * omega / math.pi) < 1e-6
 
 
+@pytest.mark.slow
 def test_the_amplitude_of_the_baseline_is_that_of_the_model_with_what_is_missing() -> None:
     """|y| at the first turning point kept, before the first reading: no half cycle later."""
     law, time_s = Eq8(4.0, 0.0, 0.0, 0.03, restoring="sine"), np.arange(0.0, 60.0, 0.02)

@@ -170,6 +170,7 @@ def test_each_of_several_names_is_less_certain_than_one() -> None:
     assert doubted[-1] / doubted[0] == pytest.approx(np.exp(2.2) * alone[-1] / alone[0], rel=1e-2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("order", "off"), [(2.0, 0.3), (3.0, 0.02)])
 def test_a_line_near_a_harmonic_is_doubted_by_the_chance_that_it_is_so_near(
     order: float, off: float
@@ -395,6 +396,7 @@ def test_the_draws_follow_their_seed() -> None:
     assert draw_chance(scanner_of(bank), seed=3) != draw_chance(scanner_of(bank), seed=4)
 
 
+@pytest.mark.slow
 def test_false_alarms_of_the_whole_catalogue_are_as_frequent_as_the_p_value() -> None:
     """Of 80 fresh residuals a tenth have p < 0.1, and three tenths p < 0.3."""
     fit, data, noise = null_fit()

@@ -60,6 +60,7 @@ def test_the_reference_record_to_a_ten_billionth() -> None:
         assert max(phase) < 1e-11
 
 
+@pytest.mark.slow
 def test_samples_between_the_turning_points() -> None:
     with mp.workdps(24):
         pendulum = MpmathPendulum.of(REFERENCE)

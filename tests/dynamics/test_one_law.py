@@ -90,6 +90,7 @@ def general(law: Eq8, start_rad: float) -> tuple[Model, FloatArray]:
     return model, np.array(value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("amplitude", AMPLITUDES)
 @pytest.mark.parametrize(("losses", "restoring", "drag"), EACH)
 def test_three_ways_to_one_motion(
@@ -141,6 +142,7 @@ def derivatives(restoring: Restoring, drag: Drag, amplitude: float) -> FloatArra
     return np.stack([*columns, difference / (2e-4 * amplitude)], axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("amplitude", [0.3, 2.0])
 @pytest.mark.parametrize(("restoring", "drag"), FORMS)
 def test_the_compiled_derivatives_are_those_of_the_integrated_equation(

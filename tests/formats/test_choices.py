@@ -340,6 +340,7 @@ def test_a_zero_before_every_number_is_whole_or_its_own_column(tmp_path: Path) -
         np.testing.assert_allclose(found, values, atol=2e-5 * values.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "said"),
     [

@@ -23,6 +23,7 @@ TAIL = "dynamicslab-single/SingleDataFreeSwing_1_Dt_0_0001.mat"
 WOOD = "davidw99-wood-steel-bob/damping_angle.xlsx"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "samples", "rate", "largest", "step"),
     [
@@ -161,6 +162,7 @@ def test_each_shared_recording_is_in_the_table() -> None:
     assert here == {row["file"] for row in FILES if not row["file"].startswith("inputs/")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", FILES, ids=lambda row: row["file"])
 def test_a_shared_file_is_read_right_or_refused_for_its_reason(row: dict[str, str]) -> None:
     """Any unit will do where a file gives none away, provided that the answer calls it a guess."""

@@ -217,6 +217,7 @@ def slow_gradient(t: float, arguments: tuple[float, ...]) -> list[float]:
 moderate = st.tuples(*[st.one_of(st.just(0.0), decades(-10, 2))] * 3)
 
 
+@pytest.mark.slow
 @given(y0=decades(-6, 0), abc=moderate, fraction=st.floats(1e-6, 0.999))
 @settings(max_examples=200)
 def test_gradient_over_many_decades(

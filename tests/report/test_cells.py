@@ -65,6 +65,7 @@ def hostile(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["csv", "xlsx", "html"])
 def test_a_table_of_fits_holds_no_formula(
     hostile: Path, tmp_path: Path, form: str, monkeypatch: pytest.MonkeyPatch

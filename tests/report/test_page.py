@@ -348,6 +348,7 @@ def many(example: Any, count: int) -> dict[str, Any]:
     return {**example.content, "records": entries, "typical_record": "record 0014"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("relative", [False, True])
 def test_beyond_a_hundred_records_only_those_that_need_a_look_are_drawn(
     example: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, relative: bool
@@ -376,6 +377,7 @@ def test_beyond_a_hundred_records_only_those_that_need_a_look_are_drawn(
     assert "fit.json" in outline.references
 
 
+@pytest.mark.slow
 def test_the_page_links_to_the_files_of_its_records(example: Any, tmp_path: Path) -> None:
     """Where they lie below it, and to nothing elsewhere."""
     places = example.folder / "report.html", tmp_path / "report.html"

@@ -143,6 +143,7 @@ def test_a_temperature_outside_waters_table_is_refused_by_row(
         load_campaign(changed, "config.yaml")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("written", [b"\xff\xfe", b"a: \x01", b"[" * 5000, b"a: [1", b"", b"3"])
 def test_a_file_that_is_no_configuration_is_named_in_one_line(
     tmp_path: Path, written: bytes
