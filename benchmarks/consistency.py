@@ -28,10 +28,10 @@ import numpy as np
 import pendpipe as pp
 from benchmarks.journal import answers, judge_parser
 from benchmarks.table import head, table_row
-from pendpipe.analysis.fit.goodness import LEVEL
 from pendpipe.arrays import FloatArray as Array
 from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian
 from pendpipe.errors import InputError
+from pendpipe.levels import REFUTED as LEVEL
 from pendpipe_challenge.motion import Motion
 from pendpipe_challenge.torques import of_rates
 

@@ -20,8 +20,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache, partial
 from itertools import islice
 from pathlib import Path, PurePath
 from typing import IO, Any, Final, NamedTuple
@@ -358,18 +358,41 @@ def _cannot_write(path: str | Path, fault: OSError) -> UnwritableError:
     return UnwritableError(path, f"it can't be written ({reason})", "name another place")
 
 
-def finite(value: Any) -> Any:
-    """Replace what JSON cannot say (NaN, infinities) by ``None``, at any depth.
+def plain(value: Any, *, only_finite: bool = False) -> Any:
+    """Return what JSON has for a value, at any depth: dictionaries, lists, numbers and strings.
 
-    numpy scalars and arrays become plain numbers and lists.
+    A dataclass and a named tuple become their fields (`fields_of`), what has ``as_json`` what that
+    returns, numpy scalars and arrays numbers and lists; of finite numbers only, others are None.
+
+    >>> plain({"sizes": (2.5, math.nan)}, only_finite=True)
+    {'sizes': [2.5, None]}
     """
+    if hasattr(value, "as_json"):
+        value = value.as_json()
+    elif is_dataclass(value) or hasattr(value, "_asdict"):
+        value = fields_of(value)
+    elif hasattr(value, "tolist"):
+        value = value.tolist()
     if isinstance(value, Mapping):
-        return {str(key): finite(entry) for key, entry in value.items()}
+        return {str(key): plain(each, only_finite=only_finite) for key, each in value.items()}
     if isinstance(value, list | tuple):
-        return [finite(entry) for entry in value]
-    if hasattr(value, "tolist"):
-        return finite(value.tolist())
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        return [plain(each, only_finite=only_finite) for each in value]
+    lacks = only_finite and isinstance(value, float) and not math.isfinite(value)
+    return None if lacks else value
+
+
+finite: Final = partial(plain, only_finite=True)
+
+
+def fields_of(value: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass or a named tuple by the names that they have in JSON.
+
+    A field's metadata may hold another name than its own (``json``); of None it is left out.
+    """
+    if not is_dataclass(value):
+        return dict(value._asdict())
+    names = {each.name: each.metadata.get("json", each.name) for each in fields(value)}
+    return {there: getattr(value, here) for here, there in names.items() if there}
 
 
 def write_whole(path: str | Path, content: str | bytes) -> None:
@@ -380,7 +403,7 @@ def write_whole(path: str | Path, content: str | bytes) -> None:
 
 def json_text(content: Mapping[str, Any]) -> str:
     """Return `content` as indented JSON that says who made it; what is not finite is null."""
-    marked = {MARK: MADE_BY, **finite(content)}
+    marked = {MARK: MADE_BY, **plain(content, only_finite=True)}
     return json.dumps(marked, indent=1, ensure_ascii=False, allow_nan=False)
 
 

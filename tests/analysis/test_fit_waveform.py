@@ -225,6 +225,7 @@ def test_fit_json_is_read_as_it_was_written() -> None:
         "other_frequency",
         "light",
         "light_reason",
+        "hindered",
         "decrement_check",
     }
     sd = [content["parameters"][name]["sd"] for name in content["covariance"]["order"]]

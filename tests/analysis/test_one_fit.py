@@ -17,12 +17,13 @@ import pendpipe as pp
 from pendpipe import cli
 from pendpipe.analysis.fit import fit_recording
 from pendpipe.analysis.fit.decrement import check_decrement, loss_of, seen_loss
-from pendpipe.analysis.fit.goodness import LEVEL, judge
+from pendpipe.analysis.fit.goodness import judge
 from pendpipe.analysis.fit.quality import seen_qualities
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, turning_points
 from pendpipe.errors import InputError
+from pendpipe.levels import REFUTED
 from pendpipe.recording import Recording, write_plain
 
 from ..effects.integration import swung
@@ -144,7 +145,7 @@ def test_a_perfect_recording_is_refuted_at_the_level_of_all_questions_together()
         p_values.append(result.fit_p_value)
         lights.append(result.light)
     assert "red" not in lights
-    assert min(p_values) > LEVEL
+    assert min(p_values) > REFUTED
     # A question's own level would refute each third.
     assert np.mean(np.array(p_values) < 0.5) < 0.75
 
@@ -175,7 +176,7 @@ def test_what_noise_does_not_explain_is_seen(name: str, frequency: float, size: 
         step=None,
         floor=0.0,
     )
-    assert found.p_value < LEVEL, name
+    assert found.p_value < REFUTED, name
     assert found.noise_rms == pytest.approx(1.0, rel=0.03)
 
 

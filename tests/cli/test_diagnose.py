@@ -115,7 +115,7 @@ def check_contract(content: dict[str, Any]) -> None:
     for model in (content["baseline"], content["improved"]):
         assert all(set(each) == ESTIMATE | {"at_bound"} for each in model["parameters"].values())
     for effect in content["effects"]:
-        assert set(effect) - {"curve"} == EFFECT
+        assert set(effect) == EFFECT | {"curve", "confirmed"}
         assert effect["kind"] in {"dynamics", "measurement", "parameter", "unnamed"}
         assert set(effect["location"]) == LOCATION
         assert all(set(each) >= ESTIMATE for each in effect["parameters"].values())

@@ -240,7 +240,7 @@ def test_pictures_show_themselves_and_are_drawn_on_axes_of_others(fit: FitResult
     assert fit.plot(ax=axes) is own
     assert axes.get_xlabel() == "Time (s)"
     html = fit._repr_html_()
-    assert "<table>" in html
+    assert "<dt>misfit</dt>" in html
     assert "Q = " in html
 
 

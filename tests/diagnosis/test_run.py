@@ -400,16 +400,16 @@ def waver(size_s: float) -> FloatArray:
 def test_a_change_of_the_last_cycles_alone_is_seen_and_measured(share: float) -> None:
     found = last_cycles(bend(share))
     assert found.significant
-    assert found.excess == pytest.approx(-share, abs=3.0 * found.excess_sd)
-    assert 0.04 < found.amplitude < 0.06
+    assert found.frequency_excess == pytest.approx(-share, abs=3.0 * found.frequency_excess_sd)
+    assert 0.04 < found.amplitude_rad < 0.06
 
 
 def test_a_frequency_that_wavers_anyway_makes_the_last_cycles_uncertain() -> None:
     """Wherever among the others it wavers; a calm one is known by its noise."""
     calm, wavering = last_cycles(bend(0.0)), last_cycles(waver(0.02))
-    assert wavering.excess == calm.excess
-    assert calm.excess_sd < 1e-4
+    assert wavering.frequency_excess == calm.frequency_excess
+    assert calm.frequency_excess_sd < 1e-4
     # An amplitude of 0.02 s in a period of 8 s makes 1.1 % rms, in two fifths of the spans.
     slope = 0.02 * 2.0 * np.pi / 8.0 / np.sqrt(2.0) * np.sqrt(0.4)
-    assert wavering.excess_sd == pytest.approx(slope, rel=0.4)
+    assert wavering.frequency_excess_sd == pytest.approx(slope, rel=0.4)
     assert not last_cycles(waver(0.02) + bend(1e-2)).significant

@@ -89,7 +89,8 @@ def test_each_release_is_predicted_from_the_others_within_its_band() -> None:
         # 1000 readings: a fraction of 0.95 has a standard deviation of 0.007.
         within = each["prediction"]["within_95"]
         assert within == pytest.approx(0.95, abs=0.03)
-        assert f" {100 * within:.0f} % of {each['name']} " in found.details
+        assert f"{each['name']} is predicted from the others" in found.details
+        assert f" {100 * within:.0f} % of the rest " in found.details
 
 
 @pytest.mark.slow

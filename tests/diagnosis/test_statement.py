@@ -11,7 +11,7 @@ import pytest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.found import FittedModel, FoundEffect, Location, verdict_of
+from pendpipe.diagnosis.found import FittedModel, FoundEffect, Location, Mate, verdict_of
 from pendpipe.diagnosis.held_out import HeldOut
 from pendpipe.diagnosis.location import curve_told, locate, mains_of
 from pendpipe.diagnosis.noise import white_noise
@@ -19,7 +19,7 @@ from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.remainder import Remainder, remainder_of, with_errors
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.rivals import near_harmonic_by_chance
-from pendpipe.diagnosis.summary import Change, Summary, numbers_of, statement
+from pendpipe.diagnosis.summary import Change, Summary, numbers_of
 from pendpipe.diagnosis.values import constants_of, curve_values
 from pendpipe.diagnosis.weighing import curve_of
 from pendpipe.effects.baseline import OMEGA, TIME, A, B, C
@@ -75,11 +75,16 @@ def named(identifier: str, **parameters: Estimate) -> FoundEffect:
     )
 
 
-BEFORE = FittedModel({"b": Estimate(0.0123, 0.0002, "1/s")}, 2e-4, 4.0)
+BEFORE = FittedModel({"b": Estimate(0.0123, 0.0002, "1/s")}, 2e-4, 4.0, 1e-4)
 
 
 def details(effect: FoundEffect) -> list[str]:
-    return statement("eq8", BEFORE, [effect], 1e-4, 0.0, 0.5, 0.01).splitlines()
+    return Diagnosis("eq8", BEFORE, BEFORE, 0.0, (effect,), None, 0.5).details.splitlines()
+
+
+def undisturbed(p_value: float) -> str:
+    model = FittedModel({}, 1e-4, 1.0, 1e-4)
+    return Diagnosis("eq8", model, model, p_value, (), None, p_value).details
 
 
 def test_a_line_says_whether_the_law_holds_one_each_effect_and_one_what_is_left() -> None:
@@ -97,7 +102,7 @@ def test_a_class_is_listed_with_the_likeliest_first() -> None:
     fitted = replace(
         named("clock-drift", rate=Estimate(1.66e-4, 1.1e-5, "1/s")),
         probability=0.2,
-        indistinguishable=(("frequency-drift", 0.67), ("unnamed-restoring", 0.002)),
+        indistinguishable=(Mate("frequency-drift", 0.67), Mate("unnamed-restoring", 0.002)),
     )
     assert details(fitted)[1].startswith(
         "Drifting frequency 67 %, drifting clock 20 %, a restoring torque of unknown form < 1 %"
@@ -119,7 +124,7 @@ def test_the_likeliest_of_a_class_says_what_decides(
 ) -> None:
     """A name of probability near 0 must send nobody to the bench."""
     tests = {each.identifier: each.discriminating_test for each in (*reversed(CURVES), *CATALOGUE)}
-    fitted = replace(named(own), probability=0.2, indistinguishable=((rival, p),))
+    fitted = replace(named(own), probability=0.2, indistinguishable=(Mate(rival, p),))
     assert details(fitted)[1].removesuffix(".").endswith(f"decide by: {tests[says]}")
     assert diagnosis(fitted).summary.decide_by == tests[says]
 
@@ -141,14 +146,14 @@ def test_numbers_are_those_of_what_is_named(
     fitted = replace(
         named("clock-drift", rate=Estimate(1.66e-4, 1.1e-5, "1/s")),
         probability={0.1: 0.8, 0.5: 0.5, 0.6: 0.3}[p],
-        indistinguishable=((rival, p),),
+        indistinguishable=(Mate(rival, p),),
     )
     summary = diagnosis(fitted).summary
     assert (summary.missing, summary.candidates) == (missing, candidates)
 
 
 def test_what_eq_8_describes_needs_no_effect() -> None:
-    text = statement("eq8", FittedModel({}, 1e-4, 1.0), [], 1e-4, 0.4, 0.4, 0.01)
+    text = undisturbed(0.4)
     assert text.startswith("Eq. 8 describes this recording")
     assert "p = 0.4" in text
 
@@ -205,29 +210,28 @@ def parameters(frequency_hz: float) -> dict[str, Estimate]:
 
 def diagnosis(*effects: FoundEffect, **more: Any) -> Diagnosis:
     before = FittedModel(parameters(0.9), 2e-4, 4.0)
-    after = FittedModel(parameters(0.91), 1e-4, 1.0)
-    verdict = "missing-physics" if effects else "consistent"
+    after = FittedModel(parameters(0.91), 1e-4, 1.0, 1e-4)
     held = HeldOut(1000.0, 1050.0, 5.0, 2e-4, 1.1e-4, 12, 11)
     scanned = tuple((each.identifier, 0.5) for each in CATALOGUE)
     return Diagnosis(
         "eq8",
         before,
         after,
-        1e-4,
-        verdict,
         0.0 if effects else 0.9,
         effects,
         held,
-        1e-4,
         0.9,
-        "details",
         scanned=scanned,
         **more,
     )
 
 
 def likely(identifier: str, probability: float, *rivals: tuple[str, float]) -> FoundEffect:
-    return replace(named(identifier), probability=probability, indistinguishable=rivals)
+    return replace(
+        named(identifier),
+        probability=probability,
+        indistinguishable=tuple(Mate(*rival) for rival in rivals),
+    )
 
 
 @pytest.mark.structure
@@ -239,7 +243,7 @@ def test_a_healthy_pendulum_takes_one_line() -> None:
 
 @pytest.mark.structure
 def test_a_misfit_that_chance_does_not_explain_is_not_nothing() -> None:
-    left = replace(diagnosis(), verdict=verdict_of((), 5e-10, 0.01), p_value=5e-10)
+    left = replace(diagnosis(), p_value=5e-10)
     headline, copied = left.statement.splitlines()
     assert headline == "a small misfit is left, its cause is NOT known (p = 5e-10)"
     assert copied.endswith("(p = 5e-10); the cause was not identified.”")
@@ -252,8 +256,7 @@ def test_a_misfit_that_chance_does_not_explain_is_not_nothing() -> None:
     ):
         assert verdict_of(lacks, p, level) == says
     for p, chance in ((0.4, " more than chance would"), (5e-10, ", but more than by chance")):
-        text = statement("eq8", FittedModel({}, 1e-4, 1.0), [], 1e-4, p, p, 0.01)
-        assert f"no effect of the catalogue improves the fit{chance}" in text
+        assert f"no effect of the catalogue improves the fit{chance}" in undisturbed(p)
 
 
 @pytest.mark.structure
@@ -328,11 +331,11 @@ def test_a_line_is_as_wide_as_a_terminal_and_the_whole_is_in_the_details() -> No
     knock = named("impulse", dv=Estimate(5e-3, 5e-4, "rad/s"), time=Estimate(21.0, 0.1, "s"))
     place = Location(summary="; ".join(["throughout the record, mostly at the turning points"] * 3))
     summary = diagnosis(replace(law, location=place), knock).summary
-    first, *lines, copied = summary.lines("a-long-name-of-a-file.csv")
+    first, *lines, copied = summary.answer.lines("a-long-name-of-a-file.csv")
     assert first.endswith("csv: missing: vortex shedding above an amplitude; impulse")
     assert all(len(line) <= 120 for line in (first, *lines))
     assert "loss rate 0.0123(12) s⁻¹" in copied
-    assert max(map(len, summary.lines(width=math.inf)[:-1])) > 120
+    assert max(map(len, summary.answer.lines(width=math.inf)[:-1])) > 120
 
 
 def test_a_wide_table_leaves_out_the_middle_q() -> None:
@@ -340,7 +343,8 @@ def test_a_wide_table_leaves_out_the_middle_q() -> None:
     ends = [Change("Q", q, q, amplitude) for amplitude in (0.5, 0.2, 0.1)]
     period = Change("period", *(Estimate(1.0 / 3.0, 1e-7, "s"),) * 2)
     summary = Summary("missing: impulse", consequence=(period, *ends))
-    titles = [summary.table(width).splitlines()[0].split("Q at")[1:] for width in (120, 60)]
+    lines = ["\n".join(summary.answer.lines(width=width)) for width in (120, 60)]
+    titles = [re.findall(r"Q at [^ ]*", text) for text in lines]
     assert [len(each) for each in titles] == [3, 2]
     assert titles[1] == [titles[0][0], titles[0][-1]]
 
@@ -366,7 +370,7 @@ def test_the_table_shows_the_numbers_as_fitted_and_with_what_is_missing() -> Non
     assert period["with_missing"]["value"] == pytest.approx(1.0 / 0.91)
     assert period["moved_sd"] > 100.0
     assert b["moved_sd"] == 0.0
-    old, new = found.summary.table().splitlines()[1:]
+    *_, old, new, _ = found.statement.splitlines()
     assert "1.111111(28) s" in old
     assert "1.098901(28) s" in new
 

@@ -59,8 +59,6 @@ def a_fit(method: str, restoring: str, frequency: float, **values: float) -> Fit
         method=method,  # type: ignore[arg-type]
         baseline="eq8",
         parameters={name: Estimate(value, 0.0, "") for name, value in given.items()},
-        quality_factor_limit=None,
-        covariance_order=("a", "b", "c"),
         covariance=np.diag([0.0, 1e-8, 0.0]),
         noise_rms_rad=1e-5,
         residual_rms_rad=1e-5,

@@ -302,6 +302,7 @@ def _rows(
 
 
 _MOST_ROWS: Final = 1 << 20
+"""Rows that a gap is filled with, 8 MB a channel: of more only its ends are marked."""
 SHORT: Final = ("the recording was cut short", "ended early")
 
 
@@ -402,7 +403,9 @@ def offsets_s(segments: Sequence[Segment], rates_hz: Sequence[Sequence[float]]) 
 _HOST_S: Final = 0.010
 """Seconds by which a busy host's delays may step or drift within a record: less is not believed."""
 _RATE_STRETCHES: Final = 12
+"""Parts of a record whose least late blocks tell the rate: ten degrees of freedom are left."""
 _FEWEST_IN_STRETCH: Final = 3
+"""Blocks in each: the least late of three is one that did not wait."""
 _RATE_TRUST: Final = 6.0
 """How many standard deviations the measured rate must differ from the nominal one before
 it is believed: by chance alone (ten degrees of freedom) once in 8000 records."""
@@ -589,7 +592,10 @@ _BESIDE: Final = 3
 """Stretches on either side that must bear a step out: nearer to the ends it can't be distinguished
 from a busy host."""
 _FEWEST_SCANS: Final = 1.5
+"""Scans by which a step must exceed the rounding of an arrival: one that is lost, and a half."""
 _SPREADS: Final = 8.0
+"""Spreads of the steps between stretches that a delay must exceed: 8 of normal ones are chance
+once in 10^15."""
 
 
 def find_delays(

@@ -6,6 +6,7 @@ They differ from the DI-2108 (8 channels of 16 bits, +-10 V) in these alone (dat
 from typing import Any, Final
 
 _RANGES: Final = (100.0, 50.0, 20.0, 10.0, 5.0, 2.0)
+"""Full scales in volts."""
 CDC: Final[dict[str, dict[str, Any]]] = {
     "DI-1100": {"bits": 12, "channels": 4, "divisors": (1500, 65535), "decimations": 1},
     "DI-1110": {"bits": 12, "decimations": 1},

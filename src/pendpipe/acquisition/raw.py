@@ -37,6 +37,7 @@ from pendpipe.errors import InputError, refuse_if
 _FORMAT: Final = "pendpipe-raw"
 _BEGINNING: Final = b'{"format": "pendpipe-raw"'
 _LONGEST_HEADER: Final = 1 << 16
+"""Bytes of the first line: what goes on longer is no description."""
 _LONGEST_FRAME: Final = 1 << 22
 """What claims to be longer is damaged; no device sends as much in a second."""
 _LARGEST_HOLE: Final = 1 << 40
@@ -47,6 +48,7 @@ _HEAD_1: Final = struct.Struct("<0scId")
 """What stands before the check sum of a frame, in version 2 and in version 1."""
 _CHECK: Final = struct.Struct("<I")
 _SYNC_S: Final = 1.0
+"""Seconds of a recording that a loss of power may take."""
 COMPLETE: Final = ("scans", "time", "noise")
 """Reasons for which a recording ends when it has what was asked for (the last of older files)."""
 
@@ -382,6 +384,7 @@ _NUMBERS: Final[Mapping[str, tuple[float, float]]] = {
 _NEEDED: Final = ("model", "port", "channels", "rate_hz", "recorded_at")
 _TEXTS: Final = ("model", "port", "recorded_at")
 _MOST_CHANNELS: Final = 64
+"""No instrument here has as many: a description that says more is damaged."""
 
 
 def check_description(place: str, raw: RawRecording) -> None:

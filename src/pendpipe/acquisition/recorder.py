@@ -88,6 +88,7 @@ class AcquisitionRequest:
 
 
 _REFRESH_S: Final = 0.2
+"""Between two lines of progress: five a second are read as motion."""
 _MEMORY_S: Final = 5.0
 """The amplitude shown is that of the last seconds, of the recorder's clock."""
 

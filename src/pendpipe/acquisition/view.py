@@ -24,9 +24,11 @@ from pendpipe.errors import InputError
 from pendpipe.templates import render
 
 _LAST_S: Final = 60.0
+"""Seconds that are shown as they came."""
 _COLUMNS: Final = 600
 """Most extremes that the last minute is drawn by."""
 _STRETCHES: Final = 200
+"""Of the whole, each drawn from its least to its largest: one a column."""
 _SHORTEST_STRETCH_S: Final = 5.0
 """Amplitudes are half the range of a stretch: a 200th of the recording, and no less than that."""
 

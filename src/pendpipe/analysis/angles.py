@@ -33,7 +33,9 @@ _SCALE_SD: Final = "scale_sd"
 READ_AS: Final = "read_as"
 """Metadata: the relative error of a scale that the period shows, and what it says of the unit."""
 _ANGLES: Final = {"radians": 1.0, "degrees": math.pi / 180.0, "turns": 2.0 * math.pi}
+"""Of an angle, in rad."""
 _LENGTHS: Final = {"metres": 1.0, "centimetres": 0.01, "millimetres": 0.001}
+"""Of a position, in m."""
 
 
 def as_angles(

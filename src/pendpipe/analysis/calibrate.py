@@ -19,6 +19,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Z95, Estimate, chi_square_p_value
 from pendpipe.files import read_text
+from pendpipe.levels import FALSE_ALARM
 from pendpipe.recording import decimal_step
 
 ANGLES: Final = ("angle_rad", "angle_deg", "displacement_m")
@@ -220,7 +221,9 @@ class Calibration:
         linear = "linearity        not tested: it takes six points, or five with errors"
         if curve := self.linearity:
             verdict = (
-                "no curvature seen" if curve.p_value >= 0.01 else "the sensor is not linear here"
+                "no curvature seen"
+                if curve.p_value >= FALSE_ALARM
+                else "the sensor is not linear here"
             )
             linear = (
                 f"linearity        p = {curve.p_value:.3g} ({verdict}; cubic departs from the line"
@@ -238,7 +241,9 @@ class Calibration:
 
 
 FEWEST_POINTS = 3
+"""Points of a line: one more than its two numbers."""
 _ROUNDS = 100
+"""Times that the weights follow the slope, at most."""
 
 
 def calibrate(

@@ -20,9 +20,11 @@ HARDLY: Final = 7.0
 _SPARSE: Final = 3.6
 """Readings in a cycle below which a second harmonic can't be told from a wander."""
 _WANTED: Final = 32.0
+"""Points in a cycle, read and computed: a parabola through three is right to 5e-4 of the swing."""
 _WINDOW: Final = 2.5
 """Cycles that a wave is fitted to."""
 _EVEN: Final = 0.2
+"""Part of an interval by which readings of an even record may be off."""
 _AT_ONCE: Final = 1 << 15
 """Moments whose waves are fitted together."""
 _MOST: Final = 1 << 16

@@ -18,6 +18,7 @@ _NEIGHBOURS: Final = 9
 """Cycles over which the median number of readings is taken: an encoder that records its counts
 gives fewer at small amplitudes."""
 _RIDGE: Final = 1e-12
+"""Of the level's square: below the rounding of the sums, and more than an idle window has."""
 
 
 def harmonic_columns(phase: FloatArray, harmonics: int) -> FloatArray:

@@ -19,10 +19,16 @@ import numpy as np
 
 from pendpipe.analysis.angles import as_pendulum
 from pendpipe.analysis.coarse import HARDLY, between
-from pendpipe.analysis.half_cycles import SEEN, HalfCycles, half_cycles, usual_half_period
+from pendpipe.analysis.half_cycles import (
+    LEAST_HALF_CYCLES,
+    SEEN,
+    HalfCycles,
+    half_cycles,
+    usual_half_period,
+)
 from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.find import find_turning_points
-from pendpipe.analysis.turning_points.table import BEAT, Cut, TurningPoints
+from pendpipe.analysis.turning_points.table import Cut, TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.quantities import after_number, with_error
@@ -31,12 +37,17 @@ from pendpipe.recording import Recording
 # Loose on purpose: an impulse or a beat is physics to be diagnosed, not to be cut.
 _RISE: Final = 1.3
 _FALL: Final = 0.3
+"""Part of the swing before that is left where a hand has caught the pendulum."""
 _TAIL: Final = 0.05
+"""Part of the first swing by which a small one may grow: noise, or a beat of the support."""
 _PERIOD: Final = 0.3
+"""Change of ln half period that is another motion: sin x changes it by as much at 117 degrees."""
 _WAVER: Final = 0.12
+"""Mean change of ln half period of a motion that is not one mode."""
 _FLAT: Final = 0.025
 """Of a swing, within which turning points are the same."""
 _FEW_FLAT: Final = 4
+"""Half cycles of one side whose end is called flat: three may lie alike by their rounding."""
 _LONG: Final = 1.6
 """By which a flat side holds more readings than a crest has there."""
 _SMOOTH: Final = 0.03
@@ -103,7 +114,7 @@ class Run:
 def best_runs(cycles: HalfCycles, piece: slice) -> list[Run]:
     """Find the runs among the half cycles of a piece of the record, the most telling first."""
     count = len(cycles)
-    if count < 3:
+    if count < LEAST_HALF_CYCLES:
         return []
     follows, swings = _follows(cycles).tolist(), cycles.swing.tolist()
     runs: list[Run] = []
@@ -116,7 +127,7 @@ def best_runs(cycles: HalfCycles, piece: slice) -> list[Run]:
         floor = min(floor, swings[leg])
     runs.append(Run(piece, cycles, first, count - 1))
     joined = _joined([_trimmed(run) for run in runs])
-    kept = [run for run in joined if run.legs >= 3 and _regular(run)]
+    kept = [run for run in joined if run.legs >= LEAST_HALF_CYCLES and _regular(run)]
     return sorted((_undriven(run) for run in kept), key=lambda run: -run.worth)
 
 
@@ -192,14 +203,16 @@ def _continues(before: Run, after: Run) -> bool:
     # Where a turning point is lost in a gap, the swings beside it are too small.
     begun = float(after.swing[0])
     ratio, strong = begun / float(np.max(before.swing[-3:])), begun > 3.0 * after.cycles.step
-    if not (strong and before.legs >= 3 and pause < 4.5 * half and 0.5 < ratio < 1.15):
+    if not (
+        strong and before.legs >= LEAST_HALF_CYCLES and pause < 4.5 * half and 0.5 < ratio < 1.15
+    ):
         return False
     return after.legs > 1 and abs(after.half_period_s / half - 1.0) < _PERIOD
 
 
 def _fading(run: Run) -> Run:
     """Note whether the run's own last swing follows it, and then rest or the record's end."""
-    if run.legs < 3:
+    if run.legs < LEAST_HALF_CYCLES:
         return run
     cycles = run.cycles
     if run.last + 1 == len(cycles):
@@ -271,7 +284,7 @@ def stretches(
         (stop_s, float(time[-1]), "at rest after the decay", _NO_DECAY),
     )
     return [
-        Cut(low, high, rest if still else motion)
+        Cut(low, high, rest if still else motion, still)
         for begin, end, rest, motion in sides
         if end > begin
         for low, high, still in _parts(time, values, begin, end, quiet, window_s)
@@ -302,7 +315,7 @@ def _runs_of_flags(flags: list[bool]) -> list[tuple[int, int]]:
 
 
 _BLOCKS: Final = 9
-_LEAST_HALF_CYCLES: Final = 3
+"""Half cycles, or blocks of them, by whose medians two runs are compared."""
 _MANY: Final = 18
 """Half cycles that follow one another by no accident, however small they are."""
 _STEADY: Final = 0.2
@@ -333,6 +346,8 @@ class FreeDecay:
         How many half cycles were counted in it.
     notes
         What else was noticed, a clause each.
+    beats
+        Which two modes beat, where they do.
     """
 
     start_s: float
@@ -341,6 +356,7 @@ class FreeDecay:
     half_period_s: float
     half_cycles: int
     notes: list[str] = field(default_factory=list)
+    beats: str = ""
 
     def of(self, recording: Recording) -> Recording:
         """Return that part of the recording."""
@@ -379,7 +395,7 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
         run
         for cycles, piece in zip(parts, pieces, strict=True)
         for run in best_runs(cycles, piece)
-        if run.legs >= _LEAST_HALF_CYCLES
+        if run.legs >= LEAST_HALF_CYCLES
     ]
     told = max(found, key=lambda run: run.worth, default=None)
     rivals = sum(run.path > 0.2 * told.path for run in found) - 1 if told else 0
@@ -538,7 +554,7 @@ def _goes_on(run: Run, follower: Run) -> bool:
     whole number, and the side on which the follower begins is that number's. So must their loss.
     """
     cycles, later = run.cycles, follower.cycles
-    if run.last + 1 < len(cycles) or follower.first > 1 or follower.legs < _LEAST_HALF_CYCLES:
+    if run.last + 1 < len(cycles) or follower.first > 1 or follower.legs < LEAST_HALF_CYCLES:
         return False
     before, behind = run.middle_s[-_BLOCKS:], follower.middle_s[:_BLOCKS]
     halves = [float(np.mean(np.diff(part))) for part in (before, behind)]
@@ -622,7 +638,9 @@ def _beating(
     )
     quiet = 2.0 * cycles.step
     cuts = stretches(time, values, start, stop, quiet=quiet, window_s=half_period, before=_BY_HAND)
-    return FreeDecay(start, stop, cuts, half_period, last - first, [f"{BEAT}: {each}"])
+    return FreeDecay(
+        start, stop, cuts, half_period, last - first, [f"two modes beat: {each}"], each
+    )
 
 
 def _falls(run: Run, least: float) -> bool:
@@ -765,4 +783,5 @@ def measure_recording(
     notes = (*decay.notes, *points.notes)
     metadata = {key: str(value) for key, value in (provenance or {}).items() if value is not None}
     metadata = {**points.metadata, **metadata}
-    return replace(points, cuts=tuple(decay.cuts), metadata=metadata, notes=notes), part
+    points = replace(points, cuts=tuple(decay.cuts), beats=decay.beats, notes=notes)
+    return replace(points, metadata=metadata), part

@@ -21,6 +21,8 @@ _PER_HALF_CYCLE: Final = 40
 
 _ASIDE: Final = 0.5 * (math.sqrt(5.0) - 1.0)
 """Cells by which their edges lie beside even readings, so that no rounding error decides."""
+LEAST_HALF_CYCLES: Final = 3
+"""Half cycles that show a decay: two amplitudes of one side, and one of the other."""
 _SOME: Final = 4096
 """Readings, spread over the record, that tell its range and its usual interval."""
 

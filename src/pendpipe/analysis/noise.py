@@ -8,10 +8,14 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 
 _ORDER: Final = 4
+"""Differences that a smooth motion does not survive: (2 sin(pi/20))^4, 1 %, is left of a swing of
+twenty readings."""
 _GAIN: Final = float(math.comb(2 * _ORDER, _ORDER))
 """Sum of the squared weights of the fourth difference: what white noise is multiplied by."""
 _BLOCK: Final = 64
+"""Readings of one estimate: fast motion, or a glitch, spoils few of them."""
 _BLOCKS: Final = 256
+"""Estimates whose median counts: it is known to 1 %."""
 
 
 def quantisation_rms(step: float | None) -> float:

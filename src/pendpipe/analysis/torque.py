@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.half_cycles import LEAST_HALF_CYCLES
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
@@ -22,6 +23,7 @@ _CLEAR: Final = 3.0
 _LARGE: Final = 0.2
 """Of the largest amplitude: below, sin x lengthens the period by 4 % of what it does there."""
 _FEWEST: Final = 6
+"""Turning points: the times have four numbers, among them the coefficient and a drift."""
 SEEN: Final = 3.0
 """Standard deviations from which an amplitude, or a coefficient, is seen, and up to which the
 coefficient may be off."""
@@ -145,7 +147,7 @@ class Apart(NamedTuple):
 def told_apart(points: TurningPoints, readings: int, noise: float) -> Apart:
     """How far a pendulum of sin x is from any motion by x."""
     part = clear(points)
-    if len(part) < 3:
+    if len(part) < LEAST_HALF_CYCLES:
         return Apart(0.0, math.pi, 0.0)
     amplitude, number = part.amplitude_rad, part.half_cycle - part.half_cycle[0]
     swings = (swing_phase(amplitude, "sine") - math.pi) * np.diff(number)
@@ -173,7 +175,7 @@ def restoring_of(points: TurningPoints, *, stated: bool = True) -> Restoring:
 def may_be_sine(points: TurningPoints) -> bool:
     """Whether these are angles below the top, enough of them clear of the noise."""
     inside = points.unit == "rad" and float(np.max(points.amplitude_rad)) < math.pi
-    return inside and len(clear(points)) >= 3
+    return inside and len(clear(points)) >= LEAST_HALF_CYCLES
 
 
 def sine_coefficient(points: TurningPoints) -> Coefficient:

@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from scipy.special import ndtr, ndtri_exp
 
+from pendpipe.answer import Answer, percent, printed
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.campaign.design import Design, Run
 from pendpipe.campaign.effects import CATALOGUE
@@ -28,18 +29,22 @@ from pendpipe.campaign.fit import (
     predict,
 )
 from pendpipe.estimate import LISTED, Estimate, averaged, chi_square_p_value
-from pendpipe.templates import render
+from pendpipe.levels import FALSE_ALARM
 
 CLASS_CHI2: Final = 6.0
 """A rival whose likelihood is within exp(-3) of the best one's is in the class (contract)."""
 MOST_EFFECTS: Final = 3
+"""Effects that are added: of three dozen records more are not told apart."""
 MOST_LEFT_OUT: Final = 3
+"""Records that are left out: of three dozen more are no exceptions."""
 FAR_SIGMA: Final = 4.0
 """A record that lies farther from what all others predict is named."""
 NOTHING_MISSING: Final = 0.5
 """Probability beforehand that nothing is missing; the effects share the rest alike."""
 _DRAWS: Final = 10_000
+"""Campaigns drawn for the null: a hundredth of them, the level, is known to a tenth."""
 _SEED: Final = 24
+"""Of the draws, so that one campaign has one answer."""
 _REACH: Final = 30.0
 """Candidates whose linear gain in chi^2 is this far behind the best are not refitted: the
 effects change the records by a fifth at most, where the linear gain is good to a fifth."""
@@ -147,14 +152,14 @@ def global_p_value(
         np.zeros(len(scores)), correlations, _DRAWS, check_valid="ignore", method="eigh"
     )
     least = np.min(_local_p(drawn, tried), axis=-1)
-    resolved = np.quantile(least, 0.01)
+    resolved = np.quantile(least, FALSE_ALARM)
     if smallest >= resolved:
         return float(np.mean(least <= smallest))
-    return float(-math.expm1(0.01 / resolved * math.log1p(-smallest)))
+    return float(-math.expm1(FALSE_ALARM / resolved * math.log1p(-smallest)))
 
 
 def search(
-    design: Design, data: Measured, level: float = 0.01, base: JointFit | None = None
+    design: Design, data: Measured, level: float = FALSE_ALARM, base: JointFit | None = None
 ) -> CampaignSearch:
     """Look for what the model lacks, and for records that disagree with all others.
 
@@ -287,7 +292,7 @@ def class_of(
     logs.append(math.log(NOTHING_MISSING) - 0.5 * without.chi2)
     weights = np.exp(np.array(logs) - max(logs))
     left = chi_square_p_value(best, members[0].degrees_of_freedom)
-    *named_ones, nothing = (left / (left + 0.01) * weights / weights.sum()).tolist()
+    *named_ones, nothing = (left / (left + FALSE_ALARM) * weights / weights.sum()).tolist()
     return list(zip(members, named_ones, strict=True)), nothing
 
 
@@ -484,7 +489,7 @@ def campaign_diagnosis(
             "nothing_missing": NOTHING_MISSING,
             "expected_size": {name: each.expected for name, each in CATALOGUE.items()},
         },
-        "statement": statement(search, ranked, copies),
+        "statement": "\n".join(answer_of(search, ranked, copies).lines(width=math.inf)),
         "figures": [],
         "warnings": copies,
         "provenance": provenance,
@@ -675,30 +680,69 @@ def _deciding(runs: Sequence[NextRun]) -> str:
     return f"{runs[0].what}{lost}: it would reject {apart}"
 
 
-def statement(
+def answer_of(
     search: CampaignSearch, ranked: Sequence[Sequence[NextRun]], copies: Sequence[str] = ()
-) -> str:
-    """One paragraph of plain English."""
+) -> Answer:
+    """Make the answer: whether the records agree, who does not, and what causes explain it."""
+    count = len((search.whole or search).baseline.design.runs)
+    agree = "do not agree with Eq. 16" if search.missing else "agree with Eq. 16, the loss torque"
+    head = f"the {count} records {agree} and the stated errors of the apparatus"
+    rows = [*(_rows(search, ranked) if search.missing else ()), ("counted once", "; ".join(copies))]
+    kept = tuple(row for row in rows if row[1])
+    return Answer((f"{head} (global {printed(search.p_value)})",), kept)
+
+
+def _rows(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> list[tuple[str, str]]:
+    """Return what disagrees, what may explain it, how sure that is, and what would decide."""
     left = chi_square_p_value(search.improved.chi2, search.improved.degrees_of_freedom)
-    members = [
-        (one.leader, *(rival for rival, probability in one.rivals if probability >= 0.01))
+    known = {
+        each.last.identifier: each.last
         for one in search.found
+        for each in (one.leader, *(rival for rival, _ in one.rivals))
+    }
+    sizes = (f"{each.expected:g} ({_words(each.parameter.name)})" for each in known.values())
+    silent = not search.found and not search.left_out
+    beforehand = f"beforehand nothing is as likely as all {len(CATALOGUE)} causes together"
+    return [
+        ("off the others", ", ".join(map(_off, search.left_out))),
+        *(
+            (_words(name), f"the drag is {fit.size(about=1.0)} times Eq. 16, k {coefficient(fit)}")
+            for name, fit in (_with_and_without(search) if search.whole else {}).items()
+        ),
+        ("causes", "no effect of the catalogue stands out, nor any record" if silent else ""),
+        ("most probable", ", beside ".join(map(_likely, search.found))),
+        ("or", f"{_off(search.suspect)}: take it anew first" if search.suspect else ""),
+        *(("beside it", _others(one)) for one in search.found),
+        *(
+            ("decide by", _deciding(runs) if one.rivals else "")
+            for one, runs in zip(search.found, ranked, strict=True)
+        ),
+        ("shares", f"{beforehand}; sd expected: {', '.join(sizes)}" if known else ""),
+        ("quote", f"k is {quoted_coefficient(search)}, averaged over causes" if known else ""),
+        ("left", f"more than these explain ({printed(left)})" if left < FALSE_ALARM else ""),
     ]
-    expected = {each.last.identifier: each.last for group in members for each in group}.values()
-    text = render(
-        "pendpipe.campaign",
-        "statement.txt",
-        search=search,
-        found=list(zip(search.found, map(_deciding, ranked), strict=True)),
-        left=left,
-        numbers=_with_and_without(search) if search.whole else {},
-        coefficient=coefficient,
-        quoted=quoted_coefficient(search),
-        expected=expected,
-        effects=len(CATALOGUE),
-        copies=copies,
-    )
-    return " ".join(text.split())
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _off(far: Far) -> str:
+    return f"{far.record} {far.sigma:+.1f} sigma"
+
+
+def _likely(one: Found) -> str:
+    """Print a cause with its size, its probability and what it explains."""
+    last = one.leader.last
+    size = f"{_words(last.parameter.name)} {one.leader.size()}"
+    return f"{last.name} ({size}) {percent(one.probability)}, chi^2 falls by {one.delta_chi2:.0f}"
+
+
+def _others(one: Found) -> str:
+    """Print the rest of its class, and nothing at all."""
+    rivals = [(rival.last.name, share) for rival, share in one.rivals]
+    nothing = [("nothing at all", one.nothing)] if one.nothing >= FALSE_ALARM else []
+    return ", ".join(f"{name} {percent(share)}" for name, share in (*rivals, *nothing))
 
 
 _STEP = 1e-3

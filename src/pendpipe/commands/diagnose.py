@@ -143,7 +143,9 @@ def _report(arguments: Arguments, outcome: Diagnosis, name: str) -> int:
             tell(f"{name}: {warning}")
         excluded = "; ".join(f"{each['id']} {each['p_value']:.2g}" for each in content["excluded"])
         looked = [f"Looked for, with p-values: {excluded}."] if excluded else []
-        text = "\n".join([*outcome.summary.lines(name, inf), "", content["details"], *looked])
+        text = "\n".join(
+            [*outcome.summary.answer.lines(name, inf), "", content["details"], *looked]
+        )
     print_answer(arguments, content, text)
     return FOUND if arguments.fail_on == content["verdict"] else 0
 

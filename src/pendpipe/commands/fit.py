@@ -14,12 +14,13 @@ and the exit status is 2 unless --accept is given. Of several FILEs it is 2 if n
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import Final
 
 from pendpipe import api
 from pendpipe.analysis.fit.fixed import parse_fixed
-from pendpipe.analysis.fit.printed import lines
+from pendpipe.analysis.fit.printed import answer_of
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.turning_points import (
     TurningPoints,
@@ -186,8 +187,8 @@ def _scale_percent(arguments: Arguments) -> float | None:
 
 def _text(arguments: Arguments, result: FitResult) -> str:
     """The answer in words."""
-    printed = lines(result, name=name_of(arguments.file), law=arguments.accept)
-    return "\n".join(printed)
+    answer = answer_of(result, law=arguments.accept)
+    return "\n".join(answer.lines(name_of(arguments.file), inf))
 
 
 def _status(arguments: Arguments, result: FitResult) -> int:

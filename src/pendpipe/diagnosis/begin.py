@@ -40,6 +40,7 @@ from pendpipe.effects.model import Evaluated, Model
 from pendpipe.physics.decay import time_at
 
 _FEWEST_READINGS: Final = 24
+"""Readings of what is left: three for each of the eight values of the baseline."""
 _DEAD_BANDS: Final = 10.0
 """Distance from the end in half widths of the Coulomb dead band: nearer to it the rest position
 jumps with the parameters."""
@@ -89,7 +90,7 @@ def begin(
     """
     held = Held(fixed, baseline, points.apparent_frequency_hz)
     angles, _ = as_angles(points)
-    beats = not fixed and points.beats is not None
+    beats = not fixed and bool(points.beats)
     torque: Restoring = fit.restoring if fit else restoring_of(angles, stated=stated)
     if beats:
         torque = "linear"

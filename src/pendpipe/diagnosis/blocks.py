@@ -30,6 +30,7 @@ _MANY: Final = 16_000
 _SHORTEST: Final = 100.0
 """Cycles over the square of those in a block: longer records have longer blocks, and more."""
 _HARMONICS: Final = 12
+"""Of the motion that a block keeps: the thirteenth has 5e-10 of a swing of 90 degrees."""
 _REGULAR: Final = 1e-9
 """Part of a block's readings that is added to its Gram matrix, for the blocks that are masked."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from scipy.special import stdtr
@@ -24,6 +24,7 @@ _LOSS_ERROR: Final = 0.03
 _AMPLITUDE_RATIO: Final = 0.8
 """Ratio of amplitudes from which a span is long enough anyway."""
 _MOST_SPANS: Final = 40
+"""Spans of a record: a curve through forty points has its errors drawn beside it."""
 _FEWEST_SPANS: Final = 8
 """Spans of cycles needed to estimate their scatter."""
 _SIGNIFICANT: Final = 0.001
@@ -148,39 +149,32 @@ class SmallSwings:
 
     Parameters
     ----------
-    amplitude
+    amplitude_rad
         In the middle of that span, rad (or m).
-    excess, excess_sd
+    frequency_excess, frequency_excess_sd
         (f - f_model)/f_model, and its error from the readings and the scatter of the others.
     others
         The number of other spans.
     """
 
-    amplitude: float
-    excess: float
-    excess_sd: float
+    amplitude_rad: float
+    frequency_excess: float
+    frequency_excess_sd: float
     others: int
 
     @property
     def significant(self) -> bool:
         """Whether it exceeds the scatter."""
-        by_chance = 2.0 * stdtr(self.others, -abs(self.excess) / self.excess_sd)
+        by_chance = 2.0 * stdtr(self.others, -abs(self.frequency_excess) / self.frequency_excess_sd)
         return bool(by_chance < _SIGNIFICANT)
-
-    def as_json(self) -> dict[str, Any]:
-        """Return its part of ``diagnosis.json``."""
-        return {
-            "amplitude_rad": self.amplitude,
-            "frequency_excess": self.excess,
-            "frequency_excess_sd": self.excess_sd,
-        }
 
     def sentence(self, unit: str) -> str:
         """Return it as a sentence."""
-        way, torque = ("above", "stiffer") if self.excess > 0.0 else ("below", "softer")
+        excess, sd = self.frequency_excess, self.frequency_excess_sd
+        way, torque = ("above", "stiffer") if excess > 0.0 else ("below", "softer")
         return (
-            f"At the smallest amplitudes ({self.amplitude:.3g}{after_number(unit)}) the frequency"
-            f" is {with_error(100.0 * abs(self.excess), 100.0 * self.excess_sd, '%')} {way} the"
+            f"At the smallest amplitudes ({self.amplitude_rad:.3g}{after_number(unit)}) the"
+            f" frequency is {with_error(100.0 * abs(excess), 100.0 * sd, '%')} {way} the"
             f" model's: the restoring torque is {torque} there."
         )
 

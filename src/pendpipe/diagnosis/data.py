@@ -17,6 +17,8 @@ from pendpipe.arrays import BoolArray, FloatArray, IntArray
 _NOISE_RATIOS: Final = tuple(np.linspace(0.04, 0.5, 12))
 """Noise over step, at the values that are tried."""
 _NEEDED_GAIN: Final = 12.0
+"""Twice the log-likelihood by which a lattice must explain more: of its two numbers chance
+gives it once in 400."""
 _UNEVEN: Final = 0.02
 """Part of an interval by which evenly spaced readings may be off."""
 _MOST_MEANS: Final = 64_000

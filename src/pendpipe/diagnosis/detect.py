@@ -38,7 +38,9 @@ _RESOLVED_SD = 4.0
 
 
 _COLUMNS_AT_ONCE = 32
+"""Columns projected together: a block of them stays in the processor's cache."""
 _NUMBERS_AT_ONCE = 1 << 22
+"""Numbers in it, 32 MB, where a column is long."""
 
 
 class Candidate(NamedTuple):
@@ -201,6 +203,7 @@ RED_NOISE_SHARE: Final = 0.2
 TESTS_SHARE: Final = 1.0 - CATALOGUE_SHARE - RED_NOISE_SHARE
 """Part of it that the tests of the measurement share."""
 DRAWS: Final = 256
+"""Spectra drawn for the null: a chance of one half is known to 3 %; the tail by `_TAIL_SHARE`."""
 FEW_DRAWS: Final = 64
 """Draws for a first look: they determine the number of trials to 20 %."""
 _DRAWS_AT_ONCE: Final = 32

@@ -26,6 +26,7 @@ from pendpipe.dynamics.any_law import NoMotionError
 
 _SHARE_OF_EACH: Final = TESTS_SHARE / len(FINDERS)
 _MOST_ROUNDS: Final = 12
+"""Findings that are applied, and put back, of a record: about as many as there are tests."""
 
 
 class Applied(NamedTuple):

@@ -10,11 +10,12 @@ from typing import Any, Final, Literal, NamedTuple
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.estimate import Estimate
+from pendpipe.files import fields_of
 
 COLOURED_NOISE: Final = "coloured-noise"
 """What is reported of the noise, and is nothing that a model lacks."""
-LEVEL: Final = 0.01
-"""The false-alarm probability: how often a recording that lacks nothing is reported."""
+WANDERING_ZERO: Final = "wandering-zero"
+"""What is noted of noise that is slower than the motion."""
 Verdict = Literal["consistent", "missing-physics", "not-analysable"]
 
 
@@ -53,18 +54,9 @@ class FittedModel:
 
     def as_json(self) -> dict[str, Any]:
         """Return the contract's form."""
-        return {
-            "parameters": {name: each.as_json() for name, each in self.parameters.items()},
-            "residual_rms_rad": self.residual_rms_rad,
-            "chi2_per_dof": self.chi2_per_dof,
-            "noise_rms_rad": self.noise_rms_rad,
-            "fit_p_value": self.fit_p_value,
-            "period_span_s": self.period_span_s,
-            "quality_factors": [
-                {"amplitude_rad": amplitude, **each.as_json()}
-                for amplitude, each in self.quality_factors.items()
-            ],
-        }
+        by_amplitude = self.quality_factors.items()
+        listed = [{"amplitude_rad": y, **each.as_json()} for y, each in by_amplitude]
+        return {**fields_of(self), "quality_factors": listed}
 
 
 @dataclass(frozen=True)
@@ -80,6 +72,8 @@ class Location:
         Frequencies, and multiples of the motion's frequency.
     adc_codes
         Codes of the converter.
+    recording
+        The name of the one of several where it is.
     mains
         Which harmonic of 50 or 60 Hz a line may be, and by what rate it is folded.
     summary
@@ -94,6 +88,7 @@ class Location:
     adc_codes: tuple[int, ...] = ()
     summary: str = ""
     mains: str = ""
+    recording: str = field(default="", metadata={"json": None})
 
     @classmethod
     def over(
@@ -108,22 +103,6 @@ class Location:
         amplitudes = float(amplitude.min()), float(amplitude.max())
         times = float(time_s[0]), float(time_s[-1])
         return cls(times, amplitudes, phase_rad, frequency_hz, adc_codes=adc_codes)
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the contract's form."""
-        intervals = {
-            "time_s": self.time_s,
-            "amplitude_rad": self.amplitude_rad,
-            "phase_rad": self.phase_rad,
-        }
-        return {
-            "summary": self.summary,
-            **{name: ends and [float(end) for end in ends] for name, ends in intervals.items()},
-            "frequency_hz": list(self.frequency_hz),
-            "harmonics": list(self.harmonics),
-            "adc_codes": list(self.adc_codes),
-            "mains": self.mains,
-        }
 
 
 class Confirmation(NamedTuple):
@@ -198,6 +177,13 @@ class Finding:
     after: int = 0
 
 
+class Mate(NamedTuple):
+    """An effect of a class beside the one that was added."""
+
+    id: str
+    probability: float
+
+
 @dataclass(frozen=True, repr=False)
 class FoundEffect:
     """One effect that the baseline lacks.
@@ -229,16 +215,16 @@ class FoundEffect:
         Whether the baseline has it: it is fitted, and not missing.
     """
 
-    identifier: str
+    identifier: str = field(metadata={"json": "id"})
     name: str
     kind: str
     equation: str
     parameters: Mapping[str, Estimate]
     delta_chi2: float
-    p_value: float
+    p_value: float = field(metadata={"json": "p_value_global"})
     probability: float
-    indistinguishable: tuple[tuple[str, float], ...]
-    discriminating_test: str
+    indistinguishable: tuple[Mate, ...] = field(metadata={"json": "indistinguishable_from"})
+    discriminating_test: str = field(metadata={"json": "deciding_measurement"})
     location: Location
     curve: Mapping[str, Any] | None = None
     confirmed: Confirmation | None = None
@@ -246,28 +232,3 @@ class FoundEffect:
 
     def __repr__(self) -> str:
         return f"FoundEffect({self.identifier}, probability {self.probability:.2f})"
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the contract's form."""
-        found: dict[str, Any] = {
-            "id": self.identifier,
-            "name": self.name,
-            "kind": self.kind,
-            "presumed": self.presumed,
-            "equation": self.equation,
-            "parameters": {name: each.as_json() for name, each in self.parameters.items()},
-            "delta_chi2": self.delta_chi2,
-            "p_value_global": self.p_value,
-            "probability": self.probability,
-            "indistinguishable_from": [
-                {"id": identifier, "probability": probability}
-                for identifier, probability in self.indistinguishable
-            ],
-            "deciding_measurement": self.discriminating_test,
-            "location": self.location.as_json(),
-        }
-        if self.curve is not None:
-            found["curve"] = dict(self.curve)
-        if self.confirmed is not None:
-            found["confirmed"] = self.confirmed._asdict()
-        return found

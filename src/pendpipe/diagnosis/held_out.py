@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Final
+from dataclasses import dataclass, field, replace
+from typing import Final
 
 import numpy as np
 
@@ -14,10 +14,13 @@ from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.dynamics.any_law import NoMotionError
 
 _BLOCK_CYCLES: Final = 10
+"""Cycles that are predicted at once: longer than noise remembers, shorter than a drift."""
 _FOLDS: Final = 2
+"""Fits for all predictions: every other block is left out of one of two."""
 _PRECISE: Final = 1e-4
 """Relative error to which missing readings are filled in."""
 _MOST_STEPS: Final = 400
+"""Of conjugate gradients at most, whatever they have reached."""
 
 
 @dataclass(frozen=True)
@@ -39,24 +42,15 @@ class HeldOut:
     before: float
     after: float
     gain_sd: float
-    rms_before: float
-    rms_after: float
+    rms_before: float = field(metadata={"json": "rms_before_rad"})
+    rms_after: float = field(metadata={"json": "rms_after_rad"})
     blocks: int
-    better: int
+    better: int = field(metadata={"json": "blocks_better"})
 
     @property
     def gain(self) -> float:
         """Gain in log density of the extended model."""
         return self.after - self.before
-
-    def as_json(self) -> dict[str, Any]:
-        """Return ``prediction`` of ``diagnosis.json``: errors of what was left out of the fit."""
-        return {
-            "rms_before_rad": self.rms_before,
-            "rms_after_rad": self.rms_after,
-            "blocks": self.blocks,
-            "blocks_better": self.better,
-        }
 
 
 def held_out(

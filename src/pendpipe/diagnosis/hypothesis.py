@@ -44,6 +44,7 @@ RANDOM: Final = ("jitter", "broadband-drive")
 _ESTIMATE_AGAIN: Final = 0.95
 """Ratio of noise estimates below which the noise is estimated again."""
 _ROUNDS: Final = 3
+"""Times that noise and fit follow each other: each time the noise falls by 5 %, or it ends."""
 _LEAST_STEP: Final = 0.1
 """Smallest plausible noise of a rounded reading, over the step."""
 

@@ -18,6 +18,7 @@ from pendpipe.effects.catalogue.reading import DroppedSamples, OffsetStep
 from pendpipe.estimate import Z95, Estimate
 
 _TAILS: Final = (0.025, 0.975)
+"""Of a 95 % interval."""
 _NEAR_CHI2: Final = 24.0
 """Largest deficit in chi^2 of scanned instants between which more are computed."""
 _PER_CYCLE: Final = 16
@@ -111,6 +112,7 @@ def _widened(estimate: Estimate, interval: tuple[float, float]) -> Estimate:
 _SEARCH_WIDTHS: Final = (2.0, 0.125)
 """Range about an instant that is searched, in intervals between readings; the second is finer."""
 _SHIFTS: Final = np.linspace(-1.0, 1.0, 33)
+"""Places in the range that are tried: an eighth of an interval apart at first, then 1/128."""
 
 
 def with_better_instants(fit: Fit, data: Data, noise: Noise, held: Iterable[int]) -> Fit:

@@ -25,7 +25,9 @@ _INTERVAL_SHARE: Final = 0.9
 _LARGE_PHASE_RAD: Final = 0.3
 """Phase difference of two models in rad from which the difference of readings misleads."""
 _HARMONICS: Final = 6
+"""Of the motion that are told apart: what lies higher is told as sharp in phase."""
 _HARMONIC_SHARE: Final = 0.1
+"""Part of what an effect explains from which a harmonic is named."""
 
 
 def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
@@ -235,12 +237,15 @@ def _summary(found: Location, data: Data, amplitude: FloatArray, opposite: str) 
         clauses.append("at " + ", ".join(f"{line:.5g} Hz" for line in found.frequency_hz))
     if found.mains:
         clauses.append(found.mains)
-    return f"it shows {', '.join(clauses)}" if clauses else ""
+    return ", ".join(clauses)
 
 
 _CYCLE_BINS: Final = 24
+"""Of the phase: 15 degrees, as exactly as a reader is told it."""
 _HALF_CYCLE_BINS: Final = _CYCLE_BINS // 2
+"""What shows twice a cycle is folded into them."""
 _BIN_RAD: Final = 2.0 * math.pi / _CYCLE_BINS
+"""Width of one."""
 _OPPOSITE_SHARE: Final = 0.75
 """Part that two opposite quarters of the cycle must hold to be named: a misfit of the phase
 has 1/2 + 1/pi = 0.82 there, a uniform one 0.5."""

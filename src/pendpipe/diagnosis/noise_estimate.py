@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from pendpipe.diagnosis.data import Data
 
 _HARMONICS: Final = 7
+"""The first of the motion that no misfit fills: a swing of 90 degrees has 1e-5 of itself there."""
 _HARMONIC_HALF_WIDTH: Final = 0.08
 """Half width of the band about each harmonic that a misfit may fill, over the frequency."""
 _LOBE: Final = 1.5
@@ -46,13 +47,18 @@ running mean 2."""
 _LEVELS: Final = (0.0, 0.3, 1.0, 3.0)
 """Rms first coefficients of ln level^2 that are tried; a level that falls by 3 has 0.9."""
 _LEVEL_WAVES: Final = 16
+"""Cosines of a level that changes: sixteen half waves of a record."""
 _LEVEL_BINS: Final = 64
+"""Parts of a record in which the level is counted: four for each cosine."""
 _FEWEST_IN_BIN: Final = 8
+"""Readings in each: their mean square is known to a half, which the others average."""
 _LARGEST_SQUARE: Final = 20.0
 """Of a whitened reading, over the median (3 standard deviations of normal noise): single large
 errors don't make a level."""
 _BINS: Final = 128
+"""Parts of the spectrum at least."""
 _RELATIVE_BIN: Final = 0.1
+"""Width of a part over its frequency: a power law of slope 4 changes by half within."""
 _READINGS_AT_ENDS: Final = 100.0
 """Readings over which the leakage of the ends of a filtered record adds up."""
 _SLOWEST_LINE: Final = 6
@@ -73,8 +79,11 @@ _RANGE_OF_LINES: Final = 20.0
 _NOT_NOISE: Final = -2.0 * math.log(_LINES / _RANGE_OF_LINES) - math.log(2.0 * math.pi)
 """r - ln r above which a square of r times the variance is more probably no noise."""
 _ROUNDS: Final = 12
+"""Newton steps at most: the likelihood is nearly a parabola, and four are usual."""
 _CONVERGED: Final = 1e-3
+"""Gain in log-likelihood that is left when it ends: 0.05 sd of any number."""
 _CLEANINGS: Final = 3
+"""Times that lines are taken out: each shows those that a louder one has hidden."""
 
 
 def estimate_noise(

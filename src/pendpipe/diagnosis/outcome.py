@@ -7,8 +7,15 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from pendpipe.analysis.fit.result import FitResult
-from pendpipe.diagnosis.found import LEVEL, FittedModel, FoundEffect, Verdict
+from pendpipe.diagnosis.found import (
+    WANDERING_ZERO,
+    FittedModel,
+    FoundEffect,
+    Verdict,
+    verdict_of,
+)
 from pendpipe.dynamics.eq8 import Restoring
+from pendpipe.levels import FALSE_ALARM
 
 if TYPE_CHECKING:
     from pendpipe.diagnosis.cycles import SmallSwings
@@ -25,22 +32,18 @@ class Outcome:
     ----------
     baseline_name, baseline, improved
         The model that was asked for, and the one with the effects that were found.
-    noise_rms_rad
-        Of one reading, never below step/sqrt(12).
-    verdict, p_value
+    p_value
         Global: of the largest score over the whole catalogue.
     effects
         What the baseline has, and the missing in the order in which they were added.
     held_out
         None where nothing was added.
-    unexplained_rms_rad, unexplained_p_value
-        What the improved model leaves.
+    unexplained_p_value
+        Of what the improved model leaves.
     remainder
         The same in parts: its size over the noise, and where it lies.
     small_swings
         How the frequency differs from the improved model's at the smallest amplitudes, if it does.
-    details
-        All that was found, one paragraph: what the summary leaves out too.
     name
         Of the recording.
     fit
@@ -62,16 +65,11 @@ class Outcome:
     baseline_name: str
     baseline: FittedModel
     improved: FittedModel
-    noise_rms_rad: float
-    verdict: Verdict
     p_value: float
     effects: tuple[FoundEffect, ...]
     held_out: HeldOut | None
-    unexplained_rms_rad: float
     unexplained_p_value: float
-    details: str
     warnings: tuple[str, ...] = ()
-    figures: tuple[str, ...] = ()
     remainder: Remainder | None = None
     small_swings: SmallSwings | None = None
     restoring: Restoring = "linear"
@@ -83,10 +81,33 @@ class Outcome:
     search: Hypothesis | None = field(default=None, repr=False, compare=False)
     alone: tuple[Outcome, ...] = field(default=(), repr=False, compare=False)
     recordings: tuple[dict[str, Any], ...] = ()
-    level: float = LEVEL
+    level: float = FALSE_ALARM
     drawn_by: Callable[[], Any] | None = field(default=None, repr=False, compare=False)
 
     @property
     def missing(self) -> tuple[FoundEffect, ...]:
         """The effects that the baseline lacks."""
         return tuple(each for each in self.effects if not each.presumed)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether something is missing: the baseline is consistent where chance explains it."""
+        return verdict_of(self.missing, self.p_value, self.level)
+
+    @property
+    def noise_rms_rad(self) -> float:
+        """Of one reading, never below step/sqrt(12)."""
+        return self.improved.noise_rms_rad
+
+    @property
+    def unit(self) -> str:
+        """Of the motion."""
+        if self.search is not None:
+            return self.search.data.unit
+        amplitude = self.baseline.parameters.get("amplitude")
+        return "rad" if amplitude is None else amplitude.unit
+
+    @property
+    def wanders(self) -> bool:
+        """Whether most of what is left is a zero that wanders."""
+        return self.search is not None and WANDERING_ZERO in self.search.notes

@@ -149,10 +149,12 @@ _SLOW_GAIN: Final = 0.25
 _LAST_STEPS: Final = 3
 """Last steps from which the gain of further ones is extrapolated."""
 _TRIES: Final = 6
+"""Lengths of one step that are tried: from a tenth each, six reach 1e-6 of it."""
 _POOR: Final = 0.25
 _GOOD: Final = 0.75
 """Parts of the expected gain below (above) which a step was too long (may be longer)."""
 _SHORTER: Final = (0.1, 0.5)
+"""Least and usual part of a step by which it is shortened, as More (1978) has them."""
 _LONGER: Final = 2.0
 """Radius of the next step over the length of the last; with the two above as More (1978) has."""
 _NUMBERS: Final = 100.0
@@ -524,8 +526,11 @@ def _expected(here: Evaluation, columns: FloatArray, step: FloatArray) -> float:
 _FIRST_CYCLES: Final = 4
 """Cycles in the first window."""
 _FEWEST_READINGS: Final = 24
+"""Readings of the first window: three for each of the eight values of the baseline."""
 _GROWTH: Final = 1.6
+"""Of the window at each step: what is uncertain of the phase grows by its square, 2.6, at most."""
 _GROWING_ROUNDS: Final = 8
+"""Rounds in each window: its end need only lie within the next one's reach."""
 
 
 def fit_in_growing_window(

@@ -20,14 +20,19 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
+from pendpipe.files import fields_of
 
-INCOMPLETE: Final = 1.14
-"""Residual over noise (chi^2 of 1.3 per degree of freedom) above which a model is incomplete:
-the noise itself is known much better, from between the harmonics."""
+CLEAN: Final = 1.3
+"""chi^2 per reading up to which hardly more than noise is left: the noise itself is known much
+better, from between the harmonics."""
+INCOMPLETE: Final = math.sqrt(CLEAN)
+"""Residual over noise above which a model is incomplete."""
 _HARMONICS: Final = 4
+"""Of the motion that are told from what lies between them."""
 _SIGNIFICANT_POWER: Final = 9.0
 """Squared normalised coefficient above which it is not noise."""
 _FEWEST_NUMBERS: Final = 2.0
+"""Numbers that describe a misfit: a wave has two, its cosine and its sine."""
 _PARTS: Final = ("offset", "amplitude", "phase", "harmonics", "between")
 
 
@@ -52,7 +57,7 @@ class Remainder:
 
     excess: float
     over_noise: float
-    numbers: float
+    numbers: float = field(metadata={"json": "independent_numbers"})
     shares: Mapping[str, float] = field(default_factory=dict)
     sizes: tuple[float, ...] = ()
 
@@ -70,13 +75,8 @@ class Remainder:
 
     def as_json(self) -> dict[str, Any]:
         """Return its part of ``diagnosis.json``."""
-        return {
-            "over_noise": self.over_noise,
-            "independent_numbers": self.numbers,
-            "error_factor": self.error_scale,
-            "systematic": self.systematic,
-            "shares": dict(self.shares),
-        }
+        more = {"error_factor": self.error_scale, "systematic": self.systematic}
+        return {**fields_of(self), **more}
 
 
 def remainder_of(fit: Fit, data: Data, noise: Noise) -> Remainder:

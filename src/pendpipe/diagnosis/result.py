@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pendpipe.analysis.fit.result import drawer_of
+from pendpipe.diagnosis.found import FittedModel
 from pendpipe.diagnosis.outcome import Outcome
-from pendpipe.diagnosis.summary import BASELINES, Summary, html_of, summarise
+from pendpipe.diagnosis.summary import Summary, details_of, summarise
+from pendpipe.files import plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -18,13 +20,8 @@ if TYPE_CHECKING:
 FILE_NAME: Final = "diagnosis.json"
 
 
-def swinging(baseline: str, restoring: str, drag_form: str) -> str:
-    """Return a baseline with its forms, in words."""
-    forms = {"sin x": restoring == "sine", "v|v|": drag_form == "speed"}
-    with_them = " and ".join(name for name, has in forms.items() if has)
-    return BASELINES.get(baseline, baseline) + (f" with {with_them}" if with_them else "")
-
-
+_NOT_HELD: Final = (None, None, 0.0, 0.0)
+"""Of a recording of which nothing was predicted."""
 _DENSITIES: Final = ("log_density_before", "log_density_after", "gain", "gain_sd")
 
 
@@ -39,55 +36,57 @@ class Diagnosis(Outcome):
     @property
     def statement(self) -> str:
         """The answer as it is printed: a dozen lines at most."""
-        return "\n".join(self.summary.lines())
+        return "\n".join(self.summary.answer.lines())
+
+    @property
+    def details(self) -> str:
+        """All that was found: what the answer leaves out too."""
+        return "\n".join(details_of(self))
 
     def __str__(self) -> str:
-        return "\n".join(self.summary.lines(self.name))
+        return "\n".join(self.summary.answer.lines(self.name))
 
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        return html_of(self.summary, self.name)
+        return self.summary.answer.html(self.name)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``diagnosis.json``."""
-        held = self.held_out
-        densities = (
-            (None, None, 0.0, 0.0)
-            if held is None
-            else (held.before, held.after, held.gain, held.gain_sd)
+        held, found = self.held_out, {each.identifier for each in self.effects}
+        densities = (held.before, held.after, held.gain, held.gain_sd) if held else _NOT_HELD
+        content: dict[str, Any] = plain(
+            {
+                "schema_version": 1,
+                "baseline": {"name": self.baseline_name, **self.baseline.as_json()},
+                "restoring": self.restoring,
+                "drag_form": self.drag_form,
+                "noise_rms_rad": self.noise_rms_rad,
+                "verdict": self.verdict,
+                "p_value": self.p_value,
+                "effects": self.effects,
+                "improved": self.improved,
+                "held_out": dict(zip(_DENSITIES, densities, strict=True)),
+                "prediction": held,
+                "unexplained": {
+                    "residual_rms_rad": self.improved.residual_rms_rad,
+                    "p_value": self.unexplained_p_value,
+                },
+                "remainder": self.remainder,
+                "small_amplitudes": self.small_swings,
+                "statement": self.statement,
+                "summary": self.summary,
+                "details": self.details,
+                "excluded": [
+                    {"id": name, "p_value": p} for name, p in self.scanned if name not in found
+                ],
+                "figures": (),
+                "warnings": self.warnings,
+                "provenance": self.provenance,
+                **({"recordings": self.recordings} if self.recordings else {}),
+            }
         )
-        return {
-            "schema_version": 1,
-            "baseline": {"name": self.baseline_name, **self.baseline.as_json()},
-            "restoring": self.restoring,
-            "drag_form": self.drag_form,
-            "noise_rms_rad": self.noise_rms_rad,
-            "verdict": self.verdict,
-            "p_value": self.p_value,
-            "effects": [effect.as_json() for effect in self.effects],
-            "improved": self.improved.as_json(),
-            "held_out": dict(zip(_DENSITIES, densities, strict=True)),
-            "prediction": None if held is None else held.as_json(),
-            "unexplained": {
-                "residual_rms_rad": self.unexplained_rms_rad,
-                "p_value": self.unexplained_p_value,
-            },
-            "remainder": None if self.remainder is None else self.remainder.as_json(),
-            "small_amplitudes": None if self.small_swings is None else self.small_swings.as_json(),
-            "statement": self.statement,
-            "summary": self.summary.as_json(),
-            "details": self.details,
-            "excluded": [
-                {"id": identifier, "p_value": p_value}
-                for identifier, p_value in self.scanned
-                if identifier not in {each.identifier for each in self.effects}
-            ],
-            "figures": list(self.figures),
-            "warnings": list(self.warnings),
-            "provenance": dict(self.provenance),
-            **({"recordings": list(self.recordings)} if self.recordings else {}),
-        }
+        return content
 
     def save(
         self, folder: str | Path, *, figures: bool = True, force: bool = False
@@ -115,12 +114,11 @@ class Diagnosis(Outcome):
         """
         from pendpipe.files import write_json, writing
 
-        target, whole = Path(folder), self
+        target, content = Path(folder), self.to_dict()
         with writing(force=force):
             if figures and self.drawn_by and not self.alone:
                 drawn = self.drawn_by().draw_diagnosis(self, target)
-                whole = replace(self, figures=tuple(path.name for path in drawn))
-            content = whole.to_dict()
+                content["figures"] = [path.name for path in drawn]
             write_json(target / FILE_NAME, content)
         return content
 
@@ -152,27 +150,22 @@ def not_analysable(
     provenance
         Goes into the result.
     """
-    nothing: dict[str, Any] = {"parameters": {}, "residual_rms_rad": None, "chi2_per_dof": None}
-    nothing |= {"noise_rms_rad": None, "fit_p_value": None}
-    nothing |= {"period_span_s": None, "quality_factors": []}
-    return {
-        "schema_version": 1,
-        "baseline": {"name": baseline, **nothing},
-        "restoring": None,
-        "drag_form": None,
-        "noise_rms_rad": None,
-        "verdict": "not-analysable",
-        "reason": reason,
-        "p_value": None,
-        "effects": [],
-        "improved": dict(nothing),
-        "held_out": dict.fromkeys(_DENSITIES),
-        "unexplained": {"residual_rms_rad": None, "p_value": None},
-        "statement": f"This recording can't be analysed: {reason}.",
-        "summary": Summary(f"not analysable: {reason}").as_json(),
-        "details": "",
-        "excluded": [],
-        "figures": [],
-        "warnings": [],
-        "provenance": dict(provenance or {}),
-    }
+    nothing = FittedModel({}, math.nan, math.nan, math.nan)
+    answer = f"This recording can't be analysed: {reason}."
+    empty = Diagnosis(baseline, nothing, nothing, math.nan, (), None, math.nan).to_dict()
+    content: dict[str, Any] = plain(
+        {
+            **empty,
+            "restoring": None,
+            "drag_form": None,
+            "verdict": "not-analysable",
+            "reason": reason,
+            "held_out": dict.fromkeys(_DENSITIES),
+            "statement": answer,
+            "summary": Summary(f"not analysable: {reason}"),
+            "details": "",
+            "provenance": provenance or {},
+        },
+        only_finite=True,
+    )
+    return content

@@ -235,7 +235,7 @@ def of_one_class(best: Rival, rival: Rival) -> bool:
 
 def equivalent(p_value: float, score: float) -> float:
     """Return chi^2 of one degree of freedom with that p-value; `score` where p underflows."""
-    if p_value <= 1e-290:
+    if p_value <= _UNDERFLOW:
         return score
     return float(chdtri(1, p_value))
 
@@ -266,7 +266,7 @@ def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance, unit: float = 1.
         gain += max(math.log(gain) - 0.45, 0.0)
     local = float(chdtrc(sizes, gain))
     trials = chance.own.get(effect.key, Trials(1.0, 0.0))
-    if local > 1e-290:
+    if local > _UNDERFLOW:
         worth = equivalent(trials.global_p_value(local), gain)
     else:
         # Too large for p-values: subtract the charges for trials and further sizes.
@@ -367,7 +367,10 @@ _STALLED_GAIN: Final = 0.3
 """Fall of chi^2 in two rounds below which a refit stops (a winner is refined again)."""
 _LARGEST_DISPLACEMENT: Final = 0.5
 """Largest displacement that an effect may add to the reading, over the first amplitude."""
+_UNDERFLOW: Final = 1e-290
+"""p-value below which the next digits are lost: the least number is 2e-308."""
 _MOST_REFITTED: Final = 9
+"""Effects that are refitted side by side: a choice, of time."""
 _SCORE_MARGIN: Final = 0.3
 """Part of the best score that a refit may catch up."""
 _SCORE_MARGIN_AT_BOUND: Final = 0.6

@@ -25,7 +25,7 @@ from pendpipe.diagnosis.data import with_scatter
 from pendpipe.diagnosis.forensics.codes import with_true_step
 from pendpipe.diagnosis.forensics.lost_samples import loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
-from pendpipe.diagnosis.found import LEVEL, FittedModel, FoundEffect, Location, verdict_of
+from pendpipe.diagnosis.found import FittedModel, FoundEffect, Location, verdict_of
 from pendpipe.diagnosis.held_out import HeldOut, held_out
 from pendpipe.diagnosis.hypothesis import Hypothesis, Task, catalogue_beside
 from pendpipe.diagnosis.projection import whitened
@@ -33,9 +33,8 @@ from pendpipe.diagnosis.quoted import quoted
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
-from pendpipe.diagnosis.result import Diagnosis, swinging
+from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.search import baseline_fitted, run_search
-from pendpipe.diagnosis.summary import statement
 from pendpipe.diagnosis.values import parameters_of
 from pendpipe.diagnosis.weighing import (
     Weighed,
@@ -49,6 +48,7 @@ from pendpipe.effects.catalogue.losses import drag_form as drag_form_effect
 from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
+from pendpipe.levels import FALSE_ALARM
 from pendpipe.quantities import stretch, with_error
 from pendpipe.recording import Recording
 
@@ -59,7 +59,7 @@ def diagnose_recording(
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
     seed: int = 0,
-    level: float = LEVEL,
+    level: float = FALSE_ALARM,
     restoring: Restoring | None = None,
     length: Estimate | None = None,
     place: str | Path = "recording",
@@ -122,7 +122,7 @@ def diagnose_recording(
     refuse_if(
         points.mostly_cut,
         place,
-        f"{points.mostly_cut}, of which nothing is said",
+        f"most of it was cut: {points.mostly_cut}, of which nothing is said",
         "cut it with --start and --stop, or see pendpipe inspect",
         NotAnalysableError,
     )
@@ -172,7 +172,7 @@ def diagnose_decay(
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
     seed: int = 0,
-    level: float = LEVEL,
+    level: float = FALSE_ALARM,
     restoring: Restoring | None = None,
     place: str | Path = "recording",
     provenance: Mapping[str, Any] | None = None,
@@ -220,37 +220,19 @@ def diagnose_decay(
     stands = printed if printed and printed.light != "red" else None
     before, after, leading = _models(found, weighed, printed, level)
     drag_form, swung = stands.drag_form if stands else "energy", found.baseline.model.restoring
-    swings = _small_swings(leading, found)
     gap = gap_note((whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
     stamps = tuple(note for note in (gap, *found.notes.values()) if note)
     return Diagnosis(
         baseline,
         before,
         after,
-        after.noise_rms_rad,
-        verdict,
         found.p_value,
         (*_presumed(found, drag_form), *effects),
         _left_out(found, beginning.held, progress) if verdict != "consistent" else None,
-        after.residual_rms_rad,
         found.unexplained,
-        statement(
-            swinging(baseline, swung, drag_form),
-            before,
-            effects,
-            after.noise_rms_rad,
-            found.p_value,
-            found.unexplained,
-            level,
-            unit=found.data.unit,
-            remainder=found.remainder,
-            swings=swings,
-            notes=stamps,
-            rounded=after.noise_rms_rad <= found.data.step / 12.0**0.5,
-        ),
         warnings=(*points.notes, *stamps),
         remainder=found.remainder,
-        small_swings=swings,
+        small_swings=_small_swings(leading, found),
         restoring=swung,
         drag_form=drag_form,
         provenance=dict(provenance or {}),

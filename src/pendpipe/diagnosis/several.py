@@ -22,7 +22,7 @@ from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.found import LEVEL, FittedModel, FoundEffect, Location, verdict_of
+from pendpipe.diagnosis.found import FittedModel, FoundEffect, Location
 from pendpipe.diagnosis.held_out import held_out
 from pendpipe.diagnosis.hypothesis import (
     MOST_EFFECTS,
@@ -37,11 +37,11 @@ from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.quoted import Description, averages, descriptions_of
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
-from pendpipe.diagnosis.result import Diagnosis, swinging
+from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.rivals import Scale
 from pendpipe.diagnosis.search import LESS_FRICTION, run_search
 from pendpipe.diagnosis.stacked import StackedData, StackedNoise
-from pendpipe.diagnosis.summary import DOUBTFUL, statement
+from pendpipe.diagnosis.summary import DOUBTFUL
 from pendpipe.diagnosis.values import constants_of
 from pendpipe.diagnosis.weighing import Weighed, effect_named
 from pendpipe.dynamics.any_law import NoMotionError
@@ -53,7 +53,8 @@ from pendpipe.effects.model import Model, jacobian
 from pendpipe.effects.stack import MAY_DIFFER, Differs, Stack
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.estimate import Z95, Estimate
-from pendpipe.quantities import compact, listed
+from pendpipe.levels import FALSE_ALARM
+from pendpipe.quantities import listed
 from pendpipe.recording import Recording
 
 _HEAD: Final = 0.25
@@ -69,7 +70,7 @@ def diagnose_several(
     *,
     diagnose: Callable[..., Diagnosis],
     baseline: Baseline = "eq8",
-    level: float = LEVEL,
+    level: float = FALSE_ALARM,
     seed: int = 0,
     restoring: Restoring | None = None,
     same_sensor: bool = False,
@@ -146,39 +147,19 @@ def diagnose_several(
     p_value = min(1.0, (len(outcomes) + 1) * p_value)
     own_forms = [each for each in outcomes[0].effects if each.presumed]
     effects = (*own_forms, *named, *differing, *events)
-    told = [after.recording(number) for number in range(len(names))]
-    missing = [each for each in effects if not each.presumed]
-    noise_rms = _rms([outcome.noise_rms_rad for outcome in outcomes])
     held = (
         held_out(found.baseline, found.fit, found.data, found.noise, found.held, found.held)
         if named
         else None
     )
-    text = statement(
-        swinging(baseline, outcomes[0].restoring, outcomes[0].drag_form),
-        before.model() if named else after.model(),
-        named,
-        noise_rms,
-        p_value,
-        found.unexplained,
-        level,
-        unit=found.data.unit,
-        remainder=found.remainder,
-    )
-    # It is about one recording.
-    text = text.replace("this recording", "them")
     return Diagnosis(
         baseline,
         before.model(),
         after.model(),
-        noise_rms,
-        verdict_of(missing, p_value, level),
         p_value,
         effects,
         held,
-        after.model().residual_rms_rad,
         found.unexplained,
-        " ".join((after.opening(), text, *after.closing(differing, events, told))),
         warnings=tuple(
             f"{name}: {line}"
             for name, outcome in zip(names, outcomes, strict=True)
@@ -191,7 +172,7 @@ def diagnose_several(
         name=f"{listed(names)} together",
         search=found,
         alone=tuple(outcomes),
-        recordings=tuple(told),
+        recordings=tuple(after.recording(number) for number in range(len(names))),
         level=level,
     )
 
@@ -447,14 +428,16 @@ class _Together:
             known = effect.parameter_free or effect.kind == "unnamed"
             if not known and all(abs(e.value) < _NOT_ZERO_SD * e.sd for e in sizes):
                 one = replace(one, probability=min(one.probability, DOUBTFUL))
-            everywhere = Location(summary="it shows in all recordings together")
+            everywhere = Location(summary="in all recordings together")
             named.append(replace(one, location=everywhere))
         return named, differing
 
     def events(self) -> list[FoundEffect]:
         """Return what happened in one recording alone."""
         return [
-            replace(each, location=replace(each.location, summary=f"in {name} alone"))
+            replace(
+                each, location=replace(each.location, summary=f"in {name} alone", recording=name)
+            )
             for name, outcome, part in zip(
                 self.names, self.outcomes, self.improved.at.parts, strict=True
             )
@@ -477,7 +460,10 @@ class _Together:
         if len(self.names) == 2:
             name = f"The recordings contradict each other in {effect.parameter}"
         return replace(
-            found, name=name, parameters=values, location=Location(summary=f"in {where}")
+            found,
+            name=name,
+            parameters=values,
+            location=Location(summary=f"in {where}", recording=where),
         )
 
     def recording(self, number: int) -> dict[str, Any]:
@@ -544,45 +530,6 @@ class _Together:
             "expected_rms_rad": float(np.sqrt(band.mean())),
             "within_95": float(np.mean(np.abs(off) < Z95 * np.sqrt(band))),
         }
-
-    def opening(self) -> str:
-        """Return what was taken together, and what all have."""
-        common = [f"{name} = {value}" for name, value in self.model().parameters.items()]
-        return (
-            f"{len(self.names)} recordings of one pendulum ({listed(self.names)}) were taken"
-            " together: each has a start, an offset and noise of its own"
-            + (f", and all have {listed(common)}." if common else ".")
-        )
-
-    def closing(
-        self,
-        differing: Sequence[FoundEffect],
-        events: Sequence[FoundEffect],
-        recordings: Sequence[Mapping[str, Any]],
-    ) -> list[str]:
-        """Return who contradicts whom, what happened to one alone, and how each is predicted."""
-        text = [
-            f"{each.name}: {listed([f'{v} in {name}' for name, v in each.parameters.items()])}."
-            for each in differing
-        ]
-        for name in self.names:
-            shown = [each.name for each in events if each.location.summary == f"in {name} alone"]
-            text += [f"{name} alone shows {listed(shown)}."] if shown else []
-        told = [(each["name"], each["prediction"]) for each in recordings if each["prediction"]]
-        parts = [
-            f"{100.0 * each['within_95']:.0f} % of {name}"
-            f" ({compact(each['rms_rad'], self.found.data.unit)} rms, expected"
-            f" {compact(each['expected_rms_rad'], self.found.data.unit)})"
-            for name, each in told
-        ]
-        lost = [each["name"] for each in recordings if not each["prediction"]]
-        text += [f"The others do not settle how {listed(lost)} moves."] if lost else []
-        if told:
-            text.append(
-                "Predicted from the others, with only its first quarter to fit what is its own,"
-                f" the 95 % band holds {listed(parts)}."
-            )
-        return text
 
 
 _MARGIN: Final = 0.03

@@ -1,26 +1,28 @@
 """The answer in a dozen lines: what is missing, how much it matters, and what to quote.
 
 A name is given from a probability of one half on, its class counted together; from a fifth on
-it stands in one line of candidates. Everything below is in the details (`statement`).
+it stands in one line of candidates. Everything below is in the details.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from pendpipe.analysis.fit.printed import short_size
 from pendpipe.analysis.fit.quality import period_of_frequency
-from pendpipe.diagnosis.cycles import SmallSwings
-from pendpipe.diagnosis.found import COLOURED_NOISE, FittedModel, FoundEffect
+from pendpipe.answer import Answer, Table, factor, percent, printed
+from pendpipe.diagnosis.found import COLOURED_NOISE, FoundEffect
 from pendpipe.diagnosis.outcome import Outcome
 from pendpipe.diagnosis.remainder import Remainder
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier, declared
 from pendpipe.effects.curves import CURVES
-from pendpipe.estimate import Estimate
-from pendpipe.quantities import compact, in_columns, listed, with_error
+from pendpipe.estimate import LISTED, Estimate
+from pendpipe.files import fields_of
+from pendpipe.levels import FALSE_ALARM
+from pendpipe.quantities import compact, listed, with_error
 
 BASELINES: Final = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 """The baselines in words."""
@@ -28,18 +30,12 @@ NAMED: Final = 0.5
 """Probability from which a cause is named, its class counted together."""
 DOUBTFUL: Final = 0.05
 """Probability up to which a name only describes and is not to be quoted."""
-_CONFIRMED: Final = 0.01
-"""p-value of a second test below which it confirms."""
 CANDIDATE: Final = 0.2
 """Probability from which it is a candidate."""
 _MOVED: Final = 2.0
 """Standard deviations from which a number is said to move."""
 _SURE: Final = 0.95
 """Probability from which a name without rivals needs no further measurement."""
-SMALLEST: Final = 1e-12
-"""Smaller p-values rest on tails of the noise that nobody has tested."""
-WIDTH: Final = 120
-"""Of a line that is printed."""
 _SHOWN: Final = 4
 """Of what was looked for."""
 _KNOWN: Final = 2.0
@@ -94,13 +90,7 @@ class Change:
 
     def as_json(self) -> dict[str, Any]:
         """Return its form in JSON."""
-        return {
-            "quantity": self.quantity,
-            "amplitude_rad": self.amplitude_rad,
-            "fitted": self.fitted.as_json(),
-            "with_missing": self.with_missing.as_json(),
-            "moved_sd": self.moved_sd,
-        }
+        return {**fields_of(self), "moved_sd": self.moved_sd}
 
 
 @dataclass(frozen=True)
@@ -156,58 +146,32 @@ class Summary:
         )
         return [(title, value) for title, value in pairs if value]
 
-    def lines(self, name: str = "", width: float = WIDTH) -> list[str]:
-        """Return the answer as it is printed: a dozen lines at most, all but the last `width` wide.
-
-        What makes room are numbers of effects (the sentence has them), last clauses, and Q between
-        the largest amplitude and the smallest.
-        """
-        first = f"{name}: {self.headline}" if name else self.headline
-        for cause in self.missing if len(first) > width else ():
-            first = first.replace(cause, cause if cause.endswith("together)") else _bare(cause))
-        return [
-            first,
-            *(_within(f"  {title:<22}{value}", width) for title, value in self.pairs()),
-            *(f"  {row}" for row in self.table(width - 2).splitlines()),
-            *([f"Copy: {self.sentence}"] if self.sentence else []),
-        ]
-
-    def table(self, width: float = math.inf) -> str:
-        """Return *as fitted* and *with what is missing* side by side."""
-        rows = [("", "as fitted", "with what is missing"), *self.rows()]
-        text = in_columns(list(zip(*rows, strict=True))) if self.consequence else ""
-        if max(map(len, text.splitlines()), default=0) <= width:
-            return text
+    @property
+    def answer(self) -> Answer:
+        """What is printed: where it is too wide, without the numbers of what is missing."""
+        short = self.headline
+        for cause in self.missing:
+            short = short.replace(cause, cause if cause.endswith("together)") else _bare(cause))
         of_q = [each for each in self.consequence if each.quantity == "Q"]
-        kept = [each for each in self.consequence if each not in of_q[1:-1]]
-        return replace(self, consequence=tuple(kept)).table()
+        fewer = [each for each in self.consequence if each not in of_q[1:-1]]
+        tables = (_table(self.consequence), _table(fewer)) if self.consequence else ()
+        headlines = self.headline, short
+        return Answer(headlines, tuple(self.pairs()), tables=tables, sentence=self.sentence)
 
-    def rows(self) -> list[tuple[str, str, str]]:
-        """Return the table as rows: quantity, as fitted, with what is missing."""
-        return [
+
+def _table(changes: Sequence[Change]) -> Table:
+    """Return *as fitted* and *with what is missing* side by side, heads first."""
+    return (
+        ("", "as fitted", "with what is missing"),
+        *(
             (
                 _title(each),
                 each.fitted.or_limit(),
                 replace(each.with_missing, unit=each.fitted.unit).or_limit(),
             )
-            for each in self.consequence
-        ]
-
-    def as_json(self) -> dict[str, Any]:
-        """Return ``summary`` of ``diagnosis.json``."""
-        return {
-            "headline": self.headline,
-            "missing": list(self.missing),
-            "matters": self.matters,
-            "consequence": [each.as_json() for each in self.consequence],
-            "where": self.where,
-            "certainty": self.certainty,
-            "candidates": self.candidates,
-            "excluded": list(self.excluded),
-            "decide_by": self.decide_by,
-            "quote": self.quote,
-            "sentence": self.sentence,
-        }
+            for each in changes
+        ),
+    )
 
 
 def read_summary(content: Mapping[str, Any], unit: str) -> Summary:
@@ -231,13 +195,6 @@ def _bare(cause: str) -> str:
     return cause.rpartition(" (")[0] if cause.endswith(")") else cause
 
 
-def _within(line: str, width: float) -> str:
-    """Leave out the last clauses of a line until it is short enough."""
-    while len(line) > width and "; " in line:
-        line = line.rpartition("; ")[0]
-    return line
-
-
 def _title(change: Change) -> str:
     if change.amplitude_rad is None:
         return {"period": "T0"}.get(change.quantity, change.quantity)
@@ -253,48 +210,36 @@ def summarise(diagnosis: Outcome) -> Summary:
         noise = any(each.identifier == COLOURED_NOISE for each in diagnosis.effects)
         p = printed(diagnosis.p_value)
         coloured = "; its noise is coloured" if noise else ""
-        wanders = any("the zero wanders" in note for note in diagnosis.warnings)
-        zero = "; its zero wanders" if wanders else ""
+        zero = "; its zero wanders" if diagnosis.wanders else ""
         said, sentence = f"nothing is missing{beyond}", ""
         if diagnosis.verdict != "consistent":
             said = f"a small misfit is left{beyond}, its cause is NOT known"
             sentence = _sentence(diagnosis, (), presumed)
         return Summary(f"{said} ({p}){coloured}{zero}", sentence=sentence)
-    contradicting = [
-        each.name
-        for each in found
-        if each.kind == "parameter" and not each.identifier.startswith("parameter-")
-    ]
     named = [word for each in found if (word := _named(each))]
     candidates = [_candidate(each) for each in found if not _named(each)]
     candidates = [each for each in candidates if each]
-    names = (*contradicting, *(word for word in named if word not in contradicting))
     changes = _changes(diagnosis)
     rest = diagnosis.remainder is not None and diagnosis.remainder.systematic
-    if names:
-        headline = f"missing: {'; '.join(names)}"
+    if named:
+        headline = f"missing: {'; '.join(named)}"
         headline += ", and a misfit of unknown cause" if rest or len(named) < len(found) else ""
     else:
         headline = "something is missing, its cause is NOT known"
-    unit = _unit(diagnosis)
+    unit = diagnosis.unit
     return Summary(
         headline,
-        names,
+        tuple(named),
         _matters(diagnosis, changes, unit),
         changes,
         _where(diagnosis, found),
         _certainty(diagnosis, named, rest=rest),
-        "; ".join(candidates) or ("none above 20 %" if not names else ""),
+        "; ".join(candidates) or ("none above 20 %" if not named else ""),
         _excluded(diagnosis, found),
         _decide_by(found),
         _quote(diagnosis, changes),
-        _sentence(diagnosis, names, presumed),
+        _sentence(diagnosis, named, presumed),
     )
-
-
-def _unit(diagnosis: Outcome) -> str:
-    amplitude = diagnosis.baseline.parameters.get("amplitude")
-    return "rad" if amplitude is None else amplitude.unit
 
 
 def _presumed(diagnosis: Outcome) -> str:
@@ -332,7 +277,7 @@ def _named(effect: FoundEffect) -> str:
     if members[0][0] >= NAMED:
         numbers = numbers_of(effect) if _leader(effect)[1] == effect.identifier else ""
         return f"{members[0][1]} ({numbers})" if numbers else members[0][1]
-    likely = [name for p, name in members if p >= 0.05]
+    likely = [name for p, name in members if p >= LISTED]
     return f"{' or '.join(likely)} ({percent(min(total, 1.0))} together)"
 
 
@@ -398,7 +343,7 @@ def _changes(diagnosis: Outcome) -> tuple[Change, ...]:
                 each.quality_factor,
                 better[each.amplitude_rad],
                 each.amplitude_rad,
-                _unit(diagnosis),
+                diagnosis.unit,
             )
             for each in fit.quality_factors
             if each.amplitude_rad in better
@@ -423,7 +368,7 @@ def _matters(diagnosis: Outcome, changes: Sequence[Change], unit: str) -> str:
 def _where(diagnosis: Outcome, found: Sequence[FoundEffect]) -> str:
     """Say where the most probable effect shows, and where the rest lies."""
     first = max(found, key=_leader)
-    text = first.location.summary.removeprefix("it shows ").removeprefix("It shows ")
+    text = first.location.summary
     curves = [each.curve for each in (first, *found) if each.curve and each.curve["summary"]]
     told = list({curve["name"]: curve["summary"] for curve in reversed(curves)}.values())
     text = "; ".join(told if _is_described(first) and told else [text, *told])
@@ -486,7 +431,7 @@ def _decide_by(found: Sequence[FoundEffect]) -> str:
 
 def _quote(diagnosis: Outcome, changes: Sequence[Change]) -> str:
     """What can be quoted: T0 and Q of the better model, a, b, c that stay."""
-    said, unit = list[str](), _unit(diagnosis)
+    said, unit = list[str](), diagnosis.unit
     period = next((each for each in changes if each.quantity == "period"), None)
     if period is not None:
         better = period.with_missing
@@ -518,111 +463,71 @@ def _sentence(diagnosis: Outcome, names: Sequence[str], presumed: str) -> str:
     return f"“{model} does not describe this recording ({p}): it lacks {listed(names)}.”"
 
 
-def printed(p_value: float) -> str:
-    """Return a p-value as it is printed: below 1e-12 it would rest on untested tails.
-
-    >>> printed(0.0312), printed(0.0)
-    ('p = 0.031', 'p < 1e-12')
-    """
-    return f"p = {p_value:.2g}" if p_value >= SMALLEST else f"p < {SMALLEST:.0e}"
-
-
-def percent(share: float) -> str:
-    """Print a probability in per cent."""
-    if share > 0.995:
-        return "> 99 %"
-    return f"{100.0 * share:.0f} %" if share >= 0.01 else "< 1 %"
+def swinging(outcome: Outcome) -> str:
+    """Return the baseline with its forms, in words."""
+    forms = {"sin x": outcome.restoring == "sine", "v|v|": outcome.drag_form == "speed"}
+    with_them = " and ".join(name for name, has in forms.items() if has)
+    name = BASELINES.get(outcome.baseline_name, outcome.baseline_name)
+    return name + (f" with {with_them}" if with_them else "")
 
 
-def factor(ratio: float) -> str:
-    """Print a ratio to two digits, without a power of ten."""
-    return f"{float(f'{ratio:.2g}'):,.0f}" if ratio > 9.95 else f"{ratio:.2g}"
-
-
-def html_of(summary: Summary, name: str = "") -> str:
-    """Return the answer for a notebook or a page: a list of what is known, and a table."""
-    from html import escape
-
-    title = f"{name}: {summary.headline}" if name else summary.headline
-    parts = [f"<p><strong>{escape(title)}</strong></p>"]
-    if pairs := summary.pairs():
-        cells = (f"<dt>{escape(key)}</dt><dd>{escape(value)}</dd>" for key, value in pairs)
-        parts.append(f"<dl>{''.join(cells)}</dl>")
-    if rows := summary.rows():
-        body = "".join(
-            "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
-        )
-        heads = "<th></th><th>as fitted</th><th>with what is missing</th>"
-        parts.append(f"<table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>")
-    if summary.sentence:
-        parts.append(f"<p>{escape(summary.sentence)}</p>")
-    return "".join(parts)
-
-
-def statement(
-    baseline: str,
-    before: FittedModel,
-    effects: Sequence[FoundEffect],
-    noise_rms: float,
-    p_value: float,
-    unexplained: float,
-    level: float,
-    *,
-    unit: str = "rad",
-    remainder: Remainder | None = None,
-    swings: SmallSwings | None = None,
-    notes: Sequence[str] = (),
-    rounded: bool = False,
-) -> str:
-    """Write the lines: whether the baseline holds, each effect, and what is left.
-
-    Parameters
-    ----------
-    baseline
-        ``"eq8"`` or ``"viscous"``.
-    before
-        The baseline.
-    effects
-        What was found.
-    noise_rms
-        Of one reading.
-    p_value, unexplained
-        Global p-values of the baseline and of what the extended model leaves.
-    level
-        The significance level.
-    unit
-        Of the readings.
-    remainder, swings
-        What the extended model leaves, and the frequency at the smallest amplitudes.
-    notes
-        Properties of the time stamps, a clause each.
-    rounded
-        Whether the noise is that of the rounding.
-    """
-    model = _capital(BASELINES.get(baseline, baseline))
-    left, noise_is = compact(before.residual_rms_rad, unit), compact(noise_rms, unit)
-    times = factor(before.residual_rms_rad / noise_rms)
+def details_of(outcome: Outcome) -> list[str]:
+    """Return all that was found, a line each: the baseline, each effect, and what is left."""
+    unit, told = outcome.unit, outcome.recordings
+    shared = [each for each in outcome.missing if not each.location.recording]
+    model, whole = _capital(swinging(outcome)), "them" if told else "this recording"
+    left, noise_rms = outcome.baseline.residual_rms_rad, outcome.noise_rms_rad
+    size, noise_is = compact(left, unit), compact(noise_rms, unit)
+    noise = [each.location.summary for each in shared if each.identifier == COLOURED_NOISE]
     lines = [
-        f"{model} does not describe this recording ({printed(p_value)}): the residual is"
-        f" {left} rms, {times} times the noise of {noise_is}.",
-        *map(_effect, effects),
-        _rest(unexplained, level, remainder),
-        *([swings.sentence(unit)] if swings is not None else []),
+        f"{model} does not describe {whole} ({printed(outcome.p_value)}): the residual is"
+        f" {size} rms, {factor(left / noise_rms)} times the noise of {noise_is}.",
+        *map(_effect, shared),
+        _rest(outcome.unexplained_p_value, outcome.level, outcome.remainder),
+        *([outcome.small_swings.sentence(unit)] if outcome.small_swings is not None else []),
     ]
-    noise = [each.location.summary for each in effects if each.identifier == COLOURED_NOISE]
-    if len(noise) == len(effects):
-        wanders = any("the zero wanders" in note for note in notes)
-        what = "the motion of this recording, whose zero wanders" if wanders else "this recording"
-        agrees = f"the residual of {left} rms agrees with the noise ({noise_is})"
-        if rounded and before.residual_rms_rad < noise_rms:
-            agrees = f"it leaves {left} rms, less than the rounding adds ({noise_is})"
-        chance = " more than chance would" if unexplained >= level else ", but more than by chance"
+    if len(noise) == len(shared):
+        what = f"the motion of {whole}, whose zero wanders" if outcome.wanders else whole
+        agrees = f"the residual of {size} rms agrees with the noise ({noise_is})"
+        step = outcome.search.data.step if outcome.search is not None else 0.0
+        if left < noise_rms <= step / 12.0**0.5:
+            agrees = f"it leaves {size} rms, less than the rounding adds ({noise_is})"
+        p = outcome.unexplained_p_value
+        chance = " more than chance would" if p >= outcome.level else ", but more than by chance"
         nothing = (
             f"{model} describes {what}: {agrees}, and no effect of the catalogue"
-            f" improves the fit{chance} ({printed(unexplained)})."
+            f" improves the fit{chance} ({printed(p)})."
         )
         lines = [nothing, *(f"{_capital(said)}." for said in noise)]
-    return "\n".join([*lines, *([f"Note: {'; '.join(notes)}."] if notes else [])])
+    return [*_of_several(outcome), *lines] if told else lines
+
+
+def _of_several(outcome: Outcome) -> Iterator[str]:
+    """Say what recordings have in common, who contradicts whom, and how each is predicted."""
+    names, unit = [each["name"] for each in outcome.recordings], outcome.unit
+    yield (
+        f"{len(names)} recordings of one pendulum ({listed(names)}) were taken together: each has"
+        " a start, an offset and noise of its own"
+    )
+    shared = outcome.improved.parameters.items()
+    if shared:
+        yield f"All have {listed([f'{name} = {value}' for name, value in shared])}."
+    for each in outcome.missing:
+        if each.location.recording and each.kind == "parameter":
+            values = [f"{value} in {name}" for name, value in each.parameters.items()]
+            yield f"{each.name}: {listed(values)}."
+        elif each.location.recording:
+            yield f"{each.location.recording} alone shows {each.name}."
+    for one in outcome.recordings:
+        if (tail := one["prediction"]) is None:
+            yield f"The others do not settle how {one['name']} moves."
+            continue
+        yield (
+            f"{one['name']} is predicted from the others, with its first quarter to fit what is its"
+            f" own: the 95 % band holds {100.0 * tail['within_95']:.0f} % of the rest"
+            f" ({compact(tail['rms_rad'], unit)} rms, expected"
+            f" {compact(tail['expected_rms_rad'], unit)})."
+        )
 
 
 def _effect(effect: FoundEffect) -> str:
@@ -643,7 +548,7 @@ def _effect(effect: FoundEffect) -> str:
         effect.curve["summary"] if effect.curve else "",
     ]
     if effect.confirmed is not None:
-        sure = "confirmed" if effect.confirmed.p_value < _CONFIRMED else "not confirmed"
+        sure = "confirmed" if effect.confirmed.p_value < FALSE_ALARM else "not confirmed"
         parts.append(f"{sure} without the fit: {effect.confirmed.summary}")
     decide = f"decide by: {_test_of(effect)}"
     text = f"{_capital('; '.join(part for part in (*parts, decide) if part))}"
@@ -657,7 +562,7 @@ def _rest(unexplained: float, level: float, remainder: Remainder | None) -> str:
             return f"The remaining residual is consistent with noise ({printed(unexplained)})."
         return f"A small misfit remains unexplained ({printed(unexplained)})."
     shares = sorted(remainder.shares.items(), key=lambda item: -item[1])
-    where = ", ".join(f"{percent(share)} {PARTS[name]}" for name, share in shares if share > 0.05)
+    where = ", ".join(f"{percent(share)} {PARTS[name]}" for name, share in shares if share > LISTED)
     return (
         f"The remaining residual is still {factor(remainder.over_noise)} times the noise"
         f" ({where}), so the model is incomplete: the errors given here allow for that, and the"

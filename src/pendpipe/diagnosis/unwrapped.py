@@ -37,6 +37,7 @@ class Alignment(NamedTuple):
 
 
 _NO_CYCLES: Final = Alignment(np.zeros(0), np.zeros(0), np.zeros(0))
+"""Where the motion has none that can be compared."""
 
 
 def anchored(data: Data, at: Evaluated) -> tuple[float, float]:

@@ -22,7 +22,9 @@ from pendpipe.effects.model import Evaluated
 from pendpipe.estimate import Estimate, over
 
 _FIRST_CYCLES: Final = 4.0
+"""Cycles of the model by which its first turning point is differentiated."""
 _FEWEST_READINGS: Final = 16
+"""Readings of it, where a cycle has few."""
 _DERIVATIVE_STEP: Final = 1e-3
 """Step of numerical derivatives, in standard deviations."""
 _CONSTANTS: Final = {"a": A, "b": B, "c": C, "offset": OFFSET}
@@ -272,6 +274,7 @@ def last_in(fit: Fit, effect: Effect, unit: str) -> Estimate | None:
 
 
 _CURVE_POINTS: Final = 61
+"""Of a drawn curve: ten between its knots."""
 
 
 def curve_values(fit: Fit, effect: Curve, unit: str = "rad") -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.found import Finding, FoundEffect
+from pendpipe.diagnosis.found import Finding, FoundEffect, Mate
 from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Step, is_further, is_gross
 from pendpipe.diagnosis.instants import with_instants
 from pendpipe.diagnosis.location import curve_told, locate
@@ -33,6 +33,7 @@ from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.effects.curves import Curve
 from pendpipe.estimate import LISTED
+from pendpipe.levels import FALSE_ALARM
 
 _CLEAN_CHARGE: Final = 5.0
 """Charge (in chi^2) against "none of these" if the model leaves only noise: then one effect
@@ -125,7 +126,7 @@ def effect_named(found: Hypothesis, step: Step, weighed: Weighed) -> FoundEffect
         step.p_value,
         float(weights[0]),
         tuple(
-            (mate.identifier, float(weight))
+            Mate(mate.identifier, float(weight))
             for mate, weight in zip(mates, weights[1:], strict=False)
             if weight > LISTED or not mate.drawn
         ),
@@ -210,7 +211,7 @@ def fault_named(found: Hypothesis, finding: Finding, weighed: Sequence[Weighed])
         finding.delta_chi2,
         finding.p_value,
         each,
-        tuple((name, each) for name in finding.also),
+        tuple(Mate(name, each) for name in finding.also),
         effect.discriminating_test,
         replace(finding.location, summary=finding.summary),
         confirmed=finding.confirmed,
@@ -219,7 +220,7 @@ def fault_named(found: Hypothesis, finding: Finding, weighed: Sequence[Weighed])
 
 def _clean_charge(found: Hypothesis) -> float:
     """Return the charge against "none of these" if the model leaves only noise."""
-    return _CLEAN_CHARGE if found.unexplained > 0.01 else 0.0
+    return _CLEAN_CHARGE if found.unexplained > FALSE_ALARM else 0.0
 
 
 def _charge_for_several(found: Hypothesis) -> float:
@@ -229,7 +230,7 @@ def _charge_for_several(found: Hypothesis) -> float:
     """
     names = sum(map(is_further, found.steps))
     names += sum(fault.identifier in RANDOM for fault in found.faults)
-    alone = 1 if found.unexplained > 0.01 else 2
+    alone = 1 if found.unexplained > FALSE_ALARM else 2
     return _OF_A_FURTHER_NAME * max(names - alone, 0)
 
 

@@ -128,12 +128,15 @@ def _differentiation(order: int) -> FloatArray:
 
 
 _TOLERANCE: Final = 1e-9
+"""Change of ln r and of the phase at which a solution has settled: ten errors of Eq. 8's."""
 _SETTLED: Final = 1e-6
 """Change of a half cycle that will move it no further."""
 _PATIENCE, _STILL_OFF = 5, 0.1
 """Rounds that one half cycle may take to come so near, once all before it are settled."""
 _ROUNDS: Final = 25
+"""Picard's iterations at most."""
 _STEP: Final = 1e-6
+"""Of ln r in a numerical derivative: its error is 1e-6 of it, that of the rounding 1e-10."""
 _STRIDE: Final = 0.7
 """Longest step in ln r."""
 _STEEPEST: Final = 0.97

@@ -38,7 +38,9 @@ __all__ = [
 ]
 
 LOW: Final = (0.0, 0.0, 0.0, 0.0, 1e-9, -math.inf, -math.inf, -math.inf)
+"""Least values, in the order of `BASELINE`."""
 HIGH: Final = (math.inf, math.inf, math.inf, 1.0, math.inf, math.inf, math.inf, math.inf)
+"""And the largest."""
 
 
 def pendulum_of(value: FloatArray) -> Pendulum:

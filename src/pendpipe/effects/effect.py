@@ -403,6 +403,7 @@ def between(low: float, high: float, count: int) -> FloatArray:
 STRAIGHT_S: Final = 1e7
 """A relaxation time that no record can tell from infinity."""
 RELAXATION: Final = Parameter("tau", "s", 1e-2, STRAIGHT_S, STRAIGHT_S, word="time constant")
+"""Of what fades: from a hundredth of a second to a straight line."""
 
 
 def relaxed(time_s: FloatArray, tau: float) -> FloatArray:

@@ -443,6 +443,7 @@ class Model:
 
 
 _AT_ONCE: Final = 4
+"""Forces whose motions are solved together: see `_NUMBERS_AT_ONCE`."""
 _NUMBERS_AT_ONCE: Final = 1 << 16
 """Accelerations whose responses are computed together."""
 

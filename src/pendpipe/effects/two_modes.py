@@ -10,15 +10,18 @@ from pendpipe.arrays import AnyArray, FloatArray, of_neighbours
 from pendpipe.estimate import Estimate
 
 _WINDOWS: Final = 120
+"""Of a record at most: fifteen beats of eight each."""
 _FEWEST: Final = 10
 """Windows, each of a period or more, that two modes need: they have eight numbers."""
 _STEPS: Final = 12
+"""Undamped Newton steps at most."""
 _APART: Final = 0.3
 """Of the frequency: farther apart they do not beat, and the half period says little."""
 _EXPLAINED: Final = 0.9
 """Part of the variance that two modes must explain: of the motion, of what one mode leaves, and in
 each third of the record where it swings."""
 _THIRDS: Final = 3
+"""Parts of a record that two modes must each explain: one mode and a jump explain two."""
 _STILL: Final = 0.01
 """Part of the variance below which a third of the record does not count."""
 

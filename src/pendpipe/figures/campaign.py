@@ -48,6 +48,7 @@ from pendpipe.figures.style import (
     words,
 )
 from pendpipe.files import read_json
+from pendpipe.levels import FALSE_ALARM
 from pendpipe.process import in_order
 from pendpipe.quantities import axis_unit, with_error
 from pendpipe.recording import read_plain
@@ -212,7 +213,7 @@ def _linearity(calibration: Mapping[str, Any]) -> str:
     chance = (calibration.get("linear") or {}).get("p_value")
     if chance is None:
         return ""
-    verdict = "no sign of curvature" if chance >= 0.01 else "the line does not suffice"
+    verdict = "no sign of curvature" if chance >= FALSE_ALARM else "the line does not suffice"
     return f"Linearity test: $p$ = {chance:.2g}, {verdict}"
 
 

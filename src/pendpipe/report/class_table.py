@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from pendpipe.analysis.fit.printed import SHORT, pendulum_of, percent, period_name, short_size
-from pendpipe.analysis.turning_points import BEAT
 from pendpipe.cells import csv_text, inert
 from pendpipe.errors import refuse_if
 from pendpipe.estimate import Estimate, chi_square_p_value
@@ -237,8 +236,8 @@ def _row(fitted: Fitted, *, wide: bool) -> tuple[str, ...]:
 
 def _period(fit: FitResult) -> str:
     """The period by its name, with what it tells of a pendulum whose length, or g, is given."""
-    if fit.light_reason.startswith(BEAT):
-        return BEAT
+    if fit.hindered == "beat":
+        return "two modes beat"
     if math.isnan(fit.period.value):
         return "not shown: --period"
     given = {period_name(fit): fit.period, **pendulum_of(fit)}

@@ -430,7 +430,7 @@ def render_recording(
         name_of_recording=name,
         style=own_files()["style"],
         light=Health(result.light, *STATES[result.light], result.light_reason),
-        heading=heading(result, name).partition(": ")[2],
+        heading=heading(result),
         advice=sentence(result),
         facts=list(facts(result)),
         table=list(_qualities(result)),

@@ -64,6 +64,7 @@ class SimulatedDI194RS(
 
 
 _FULL_SCALES: Final = [0.5, 0.25, 0.1, 0.05, 0.025, 0.01, *[0.0] * 2, 50, 25, 10, 5, 2.5, 1]
+"""Volts, by the code of the range."""
 
 
 class SimulatedDI245(Dialect, model="DI-245", bits=14):

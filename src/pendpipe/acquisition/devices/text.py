@@ -63,6 +63,7 @@ class TextDialect(Dialect):
 
 
 _END_OF_LIST: Final = 0xFFFF
+"""What ends the list of channels."""
 
 
 class SimulatedDI149(TextDialect, model="DI-149", bits=12):

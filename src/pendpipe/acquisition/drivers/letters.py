@@ -15,9 +15,11 @@ _JUNK: Final = b"\xff\xfe\x7f"
 """Seen while the device's supply comes up; never an answer to a command."""
 _IDENTITIES: Final = {b"0000000000": "DI-194RS", b"0000000001": "DI-154RS"}
 _BAUD_CODES: Final = {4800: b"\x01", 9600: b"\x04"}
+"""By the rate of the line, in 1/s."""
 _BITS_PER_SAMPLE: Final = 20
 """Two bytes of ten bits on the line; it is the line that limits the rate."""
 _SLOWEST_COUNT: Final = 32767
+"""Largest of 15 bits."""
 
 
 class LetterDriver(Driver):
@@ -110,9 +112,13 @@ class DI194RS(DI154RS, model="DI-194RS", bits=10):
 _RANGE_CODES: Final = dict(
     zip((50.0, 25.0, 10.0, 5.0, 2.5, 1.0), range(8, 14), strict=True)
 ) | dict(zip((0.5, 0.25, 0.1, 0.05, 0.025, 0.01), range(6), strict=True))
+"""By the full scale in volts."""
 _BURST_HZ: Final = 8000.0
+"""Clock that the divisors and averages divide."""
 _FILTERS: Final = range(1, 16)
+"""Numbers of readings that it averages."""
 _DIVISORS: Final = range(256)
+"""Of one byte."""
 
 
 class DI245(LetterDriver, model="DI-245", bits=14, channels=4, ranges=tuple(_RANGE_CODES)):

@@ -236,12 +236,15 @@ def _off_cubic(late: int) -> AnyArray:
 
 
 _BEFORE: Final = np.arange(-4, 0)
+"""Four readings before a place: those of a cubic."""
 _BEHIND: Final = np.arange(1, 5)
+"""And four behind it."""
 _AT_THE_SCAN: Final = np.linalg.pinv(
     np.vander(np.concatenate([_BEFORE, _BEHIND]).astype(np.float64), 4)
 )[-1]
 """By which eight readings give the cubic's at the scan between them."""
 _OFF_CUBIC: Final = {late: _off_cubic(late) for late in (-1, 0, 1)}
+"""Weights by which eight readings tell how far a stretch is late, in rows."""
 
 
 def out_of_line(counts: AnyArray) -> BoolArray:

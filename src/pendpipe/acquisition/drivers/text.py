@@ -15,14 +15,18 @@ from pendpipe.acquisition.models import CDC
 from pendpipe.errors import InputError
 
 _DI149_HZ: Final = 750_000
+"""Clock of the DI-149 and DI-155."""
 _FASTEST_DIVISOR: Final = 75
 """For each channel: the box takes 10 000 samples a second."""
 _SLOWEST_DIVISOR: Final = 65535
+"""Of 16 bits."""
 _END_OF_LIST: Final = "xffff"
 _CDC_HZ: Final = 60_000_000
+"""Clock of the newer ones."""
 _PACKETS: Final = (16, 32, 64, 128, 256, 512, 1024, 2048)
 """Bytes in a packet for ``ps 0`` to ``ps 7``."""
 _PACKETS_PER_SECOND: Final = 20.0
+"""Wanted, so that what has been read is there within a twentieth of a second."""
 
 
 class TextDriver(Driver, stop_command=(b"stop\r",), checks="cable, power, CDC mode"):

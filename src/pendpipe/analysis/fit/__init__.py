@@ -20,7 +20,6 @@ from pendpipe.analysis.fit.by_waveform import (
 from pendpipe.analysis.fit.decrement import Light
 from pendpipe.analysis.fit.fitted import Baseline, Method
 from pendpipe.analysis.fit.fixed import check_fixed
-from pendpipe.analysis.fit.goodness import LEVEL
 from pendpipe.analysis.fit.printed import period_text
 from pendpipe.analysis.fit.quality import without_swings
 from pendpipe.analysis.fit.result import FitResult, read_fit, with_scale
@@ -31,6 +30,7 @@ from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.dynamics.eq8 import OMEGA, Restoring
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
+from pendpipe.levels import REFUTED
 from pendpipe.quantities import after_number, pretty_unit, with_error
 from pendpipe.recording import Recording
 
@@ -117,13 +117,13 @@ def fit_recording(
         result = replace(with_scale(result, 100.0 * arm.sd / arm.value), scale_percent=None)
     if points.beats:
         # What its turning points lose is no mode's loss, and their period none's.
-        why = f"{points.beats}; Eq. 8 has one"
+        why = f"two modes beat: {points.beats}; Eq. 8 has one"
         alone: dict[str, Any] = {"decrement_check": (), "other_frequency": None, "quotable": ()}
-        return replace(result, light="red", light_reason=why, shown=None, **alone)
+        return replace(result, light="red", light_reason=why, hindered="beat", shown=None, **alone)
     by_points = result.method == "turning-points"
     swing = result["amplitude"].value if by_points else 0.5 * float(np.ptp(samples.values))
     missed = result.residual_rms_rad / abs(swing)
-    lost = (result.fit_p_value or 0.0) < LEVEL and missed > _MISSED and result.light != "red"
+    lost = (result.fit_p_value or 0.0) < REFUTED and missed > _MISSED and result.light != "red"
     refuse_if(
         lost,
         place,
@@ -133,7 +133,8 @@ def fit_recording(
     )
     if points.mostly_cut:
         light: Light = "red" if result.light == "red" else "amber"
-        return replace(result, light=light, light_reason=points.mostly_cut, quotable=())
+        why = f"most of it was cut: {points.mostly_cut}"
+        return replace(result, light=light, light_reason=why, hindered="cut", quotable=())
     refuse_if(
         not result.settled,
         place,

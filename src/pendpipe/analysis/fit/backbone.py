@@ -30,6 +30,7 @@ _WIDTHS: Final = 10.0 ** np.arange(-8.0, 0.6, 0.5)
 _CLEAR: Final = 8.0
 """Standard deviations that a turning point must stand out: ln y is then right to a percent."""
 _ROWS: Final = 33
+"""Of the curves: 32 steps in ln y, of 7 % each over a fall to a tenth."""
 _BEYOND: Final = 0.3
 """Of the smallest amplitude seen: so far down the curves are continued."""
 _CORRELATED: Final = 0.9
@@ -117,20 +118,9 @@ class Backbone:
         table = _table(np.log(amplitude), low, high, len(value))[:, ::-1]
         return table @ value, table @ sd
 
-    def as_json(self) -> dict[str, Any]:
-        """Return ``backbone`` of ``fit.json``."""
-        names = ("amplitude_rad", "period_s", "period_sd", "decrement", "decrement_sd")
-        return {
-            **{name: getattr(self, name).tolist() for name in names},
-            "small_period": self.small_period.as_json(),
-            "seen_rad": list(self.seen_rad),
-            "period_scatter": self.period_scatter,
-            "decrement_scatter": self.decrement_scatter,
-        }
-
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Backbone:
-        """Read what `as_json` has made."""
+        """Read its part of ``fit.json``."""
         arrays = {
             name: np.array(each, dtype=np.float64)
             for name, each in content.items()

@@ -13,7 +13,7 @@ import numpy as np
 
 from pendpipe.analysis.fit.fitted import Baseline
 from pendpipe.analysis.fit.fixed import Held
-from pendpipe.analysis.fit.goodness import LEVEL, Goodness, tail
+from pendpipe.analysis.fit.goodness import Goodness, tail
 from pendpipe.analysis.fit.least_squares import (
     Bounds,
     Quadratic,
@@ -25,11 +25,13 @@ from pendpipe.analysis.fit.least_squares import (
 )
 from pendpipe.analysis.fit.period import Period, fit_period
 from pendpipe.analysis.fit.result import FitResult, result_of
+from pendpipe.analysis.half_cycles import LEAST_HALF_CYCLES
 from pendpipe.analysis.torque import TOP, clear, elliptic
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import Restoring
+from pendpipe.levels import REFUTED
 from pendpipe.physics.decay import amplitude_and_gradient
 
 ENVELOPE: Final = ("a", "b", "c", "amplitude", "level")
@@ -182,7 +184,7 @@ def _start(points: TurningPoints, fixed: Mapping[str, float]) -> tuple[FloatArra
     """Where the search begins, and what is held."""
     amplitude, sd = points.amplitude_rad, points.angle_sd_rad
     seen = amplitude > 3.0 * sd
-    if seen.sum() < 3:
+    if seen.sum() < LEAST_HALF_CYCLES:
         seen = amplitude > 0.0
     rates = loss_rates(points.time_s[seen], amplitude[seen], sd[seen])
     return _with_held(points, fixed, np.array([*rates, float(amplitude[np.argmax(seen)]), 0.0]))
@@ -261,7 +263,7 @@ def fit_points(
     envelope, period = envelope_and_period(points, held, restoring)
     freedom = max(len(points) - 4.0, 1.0)
     p_value = tail(envelope.chi2_per_dof, freedom, 1e9)
-    stretched = envelope.chi2_per_dof if p_value < LEVEL else 1.0
+    stretched = envelope.chi2_per_dof if p_value < REFUTED else 1.0
     late = (
         "the period changes along the record as Eq. 8's does not (chi^2 of the times is"
         f" {period.chi2_per_dof:.3g} per point): the frequency is a mean"

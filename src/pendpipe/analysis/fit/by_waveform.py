@@ -42,11 +42,13 @@ _DITHERED: Final = 0.4
 _TOLERANCE: Final = 1e-2
 """Of chi^2: a last step of a tenth of a standard deviation, which leaves far less."""
 _ROUNDS: Final = 2
+"""Times that the noise before rounding and the fit follow each other."""
 _SAME: Final = 1.01
 """Of a noise: within, errors are the same."""
 _SETTLED: Final = 0.1
 """Standard deviations by which the mean share may change when the others have followed it."""
 _MOST: Final = 12
+"""Minima at most until noise, rounding and share are their own."""
 _OTHER: Final = 0.9
 """Of the noise that was weighed with: below, the minimum was not looked for closely enough."""
 _DRIFTS: Final = 1e-4

@@ -24,19 +24,20 @@ from pendpipe.analysis.fit.decrement import (
     Light,
     loss_of,
 )
-from pendpipe.analysis.fit.fitted import Fit, Fitted
+from pendpipe.analysis.fit.fitted import PARAMETERS, Fit, Fitted
 from pendpipe.analysis.fit.quality import qualities, relative_loss_sd, small_period
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8
 from pendpipe.estimate import Estimate
+from pendpipe.levels import deviations
 from pendpipe.quantities import compact
 
 _FEWEST: Final = 6
 """Turning points of which a period is asked."""
-_OFF: Final = 2.4
-"""Standard deviations of the turning points beyond which a loss is off, where the law is known to
-miss something: one of three is by chance in one decay of twenty."""
+_OFF: Final = deviations(3, 0.05)
+"""Standard deviations of the turning points, 2.4, beyond which a loss is off, where the law is
+known to miss something: one of three is by chance in one decay of twenty."""
 _TOLD: Final = 4.0
 """Amplitudes at which a backbone tells its loss independently: three and a bit of curvature."""
 _SAME: Final = 0.01
@@ -69,7 +70,7 @@ def _spread(result: Fit, shown: Backbone, enlarged: float) -> Fit:
     They are those of the noise, as the turning points scatter; and what a, b, c and the frequency
     are off by: the least change of them that takes the law's loss to the backbone's.
     """
-    order = result.covariance_order
+    order = PARAMETERS
     times = [name in ("frequency", "phase") for name in order]
     root = np.sqrt(np.where(times, shown.period_scatter, shown.decrement_scatter) / enlarged)
     covariance = result.covariance * root[:, None] * root
@@ -86,14 +87,7 @@ def _spread(result: Fit, shown: Backbone, enlarged: float) -> Fit:
         found = parameters[name]
         factor = sd / found.sd if found.sd > 0.0 else 1.0
         parameters[name] = replace(scaled(found, factor, name), sd=sd)
-    limit, b = result.quality_factor_limit, result.parameters["b"]
-    factor = parameters["b"].sd / b.sd if b.sd > 0.0 else 1.0
-    return replace(
-        result,
-        parameters=parameters,
-        covariance=covariance,
-        quality_factor_limit=limit and scaled(limit, factor, "b"),
-    )
+    return replace(result, parameters=parameters, covariance=covariance)
 
 
 def _asked(result: Fitted, shown: Backbone, noise: FloatArray) -> FloatArray:
@@ -143,7 +137,7 @@ def _quotable(result: Fitted, clear: int) -> tuple[tuple[str, ...], tuple[str, .
         "half-lives" if timeless else "Q",
         "amplitudes" if result.method == "amplitudes" else "turning points",
     )
-    if len(checks) < 3:
+    if not checks:
         problems.append(f"{name}: too few {seen_in} confirm it")
     problems += [
         f"a, b, c: at {compact(each.amplitude_rad, unit)} they give a loss that is"
@@ -156,7 +150,7 @@ def _quotable(result: Fitted, clear: int) -> tuple[tuple[str, ...], tuple[str, .
         known = max(each.seen_sd / abs(each.seen) for each in unseen)
         shown = f"show it to {100.0 * known:.0f} % only" if known < 1.0 else "do not show it"
         problems.append(f"{name} at {where}: the {seen_in} {shown}")
-    if len(checks) >= 3 and not unseen:
+    if checks and not unseen:
         quotable += [] if timeless else ["Q"]
         if not off and all(each.dominant for each in qualities(result)):
             quotable += ["losses"] if result.refuted else ["losses", "a", "b", "c"]
@@ -188,9 +182,8 @@ def _light(result: Fitted, problems: Sequence[str]) -> tuple[Light, str]:
     wrong = [check for check in result.decrement_check if check.contradicts]
     if wrong:
         worst = max(wrong, key=lambda check: abs(check.excess))
-        said = worst.sentence(result.parameters["amplitude"].unit)
-        if result.method == "amplitudes":
-            said = said.replace("turning points", "amplitudes")
+        of = "amplitudes" if result.method == "amplitudes" else "turning points"
+        said = worst.sentence(result.parameters["amplitude"].unit, of)
         return "red", f"the fitted law contradicts the decay: {said}"
     if problems:
         return "amber", f"don't quote {'; nor '.join(problems)}"

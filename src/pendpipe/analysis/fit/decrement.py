@@ -14,6 +14,7 @@ import numpy as np
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray, of_neighbours
 from pendpipe.dynamics import Eq8, Release, turning_points, turning_points_with_jacobian
+from pendpipe.levels import REFUTED, deviations
 from pendpipe.quantities import compact, with_error
 
 Light = Literal["green", "amber", "red"]
@@ -21,11 +22,13 @@ TOLERANCE: Final = 0.05
 """Part of the decrement by which a law may miss it whatever the errors are."""
 CONFIRMED: Final = 0.10
 """A decrement known worse than this confirms nothing."""
-_CERTAIN: Final = 3.9
-"""Standard deviations from which a difference contradicts: three such questions are asked among
-the dozen that share one level (`goodness.LEVEL`)."""
+_CERTAIN: Final = deviations(12, REFUTED)
+"""Standard deviations, 3.9, from which a difference contradicts: three such questions are asked
+among the dozen that share one level."""
 _FEWEST: Final = 5
 """Turning points of a window: a parabola, the level's error, and one to judge the scatter."""
+_SIDES: Final = 4
+"""Turning points, two of each side, of which the level's error is told apart."""
 _FALL: Final = 0.4
 """Of ln amplitude in a window; beyond, a parabola does not follow Coulomb's straight line."""
 _STEEP: Final = 0.5
@@ -83,11 +86,11 @@ class Check(NamedTuple):
         """Whether they agree, and so closely that this says something."""
         return not self.misses(_CERTAIN) and self.seen_sd <= CONFIRMED * abs(self.seen)
 
-    def sentence(self, unit: str) -> str:
+    def sentence(self, unit: str, of: str = "turning points") -> str:
         """Say it in a clause."""
         return (
-            f"at {compact(self.amplitude_rad, unit)} it loses {self.fitted:.3g} s⁻¹, the turning"
-            f" points show {with_error(self.seen, self.seen_sd, '1/s', short=True)}"
+            f"at {compact(self.amplitude_rad, unit)} it loses {self.fitted:.3g} s⁻¹, the {of}"
+            f" show {with_error(self.seen, self.seen_sd, '1/s', short=True)}"
             f" ({100.0 * self.excess:+.0f} %)"
         )
 
@@ -114,7 +117,7 @@ def check_decrement(points: TurningPoints, law: Eq8) -> tuple[Check, ...]:
         and math.log(clear.amplitude_rad[-_FEWEST] / clear.amplitude_rad[-1]) > _STEEP
     ):
         clear = clear.first(len(clear) - 1)
-    if len(clear) < 4:
+    if len(clear) < _SIDES:
         return ()
     found = _seen(clear)
     part = clear
@@ -163,9 +166,9 @@ def seen_loss(points: TurningPoints) -> tuple[float, float, float, float]:
     span = float(np.ptp(points.time_s))
     z = (points.time_s - centre) / span
     columns = [np.ones_like(z), z]
-    if len(points) > 4 and np.ptp(points.side):
+    if len(points) > _SIDES and np.ptp(points.side):
         columns.append(points.side * float(np.mean(amplitude)) / amplitude)
-    if len(points) > 5:
+    if len(points) > _SIDES + 1:
         columns.append(z**2)
     weight = amplitude / points.angle_sd_rad
     design = np.stack(columns, axis=1) * weight[:, None]

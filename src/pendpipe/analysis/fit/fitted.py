@@ -12,12 +12,12 @@ import numpy as np
 
 from pendpipe.analysis.fit.backbone import Backbone, backbone_of
 from pendpipe.analysis.fit.decrement import Check, Light
-from pendpipe.analysis.fit.goodness import LEVEL
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release
 from pendpipe.dynamics.eq8 import Restoring
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Estimate, quality_of_rate
+from pendpipe.levels import REFUTED
 
 if TYPE_CHECKING:
     from pendpipe.recording import Recording
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 Method = Literal["waveform", "turning-points", "amplitudes"]
 Baseline = Literal["eq8", "viscous"]
 DragForm = Literal["energy", "speed", "undecided"]
+Hindrance = Literal["", "beat", "cut", "overdamped"]
 Fit = TypeVar("Fit", bound="Fitted")
 PARTS: Final = ("quality_factor_hysteretic", "quality_factor_viscous")
-OPTIONAL: Final = ("zero_drift", "other_frequency", "length", "gravity")
 PARAMETERS: Final = ("a", "b", "c", "frequency", "amplitude", "phase", "offset")
 
 
@@ -55,6 +55,10 @@ def units(unit: str) -> dict[str, str]:
     }
 
 
+_APART: Final = {"json": None}
+"""Of fields that are not in ``fit.json``, or in another form."""
+
+
 @dataclass(frozen=True, repr=False)
 class Fitted:
     """What was fitted of one recording, with its errors, and how far it may be believed.
@@ -68,12 +72,10 @@ class Fitted:
         The seven of `PARAMETERS`: the rates of Eq. 13, Eq. 8's frequency omega/(2 pi),
         |y| at the first turning point kept, the phase at the first sample kept (the motion
         is there ``offset + amplitude cos(phase)`` to first order), and the level.
-    quality_factor_limit
-        pi f/b: the Q that the exponential losses alone would give; None for b = 0.
     quality_factor_hysteretic, quality_factor_viscous
         The parts of b that are held; None elsewhere: one recording does not tell them apart.
-    covariance_order, covariance
-        Names and matrix, shape (n, n).
+    covariance
+        Of the parameters in their order, shape (7, 7).
     noise_rms_rad, residual_rms_rad, chi2_per_dof
         Noise of one reading (never below step/sqrt(12)); what the model leaves; and their
         comparison.
@@ -107,6 +109,9 @@ class Fitted:
     light, light_reason
         How far the numbers may be believed, by what the misfit does to them (`consequence`), and
         why.
+    hindered
+        Why a law tells little of the decay: two modes beat, most of it was cut, or a cycle loses
+        most of the swing.
     quotable
         What may be quoted: ``"period"``, ``"Q"``, ``"losses"``, ``"a"``, ``"b"``, ``"c"``.
     shown
@@ -136,9 +141,7 @@ class Fitted:
     method: Method
     baseline: Baseline
     parameters: Mapping[str, Estimate]
-    quality_factor_limit: Estimate | None
-    covariance_order: tuple[str, ...]
-    covariance: FloatArray
+    covariance: FloatArray = field(metadata=_APART)
     noise_rms_rad: float
     residual_rms_rad: float
     chi2_per_dof: float
@@ -150,33 +153,40 @@ class Fitted:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     restoring: Restoring = "linear"
-    settled: bool = True
+    settled: bool = field(default=True, metadata=_APART)
     decrement_check: tuple[Check, ...] = ()
     fit_p_value: float | None = None
     drag_form: DragForm = "energy"
     drag: Literal["energy", "speed"] = "energy"
     zero_drift: Estimate | None = None
     other_frequency: Estimate | None = None
-    torque_odds: float | None = None
+    torque_odds: float | None = field(default=None, metadata={"json": "torque_log_odds"})
     light: Light = "amber"
     light_reason: str = "the decrement was not checked"
+    hindered: Hindrance = ""
     quotable: tuple[str, ...] = ()
-    shown: Backbone | None = field(default=None, repr=False, compare=False)
+    shown: Backbone | None = field(default=None, compare=False, metadata=_APART)
     hysteretic_share: float = 0.5
     clock_ppm: float | None = None
     scale_percent: float | None = None
     length: Estimate | None = None
     gravity: Estimate | None = None
-    name: str = field(default="", compare=False)
-    motion: tuple[Eq8, Release] | None = field(default=None, repr=False, compare=False)
-    points: TurningPoints | None = field(default=None, repr=False, compare=False)
-    decay: Recording | None = field(default=None, repr=False, compare=False)
-    drawn_by: Callable[[], Any] | None = field(default=None, repr=False, compare=False)
+    name: str = field(default="", compare=False, metadata=_APART)
+    motion: tuple[Eq8, Release] | None = field(default=None, compare=False, metadata=_APART)
+    points: TurningPoints | None = field(default=None, compare=False, metadata=_APART)
+    decay: Recording | None = field(default=None, compare=False, metadata=_APART)
+    drawn_by: Callable[[], Any] | None = field(default=None, compare=False, metadata=_APART)
+
+    @property
+    def quality_factor_limit(self) -> Estimate | None:
+        """Pi f/b: the Q that the exponential losses alone would give; None for b = 0."""
+        b = self.parameters["b"]
+        return quality_of_rate(self.value("frequency"), b) if b.value > 0.0 else None
 
     @property
     def refuted(self) -> bool:
         """Whether the readings differ from the law by more than noise explains."""
-        return self.fit_p_value is not None and self.fit_p_value < LEVEL
+        return self.fit_p_value is not None and self.fit_p_value < REFUTED
 
     @cached_property
     def backbone(self) -> Backbone | None:
@@ -226,7 +236,7 @@ class Fitted:
 
     def covariance_of(self, *names: str) -> FloatArray:
         """Covariance of some parameters, in their order."""
-        place = [self.covariance_order.index(name) for name in names]
+        place = [PARAMETERS.index(name) for name in names]
         return self.covariance[np.ix_(place, place)]
 
 

@@ -16,9 +16,8 @@ from pendpipe.analysis.demodulation import harmonic_columns, normal_equations
 from pendpipe.analysis.noise import quantisation_rms, undithered_rms
 from pendpipe.analysis.turning_points.measure import invert
 from pendpipe.arrays import FloatArray
+from pendpipe.levels import REFUTED
 
-LEVEL: Final = 1e-3
-"""How often a recording of the fitted law may be refuted by chance, over all questions."""
 _BINS: Final = 32
 """Means in a cycle that stand for more readings than that."""
 _READINGS: Final = 32
@@ -29,6 +28,7 @@ _SLOW: Final = 8
 """Polynomials that follow a slow change along the record."""
 
 _RIDGE: Final = 1e-9
+"""Of the level's square: a block with a gap has an inverse, and is then left out (`_GAPPED`)."""
 _GAPPED: Final = 60.0
 """Variances of a block's coefficients, added up, over that of its mean: 13 where it is whole."""
 
@@ -129,7 +129,7 @@ def judge(
     asked = list(_questions(found, noise, rounding, fitted, lines))
     p_values = tuple(tail(each.chi2 / each.freedom, each.freedom, of_noise) for each in asked)
     ratio = square / freedom / noise**2
-    if combined(p_values) >= LEVEL:
+    if combined(p_values) >= REFUTED:
         # Where all of the residual is noise, all of it tells how large that is.
         return Goodness(max(math.sqrt(square / freedom), least), ratio, p_values, 1.0)
     # What a, b, c suffer from is what is left at the motion's own frequency.

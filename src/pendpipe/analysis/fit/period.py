@@ -14,6 +14,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import Restoring
 
 _LOUD: Final = 2.0
+"""chi^2 per degree of freedom of the times from which the error follows their scatter."""
 
 
 class Period(NamedTuple):

@@ -18,6 +18,7 @@ from pendpipe.physics.decay import amplitude
 _NODES: Final = 2000
 """Of a decay, to `_LEAST` of the first amplitude: the sums are right to 1e-6."""
 _LEAST: Final = 1e-3
+"""Part of the first amplitude below which no reading is asked for."""
 
 
 def predicted(result: Fitted, time_s: FloatArray) -> FloatArray:

@@ -15,7 +15,6 @@ from pendpipe.analysis.fit.fitted import Fitted
 from pendpipe.analysis.fit.quality import (
     LEAST_QUALITY,
     LOSSES,
-    OVERDAMPED,
     SEEN,
     Quality,
     mean_square,
@@ -24,7 +23,7 @@ from pendpipe.analysis.fit.quality import (
     small_period,
 )
 from pendpipe.analysis.torque import TOP, swing_phase
-from pendpipe.analysis.turning_points import BEAT, CUT
+from pendpipe.answer import SMALLEST, Answer
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import compact, pretty_unit, stretch, with_error
 
@@ -69,53 +68,39 @@ def short_size(amplitude: float, unit: str) -> str:
     return degrees(amplitude) if unit == "rad" else compact(amplitude, unit)
 
 
-def lines(result: Fitted, *, name: str = "", law: bool = False) -> list[str]:
-    """Print a fit: what is known first, what to do next last.
+def answer_of(result: Fitted, *, law: bool = False) -> Answer:
+    """Make the answer of a fit: what is known first, what to do next last.
 
     Parameters
     ----------
     result
         The fit.
-    name
-        What to call the recording; by default the name of its file.
     law
         Whether to print a law that contradicts the decay.
     """
-    return [
-        f"{heading(result, name)}   {result.light.upper()}",
-        *(f"  {line}" for line in _remarks(result)),
-        *(_line(title, value) for title, value in facts(result, law=law)),
-        f"Copy: {sentence(result)}",
-        f"Next: {following(result)}",
-    ]
-
-
-def html(result: Fitted) -> str:
-    """Return the same for a notebook."""
-    from html import escape
-
-    colour = {"green": "#00664b", "amber": "#8a4b00", "red": "#a3210f"}[result.light]
-    rows = "".join(
-        f"<tr><th style='text-align:left'>{escape(title)}</th>"
-        f"<td style='text-align:left'>{escape(value)}</td></tr>"
-        for title, value in facts(result)
-    )
-    remarks = "".join(f"<p>{escape(line)}</p>" for line in _remarks(result))
-    return (
-        f"<p>{escape(heading(result))} <strong style='color:{colour}'>{result.light}</strong></p>"
-        f"{remarks}<table>{rows}</table><p><strong>{escape(sentence(result))}</strong></p>"
+    return Answer(
+        (heading(result),),
+        tuple(facts(result, law=law)),
+        result.light,
+        tuple(_remarks(result)),
+        sentence=sentence(result),
+        following=following(result),
     )
 
 
-def heading(result: Fitted, name: str = "") -> str:
-    """Name the recording and say what was fitted of it, in one line."""
+def called(result: Fitted) -> str:
+    """Return what to call a recording: the name of its file."""
+    return result.name or ("a fit" if result.points is None else "recording")
+
+
+def heading(result: Fitted) -> str:
+    """Say what was fitted of a recording, in one line."""
     points, decay = result.points, result.decay
     unit = result.parameters["amplitude"].unit if decay is None else decay.unit
     kind = _KINDS.get(unit, f"readings in {pretty_unit(unit)}")
     what = "amplitudes" if result.method == "amplitudes" else "turning points"
-    name = name or result.name or ("a fit" if points is None else "recording")
     if points is None:
-        return f"{name}: {kind}, {result.turning_points} {what}"
+        return f"{kind}, {result.turning_points} {what}"
     amplitude, swings = points.amplitude_rad, f"{len(points)} {what}"
     ends = (short_size(abs(float(y)), points.unit) for y in (amplitude[0], amplitude[-1]))
     span = f"{float(f'{float(np.ptp(points.time_s)):.3g}'):g} s"
@@ -123,7 +108,7 @@ def heading(result: Fitted, name: str = "") -> str:
         rate = 1.0 / decay.interval_s if decay.interval_s > 0.0 else math.nan
         span = f"{float(f'{rate:.4g}'):g} Hz, {span}"
         swings = f"{0.5 * float(points.half_cycle[-1] - points.half_cycle[0]):.0f} swings"
-    return f"{name}: {kind}, {span}, {swings} from {' to '.join(ends)}"
+    return f"{kind}, {span}, {swings} from {' to '.join(ends)}"
 
 
 def _remarks(result: Fitted) -> Iterator[str]:
@@ -133,7 +118,7 @@ def _remarks(result: Fitted) -> Iterator[str]:
     if result.restoring == "linear" and result.torque_odds is not None:
         digits = result.torque_odds / math.log(10.0)
         # How far out the noise goes nobody has tested.
-        ratio = f"10^{digits:.0f}" if digits < 12.0 else "10^12 or more"
+        ratio = f"10^{digits:.0f}" if digits < -math.log10(SMALLEST) else "10^12 or more"
         yield f"x fits better than sin x, {ratio} to 1: a spring or torsion wheel, no pendulum"
     if result.decay is not None and READ_AS in result.decay.metadata:
         yield f"a guess: {result.decay.metadata[READ_AS]} (--unit)"
@@ -157,7 +142,7 @@ def period_name(result: Fitted) -> str:
 
 def facts(result: Fitted, *, law: bool = False) -> Iterator[tuple[str, str]]:
     """Yield what is known, a title and a value each; nothing of two modes beside their own."""
-    if result.light_reason.startswith(BEAT):
+    if result.hindered == "beat":
         return
     unit, has_law = result.parameters["amplitude"].unit, result.light != "red" or law
     known = qualities(result)
@@ -243,7 +228,7 @@ def percent(share: Estimate) -> str:
 
 
 def _law(result: Fitted) -> str:
-    if result.light_reason.startswith(OVERDAMPED) and result.method != "waveform":
+    if result.hindered == "overdamped" and result.method != "waveform":
         return "a, b, c need more than a cycle to lose it in"
     text = ", ".join(f"{name} {result.parameters[name].or_limit()}" for name in "abc")
     limit = result.quality_factor_limit
@@ -272,9 +257,9 @@ def misfit(result: Fitted) -> str:
 
 def sentence(result: Fitted) -> str:
     """Return the sentence to copy."""
-    if result.light_reason.startswith(BEAT):
-        return f"{result.light_reason.partition(';')[0]}."
-    if result.light_reason.startswith(CUT):
+    if result.hindered == "beat":
+        return f"{result.light_reason}."
+    if result.hindered == "cut":
         return "nothing of this fit can be quoted."
     unit, said = result.parameters["amplitude"].unit, []
     if "period" in result.quotable:
@@ -304,7 +289,7 @@ def sentence(result: Fitted) -> str:
 
 def following(result: Fitted) -> str:
     """Say what to do next."""
-    if result.light_reason.startswith(BEAT):
+    if result.hindered == "beat":
         return "pendpipe diagnose FILE fits both modes"
     if result.light == "red":
         law = "--accept prints the law"
@@ -371,10 +356,6 @@ def _pendulum_line(result: Fitted) -> Iterator[tuple[str, str]]:
             change = 100.0 * (factor**2 - 1.0)
             said = f", finite-amplitude correction {change:+.2g} % included{said}"
         yield name, with_error(found.value, found.sd, found.unit, short=True) + said
-
-
-def _line(title: str, value: str) -> str:
-    return f"  {title:<22}{value}"
 
 
 def _number(estimate: Estimate) -> str:

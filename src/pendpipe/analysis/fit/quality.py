@@ -23,7 +23,6 @@ from pendpipe.quantities import after_number
 
 LEAST_QUALITY: Final = 3.0
 """Below, a cycle leaves less than exp(-pi/3) of the swing, a third: it is no cycle."""
-OVERDAMPED: Final = "a cycle loses most of the swing"
 LOSSES: Final = {
     "a": "drag that grows with the square of the speed",
     "b": "viscous and internal loss",
@@ -185,11 +184,12 @@ def without_swings(result: Fit) -> Fit:
     by_cycles = result.method != "waveform"
     held = {"Q", "losses", *("abc" if by_cycles else ())}
     kept = tuple(name for name in result.quotable if name not in held)
-    said = f"{OVERDAMPED}, Q = {quality:.2g}: don't quote {'Q, a, b, c' if by_cycles else 'Q'}"
+    what = "Q, a, b, c" if by_cycles else "Q"
+    said = f"a cycle loses most of the swing, Q = {quality:.2g}: don't quote {what}"
     if result.light != "green":
         said = f"{said}; {result.light_reason}"
     light: Light = "red" if result.light == "red" else "amber"
-    return replace(result, light=light, light_reason=said, quotable=kept)
+    return replace(result, light=light, light_reason=said, hindered="overdamped", quotable=kept)
 
 
 def quality_by_law(result: Fitted, amplitude: float) -> Quality:

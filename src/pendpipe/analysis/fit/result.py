@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -15,10 +15,10 @@ from pendpipe.analysis.fit.backbone import Backbone
 from pendpipe.analysis.fit.consequence import judged, scaled
 from pendpipe.analysis.fit.damping import damping_of
 from pendpipe.analysis.fit.decrement import Check, check_decrement
-from pendpipe.analysis.fit.fitted import OPTIONAL, PARAMETERS, PARTS, Fitted, units
-from pendpipe.analysis.fit.goodness import LEVEL, Goodness, combined
+from pendpipe.analysis.fit.fitted import PARAMETERS, PARTS, Fitted, units
+from pendpipe.analysis.fit.goodness import Goodness, combined
 from pendpipe.analysis.fit.least_squares import CHI2_95
-from pendpipe.analysis.fit.printed import html, lines, pendulum_of
+from pendpipe.analysis.fit.printed import answer_of, called, pendulum_of
 from pendpipe.analysis.fit.quality import (
     mean_square,
     period_of,
@@ -31,8 +31,9 @@ from pendpipe.analysis.turning_points import TurningPoints, write_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8
 from pendpipe.errors import InputError, nearest, refuse_if
-from pendpipe.estimate import Estimate, number, quality_of_rate
-from pendpipe.files import read_json, write_json, writing
+from pendpipe.estimate import Estimate, number
+from pendpipe.files import fields_of, plain, read_json, write_json, writing
+from pendpipe.levels import REFUTED
 from pendpipe.quantities import compact
 
 if TYPE_CHECKING:
@@ -83,7 +84,6 @@ class FitResult(Fitted):
     quality_factors = cached_property(qualities)
     quality_factor = quality_at
     damping = damping_of
-    _repr_html_ = html
 
     @property
     def period_check(self) -> tuple[Check, ...]:
@@ -100,7 +100,10 @@ class FitResult(Fitted):
 
     def __str__(self) -> str:
         """Return what is known, the sentence to copy, and what to do next."""
-        return "\n".join(lines(self))
+        return "\n".join(answer_of(self).lines(called(self), math.inf))
+
+    def _repr_html_(self) -> str:
+        return answer_of(self).html(called(self))
 
     def __repr__(self) -> str:
         """Return the numbers in one line."""
@@ -213,91 +216,49 @@ class FitResult(Fitted):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``fit.json``."""
-        limit = self.quality_factor_limit
-        if limit is None:
-            limit = Estimate(math.nan, math.nan, "", (math.nan, math.nan))
-        return {
-            "schema_version": 1,
-            "method": self.method,
-            "baseline": self.baseline,
-            "restoring": self.restoring,
-            "drag_form": self.drag_form,
-            "drag": self.drag,
-            "fit_p_value": self.fit_p_value,
-            "torque_log_odds": self.torque_odds,
-            **{name: getattr(self, name) and getattr(self, name).as_json() for name in OPTIONAL},
-            "light": self.light,
-            "light_reason": self.light_reason,
-            "hysteretic_share": self.hysteretic_share,
-            "clock_ppm": self.clock_ppm,
-            "scale_percent": self.scale_percent,
-            "quotable": list(self.quotable),
-            "backbone": self.backbone and self.backbone.as_json(),
-            "period_check": [check._asdict() for check in self.period_check],
-            "decrement_check": [check._asdict() for check in self.decrement_check],
-            "parameters": {name: self.parameters[name].as_json() for name in PARAMETERS},
-            "period": self.period.as_json(),
-            "quality_factors": [each.as_json() for each in self.quality_factors],
-            "damping": {name: each.as_json() for name, each in self.damping().items()},
-            "quality_factor_limit": limit.as_json(),
-            **{name: getattr(self, name) and getattr(self, name).as_json() for name in PARTS},
-            "covariance": {
-                "order": list(self.covariance_order),
-                "matrix": self.covariance.tolist(),
-            },
-            "noise_rms_rad": self.noise_rms_rad,
-            "residual_rms_rad": self.residual_rms_rad,
-            "chi2_per_dof": self.chi2_per_dof,
-            "samples": self.samples,
-            "turning_points": self.turning_points,
-            "cuts": [dict(cut) for cut in self.cuts],
-            "provenance": dict(self.provenance),
-            "warnings": list(self.warnings),
-        }
+        limit = self.quality_factor_limit or Estimate(math.nan, math.nan, "", (math.nan, math.nan))
+        content: dict[str, Any] = plain(
+            {
+                "schema_version": 1,
+                **fields_of(self),
+                "backbone": self.backbone,
+                "period_check": self.period_check,
+                "period": self.period,
+                "quality_factors": self.quality_factors,
+                "damping": self.damping(),
+                "quality_factor_limit": limit,
+                "covariance": {"order": PARAMETERS, "matrix": self.covariance},
+            }
+        )
+        return content
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> FitResult:
         """Rebuild a result from the content of ``fit.json``."""
-        limit = content["quality_factor_limit"]
-        covariance = content["covariance"]
-        held: dict[str, Any] = {
-            name: content.get(name) and Estimate.from_json(content[name])
-            for name in (*PARTS, *OPTIONAL)
+        kept = {each.name: each.metadata.get("json", each.name) for each in fields(cls)}
+        found: dict[str, Any] = {
+            here: content[there] for here, there in kept.items() if there in content
         }
+        # An estimate is told by its keys, and null where it is a number is NaN.
+        for name, entry in found.items():
+            if isinstance(entry, dict) and "sd" in entry:
+                found[name] = Estimate.from_json(entry)
+            elif isinstance(entry, list):
+                found[name] = tuple(entry)
+        found |= {name: number(content[name]) for name in _NUMBERS}
+        found["parameters"] = {
+            name: Estimate.from_json(entry) for name, entry in content["parameters"].items()
+        }
+        found["decrement_check"] = tuple(Check(**check) for check in content["decrement_check"])
+        shown, matrix = content.get("backbone"), content["covariance"]["matrix"]
         return cls(
-            method=content["method"],
-            baseline=content["baseline"],
-            parameters={
-                name: Estimate.from_json(entry) for name, entry in content["parameters"].items()
-            },
-            quality_factor_limit=None if limit["value"] is None else Estimate.from_json(limit),
-            covariance_order=tuple(covariance["order"]),
-            covariance=np.array(covariance["matrix"], dtype=np.float64),
-            noise_rms_rad=number(content["noise_rms_rad"]),
-            residual_rms_rad=number(content["residual_rms_rad"]),
-            chi2_per_dof=number(content["chi2_per_dof"]),
-            samples=content["samples"],
-            turning_points=content["turning_points"],
-            cuts=tuple(content["cuts"]),
-            provenance=content["provenance"],
-            warnings=tuple(content["warnings"]),
-            restoring=content["restoring"],
-            drag_form=content.get("drag_form", "energy"),
-            drag=content.get("drag", "energy"),
-            fit_p_value=content.get("fit_p_value"),
-            torque_odds=content.get("torque_log_odds"),
-            light=content["light"],
-            light_reason=content["light_reason"],
-            hysteretic_share=content.get("hysteretic_share", 0.5),
-            clock_ppm=content.get("clock_ppm"),
-            scale_percent=content.get("scale_percent"),
-            quotable=tuple(content.get("quotable", ())),
-            shown=content.get("backbone") and Backbone.from_json(content["backbone"]),
-            decrement_check=tuple(Check(**check) for check in content["decrement_check"]),
-            **held,
+            **found,
+            covariance=np.array(matrix, dtype=np.float64),
+            shown=shown and Backbone.from_json(shown),
         )
 
 
+_NUMBERS: Final = ("noise_rms_rad", "residual_rms_rad", "chi2_per_dof")
 _MIXED: Final = 0.95
 """Correlation of a and b from which a record tells their sum, and not each."""
 _UNCLEAR: Final = 0.1
@@ -342,13 +303,12 @@ def result_of(
     for index, name in enumerate(PARAMETERS):
         number, sd = float(value[index]), math.sqrt(max(float(covariance[index, index]), 0.0))
         half = math.sqrt(CHI2_95) * sd
-        interval = intervals[index] if index < 3 else (number - half, number + half)
-        at_bound = index < 3 and index not in held and number <= 0.0
+        interval = intervals[index] if name in "abc" else (number - half, number + half)
+        at_bound = name in "abc" and index not in held and number <= 0.0
         parameters[name] = Estimate(number, sd, dress[name], interval, at_bound)
     b = parameters["b"]
-    limit = quality_of_rate(parameters["frequency"].value, b) if b.value > 0.0 else None
     checks = check_decrement(points, law)
-    if rest["method"] == "waveform" and goodness.p_value >= LEVEL:
+    if rest["method"] == "waveform" and goodness.p_value >= REFUTED:
         # Turning points that contradict a law whose residual is white are off themselves.
         white = f"all readings leave only noise (p = {goodness.p_value:.2g})"
         checks = tuple(
@@ -358,8 +318,6 @@ def result_of(
     rest |= {name: Estimate(fixed[name], 0.0, "") for name in PARTS if name in fixed}
     result = FitResult(
         parameters=parameters,
-        quality_factor_limit=limit,
-        covariance_order=PARAMETERS,
         covariance=covariance,
         restoring=law.restoring,
         hysteretic_share=law.hysteretic / b.value if b.value > 0.0 else 0.5,
@@ -434,7 +392,7 @@ def with_scale(result: FitResult, scale_percent: float) -> FitResult:
 
 def _stretched(result: FitResult, powers: Mapping[str, float], part: float) -> FitResult:
     """Add the error of one factor, known to a part, of which the parameters are powers."""
-    order = result.covariance_order
+    order = PARAMETERS
     slope = np.array([powers.get(name, 0.0) * result.value(name) for name in order])
     covariance = result.covariance + part**2 * np.outer(slope, slope)
     parameters = dict(result.parameters)

@@ -20,15 +20,19 @@ from pendpipe.dynamics.eq8 import OMEGA, SHARE, START, A, B, C
 _SHARES: Final = 33
 """Shares at which the likelihood is looked at, in a range that narrows until some of them count."""
 _ENOUGH: Final = 8
+"""Shares that count from which their mean is taken: the trapezoids of a bell are right to 1e-3."""
 _UNLIKELY: Final = 0.02
 """Of the most likely, below which a share does not count."""
 _LEAST: Final = 1e-60
+"""Instead of zero, where a number is divided by."""
 _SUBSETS: Final = np.array(list(product((1.0, 0.0), repeat=3)))
 """Of a, b, c that are not at their bound."""
 _SLACK: Final = 1e-12
+"""Part of a value by which rounding may take it below zero."""
 _RIDGE: Final = 1e-13
 """For what the readings do not tell apart."""
 _ZOOMS: Final = 12
+"""Narrowings at most: each to a sixteenth of the range or less where nothing counts between."""
 
 
 class Marginal(NamedTuple):

@@ -2,8 +2,6 @@
 
 from pendpipe.analysis.turning_points.find import find_turning_points
 from pendpipe.analysis.turning_points.table import (
-    BEAT,
-    CUT,
     TurningPoints,
     is_turning_points,
     read_turning_points,
@@ -11,8 +9,6 @@ from pendpipe.analysis.turning_points.table import (
 )
 
 __all__ = [
-    "BEAT",
-    "CUT",
     "TurningPoints",
     "find_turning_points",
     "is_turning_points",

@@ -15,11 +15,12 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.coarse import Between, between
-from pendpipe.analysis.half_cycles import half_cycles, usual_half_period
+from pendpipe.analysis.half_cycles import LEAST_HALF_CYCLES, half_cycles, usual_half_period
 from pendpipe.analysis.noise import quantisation_rms, undithered_rms
 from pendpipe.analysis.turning_points.harmonics import far_points, mean_square, odd_harmonics
 from pendpipe.analysis.turning_points.long_records import follow
 from pendpipe.analysis.turning_points.measure import (
+    FITTED,
     HARMONICS,
     Measured,
     Places,
@@ -39,9 +40,11 @@ from pendpipe.recording import Recording
 _ENOUGH: Final = 24
 """Readings in a half cycle that a first look needs, and half cycles from which it is worth it."""
 _LOOK: Final = 200_000
+"""Readings by which the usual half period is found: of a long record its beginning will do."""
 _AT_ONCE: Final = 1 << 13
 """Half cycles that are smoothed together."""
 _WIDEST: Final = 80
+"""Half cycles whose times are smoothed together at most, by a parabola."""
 _GAP: Final = 0.4
 """Half periods without a reading from which a turning point may be lost in them."""
 _EDGE: Final = 0.05
@@ -83,10 +86,10 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
     if len(index) > _ENOUGH and not samples.counts:
         stride = max(1, int(np.median(np.diff(index))) // _ENOUGH)
     side = np.sign(np.diff(value, prepend=value[1:2])).astype(np.int64)
-    if len(index) >= 3:
+    if len(index) >= LEAST_HALF_CYCLES:
         whole, gap_before = _beside_gaps(samples.time_s, index)
         time, value, side = time[whole], value[whole], side[whole]
-    if len(time) < 3:
+    if len(time) < LEAST_HALF_CYCLES:
         return Rough(np.arange(len(time)), time, side, float(np.median(piece))), stride
     begin = 0
     while True:
@@ -94,7 +97,7 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
         usual = float(np.median(np.diff(time[rest][:6])))
         number = np.zeros(len(time) - begin, dtype=np.int64)
         count = count_half_cycles(time[rest], side[rest], gap_before[rest], usual, number)
-        if count >= 3 or len(time) - begin - count < 3:
+        if count >= LEAST_HALF_CYCLES or len(time) - begin - count < LEAST_HALF_CYCLES:
             break
         # A beat may begin at a node, where a half cycle or two hang together with nothing.
         begin += count
@@ -116,7 +119,7 @@ def _beside_gaps(time: FloatArray, index: IntArray) -> tuple[np.ndarray, IntArra
 
 def _level(value: FloatArray) -> float:
     """Middle of the swings, free of a steady decay: (e + 2 e' + e'')/4."""
-    if len(value) < 3:
+    if len(value) < LEAST_HALF_CYCLES:
         return float(np.mean(value))
     return float(np.median(0.25 * (value[:-2] + 2.0 * value[1:-1] + value[2:])))
 
@@ -206,7 +209,9 @@ def count_half_cycles(
 _PHASE_WANTED: Final = 0.01
 """Phase, in rad, to which the smoothed times should be known."""
 _BLOCK: Final = 8
+"""Half cycles followed at once, at least."""
 _VISIBLE: Final = 3.0
+"""Standard deviations of the mean amplitude from which swings are still seen."""
 
 
 def first_places(rough: Rough) -> Places:
@@ -399,14 +404,14 @@ def _refuse_few(samples: Samples, found: int, place: str | Path) -> None:
     """Refuse a record without three half cycles."""
     swing, noise = float(np.ptp(samples.values)), samples.noise_rms
     refuse_if(
-        found < 3 and swing < 12.0 * noise,
+        found < LEAST_HALF_CYCLES and swing < 12.0 * noise,
         place,
         f"no motion exceeds the noise ({noise:.3g} rms)",
         "raise the amplitude, or pick another channel",
         NotAnalysableError,
     )
     refuse_if(
-        found < 3,
+        found < LEAST_HALF_CYCLES,
         place,
         f"fewer than three half cycles ({found} turning points)",
         "record longer",
@@ -432,7 +437,7 @@ def _locate(samples: Samples, rough: Rough, stride: int) -> tuple[Places, Measur
 
 def _known(measured: Measured) -> BoolArray:
     """Which half cycles tell amplitude and level."""
-    return np.isfinite(measured.amplitude) & (measured.readings > 4) & ~measured.one_sided
+    return np.isfinite(measured.amplitude) & (measured.readings > FITTED) & ~measured.one_sided
 
 
 def _losses(
@@ -445,7 +450,7 @@ def _losses(
     sd = noise * np.sqrt(measured.variance)
     use = known & (amplitude > 2.0 * sd)
     use[last_seen(measured, noise) + 1 :] = False
-    if use.sum() >= 3:
+    if use.sum() >= LEAST_HALF_CYCLES:
         rates = loss_rates(places.centre_s[use], amplitude[use], sd[use])
     else:
         rates = np.zeros(3)

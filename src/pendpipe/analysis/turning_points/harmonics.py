@@ -15,7 +15,9 @@ import numpy as np
 
 from pendpipe.analysis.noise import white_rms
 from pendpipe.analysis.turning_points.measure import (
+    FITTED,
     HARMONICS,
+    JUDGED,
     Measured,
     Places,
     Samples,
@@ -26,10 +28,14 @@ from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray
 
 _CLEARLY: Final = 0.02
+"""Part of the noise's variance by which the residual must exceed it: it is known to 2 % from 5,000
+readings."""
 _SIGNIFICANT: Final = 20.0
+"""Fall of chi^2 that two more numbers must bring; chance does it once in 20,000 records."""
 _NARROW: Final = 0.5
 """Part of a half cycle that is fitted where no shape fits the whole of it."""
 _NEIGHBOURS: Final = 10
+"""Half cycles on either side over which a harmonic is averaged."""
 _CIRCULAR: Final = 1.0 / 192.0
 """Third harmonic of a pendulum of 1 rad; it grows with the cube of the amplitude."""
 
@@ -111,7 +117,7 @@ def _narrowed(
     late = np.nan_to_num(np.clip(late, -0.5, 0.5))
     moved = places._replace(centre_s=places.centre_s + late / places.angular_frequency)
     middle = measure(samples, moved, level, bare, window=_NARROW, free=1, amplitude=known)
-    poor &= middle.readings > 8
+    poor &= middle.readings > JUDGED
     # What even the middle half does not fit counts as error, not as precision.
     enlarged = np.maximum(_ratio(middle, noise), 1.0)
     information, score = _level_of_peaks(places, middle, enlarged)
@@ -142,7 +148,7 @@ def _level_of_peaks(
     places: Places, middle: Measured, enlarged: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """What neighbouring peaks say of the level, (p + 2 p' + p'')/4, whatever the wave's form."""
-    seen = np.isfinite(middle.peak[:, 0]) & (middle.readings > 8)
+    seen = np.isfinite(middle.peak[:, 0]) & (middle.readings > JUDGED)
     peak = np.where(seen, middle.peak[:, 0], 0.0) * places.side
     level = np.convolve(peak, [0.25, 0.5, 0.25], "same")
     between = np.convolve(seen.astype(np.float64), np.ones(3), "same") > 2.5
@@ -165,7 +171,7 @@ def _even_misfit(
     Odd terms (of the unknown share of b) do no harm to the amplitude and are not asked for.
     """
     freer = measure(samples, places, level, shape, free=2, amplitude=measured.amplitude)
-    known = np.isfinite(freer.amplitude) & (freer.readings > 8)
+    known = np.isfinite(freer.amplitude) & (freer.readings > JUDGED)
     gain = np.where(known, own_square(measured) - own_square(freer), 0.0) / noise**2
     total, half_cycles = _around(gain), np.maximum(_around(known.astype(np.float64)), 1.0)
     return np.asarray(total > 2.0 * half_cycles + 5.0 * np.sqrt(4.0 * half_cycles))
@@ -179,7 +185,7 @@ def _around(values: FloatArray) -> FloatArray:
 
 def _ratio(measured: Measured, noise: FloatArray) -> FloatArray:
     """Misfit of half cycles over the noise's, with that of their neighbours."""
-    known = np.isfinite(measured.amplitude) & (measured.readings > 4)
+    known = np.isfinite(measured.amplitude) & (measured.readings > FITTED)
     square = np.where(known, own_square(measured), 0.0) / noise**2
     freedom = np.where(known, np.maximum(measured.readings - 3.0, 1.0), 0.0)
     return _around(square) / np.maximum(_around(freedom), 1.0)
@@ -198,7 +204,7 @@ def _white(samples: Samples, places: Places) -> float:
     return max(white_rms(part) if len(part) > 16 else 0.0, samples.noise_rms)
 
 
-def mean_square(measured: Measured, least: int = 8) -> tuple[float, float]:
+def mean_square(measured: Measured, least: int = JUDGED) -> tuple[float, float]:
     """Mean square of the readings about half cycles fitted as wholes, each at its own level.
 
     Of half cycles with more readings than `least`; and its degrees of freedom.
@@ -231,6 +237,7 @@ FAR: Final = 1.2
 _REACH: Final = 0.12
 """Of a half period: so near to the turning point a fourth power follows sin x to 0.1 mrad."""
 _FEWEST: Final = 10
+"""Half cycles through which a parabola is smoothed."""
 _MOST: Final = 0.5
 """Of the reach, by which the turning point may lie off the middle of the readings."""
 

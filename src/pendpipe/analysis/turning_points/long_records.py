@@ -230,6 +230,7 @@ def _track(
 
 _PIECEWISE: Final = "a long record: the level is one number within some hundred half cycles only"
 _PLAIN: Final = 1.03
+"""Noise over another that counts as the same, as far as some thousand readings tell it."""
 _LARGEST: Final = 0.2
 """Noise about the fitted half cycles over that of neighbours, and amplitude (rad or m): where
 both are small, the half cycles are cosines with their losses, and one pass will do."""

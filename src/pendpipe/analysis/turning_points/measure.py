@@ -32,7 +32,12 @@ from pendpipe.dynamics.kernel import IntMatrix, Matrix, Stack, kernel
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.recording import Recording, decimal_step, find_step
 
+FITTED: Final = 4
+"""Readings of a half cycle from which its amplitude, phase and level are told, and one is left."""
+JUDGED: Final = 8
+"""The same with harmonics of its own, and what they leave."""
 HALF_PI = 0.5 * np.pi
+"""Phase from a turning point to the next zero crossing."""
 HARMONICS = 3
 """How many odd harmonics above the first the shape may hold (3, 5, 7)."""
 
@@ -269,7 +274,9 @@ def half_cycle_sums(
 
 
 _ONE_SIDED: Final = 0.3
+"""Correlation of slope and curvature from which readings lie on one side of a turning point."""
 _PHASE_PRIOR: Final = 0.02
+"""Phase in rad within which an extreme lies about where its neighbours have it."""
 
 
 class Places(NamedTuple):
@@ -499,7 +506,10 @@ def _peak(
 _BEGINNING: Final = 2048
 """Readings that tell a step: at the beginning the motion crosses most."""
 _FEWEST: Final = 16
+"""Readings in which anything is sought."""
 _SATURATED: Final = 0.1
+"""Part of a half cycle that may repeat one reading at its end: a cosine falls by 1 % only over a
+tenth at its end."""
 _HELD: Final = 0.2
 """Share of rows that repeat the one above, in fast motion, from which readings are held."""
 _EVEN: Final = 1e-6

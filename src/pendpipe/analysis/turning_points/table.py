@@ -33,12 +33,10 @@ _NUMBERS: Final = (
 )
 
 
+_CUTS: Final = ("cut", "rest")
+"""Keys of what was left out: motion, and rest."""
 _HEAD: Final = 1 << 16
 """Bytes of a file within which the header of its table begins."""
-BEAT: Final = "two modes beat"
-"""How a note begins that tells of two modes."""
-CUT: Final = "most of it was cut"
-"""How it is said that of a recording hardly a decay is left."""
 _FEW: Final = 8
 """Half cycles up to which what is left is a piece: they tell neither a law nor what it lacks."""
 
@@ -49,6 +47,7 @@ class Cut(NamedTuple):
     start_s: float
     stop_s: float
     reason: str
+    at_rest: bool = False
 
 
 @dataclass(frozen=True)
@@ -84,6 +83,8 @@ class TurningPoints:
         Whether the level is a slow function of time.
     cuts
         Spans of the recording that were left out before.
+    beats
+        Which two modes beat, where they do.
     metadata, notes
         Provenance for the file's head; and what the user should know, a clause each.
     """
@@ -104,6 +105,7 @@ class TurningPoints:
     unit: str = "rad"
     wanders: bool = False
     cuts: tuple[Cut, ...] = ()
+    beats: str = ""
     metadata: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
@@ -123,17 +125,12 @@ class TurningPoints:
         return np.asarray(alternating * math.copysign(1.0, first))
 
     @property
-    def beats(self) -> str | None:
-        """The note that two modes beat, where they do."""
-        return next((note for note in self.notes if note.startswith(BEAT)), None)
-
-    @property
     def mostly_cut(self) -> str | None:
         """Say that more motion was cut than is left, where what is left is a few swings."""
-        moving = (cut for cut in self.cuts if "rest " not in cut.reason)
+        moving = (cut for cut in self.cuts if not cut.at_rest)
         cut, left = sum(each.stop_s - each.start_s for each in moving), self.stop_s - self.start_s
         few = self.half_cycle[-1] - self.half_cycle[0] <= _FEW
-        return f"{CUT}: {left:.3g} s of {left + cut:.3g} s are left" if cut > left and few else None
+        return f"{left:.3g} s of {left + cut:.3g} s are left" if cut > left and few else None
 
     def first(self, count: int) -> Self:
         """The first `count` of them."""
@@ -163,11 +160,15 @@ def write_turning_points(path: str | Path, points: TurningPoints) -> None:
         **{key: repr(float(getattr(points, key))) for key in _NUMBERS},
         "level": "wanders" if points.wanders else "constant",
         "samples": str(points.samples),
+        **({"beats": points.beats} if points.beats else {}),
         **points.metadata,
     }
     told = [
         *head.items(),
-        *(("cut", f"{float(c.start_s)!r} {float(c.stop_s)!r} {c.reason}") for c in points.cuts),
+        *(
+            (_CUTS[c.at_rest], f"{float(c.start_s)!r} {float(c.stop_s)!r} {c.reason}")
+            for c in points.cuts
+        ),
         *(("note", note) for note in points.notes),
     ]
     with replaced(path) as stream:
@@ -197,7 +198,7 @@ def read_turning_points(path: str | Path) -> TurningPoints:
     start = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
     lines[:start] = map(original, lines[:start])
     head = [tuple(line.lstrip("# ").split(": ", 1)) for line in lines[:start] if ": " in line]
-    metadata = {key: value for key, value in head if key not in ("cut", "note", MARK)}
+    metadata = {key: value for key, value in head if key not in (*_CUTS, "note", MARK)}
     refuse_if(
         "refused" in metadata,
         place,
@@ -214,8 +215,11 @@ def read_turning_points(path: str | Path) -> TurningPoints:
         table = np.loadtxt(lines[start + 1 :], delimiter=",", ndmin=2)
         columns = dict(zip(COLUMNS, np.ascontiguousarray(table.T), strict=True))
         numbers: dict[str, Any] = {key: float(metadata.pop(key)) for key in _NUMBERS}
-        told = (value.split(" ", 2) for key, value in head if key == "cut")
-        cuts = tuple(Cut(float(start_s), float(stop_s), reason) for start_s, stop_s, reason in told)
+        told = ((*value.split(" ", 2), key) for key, value in head if key in _CUTS)
+        cuts = tuple(
+            Cut(float(start_s), float(stop_s), reason, key == _CUTS[True])
+            for start_s, stop_s, reason, key in told
+        )
     except (KeyError, ValueError) as fault:
         raise InputError(place, f"it can't be read ({fault})", "make it again") from None
     metadata.pop("frequency_hz", None)
@@ -226,6 +230,7 @@ def read_turning_points(path: str | Path) -> TurningPoints:
         unit=metadata.pop("unit", "rad"),
         wanders=metadata.pop("level", "constant") == "wanders",
         cuts=cuts,
+        beats=metadata.pop("beats", ""),
         metadata=metadata,
         notes=(*(value for key, value in head if key == "note"), *cut_short),
     )

@@ -18,12 +18,11 @@ from pendpipe.diagnosis.forensics import (
     slips,
     tracking,
 )
-from pendpipe.diagnosis.forensics.evidence import Evidence
+from pendpipe.diagnosis.forensics.evidence import FEWEST, Evidence
 from pendpipe.diagnosis.found import Finding
 from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR
+from pendpipe.diagnosis.remainder import CLEAN
 
-_CLEAN: Final = 1.3
-"""chi^2 per reading up to which hardly more than noise is left."""
 _IN_PHASE: Final = 0.3
 """Phase error in rad up to which residuals show errors of the times."""
 _ON_ITS_TURN: Final = 3.0
@@ -59,12 +58,13 @@ class Finder:
     def may_ask(self, evidence: Evidence) -> bool:
         """Whether a model is good enough for the test."""
         fit = evidence.fit
-        good = fit.chi2 <= self.most_misfit * evidence.data.used
+        used = evidence.data.used
+        good = used >= FEWEST and fit.chi2 <= self.most_misfit * used
         return good and fit.max_phase_error_rad <= self.most_phase_rad
 
 
 def _last(name: str, find: Callable[[Evidence], Finding | None]) -> Finder:
-    return Finder(name, find, _CLEAN, LARGE_PHASE_ERROR, last=True)
+    return Finder(name, find, CLEAN, LARGE_PHASE_ERROR, last=True)
 
 
 RANDOM_TORQUE: Final = _last("broadband-drive", colour.find_random_torque)

@@ -21,9 +21,11 @@ if TYPE_CHECKING:
 _DITHERED: Final = 0.6
 """Rms of the errors in steps from which rounding is dithered."""
 _FIRST_CODES: Final = 256
+"""Readings that show whether all lie on codes: a wrong step is a whole one off after 20 of them."""
 _FEWEST_CODES: Final = 16
 """Number of different codes that lie on a coarser lattice by chance with 2^-16 at most."""
 _ROUNDS: Final = 4
+"""Times that gaps are counted anew: one that was counted wrong moves the line by less each time."""
 _TOLERANCE: Final = 0.05
 """Tolerance of readings about their codes, in steps."""
 _LARGEST_ROUNDING: Final = 0.6

@@ -17,8 +17,10 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.blocks import blocks_of
 from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.tails import tail_of_squares
-from pendpipe.diagnosis.found import COLOURED_NOISE, Finding, Location
+from pendpipe.diagnosis.found import COLOURED_NOISE, WANDERING_ZERO, Finding, Location
 from pendpipe.diagnosis.projection import tangent_basis
+from pendpipe.diagnosis.refine import LARGE_PHASE_ERROR
+from pendpipe.diagnosis.remainder import CLEAN
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, compact
 
@@ -28,21 +30,20 @@ _LOWEST: Final = 0.1
 """Lowest frequency used, over the motion's: slower noise is a drift, allowed for elsewhere."""
 _SLOWER: Final = 0.5
 """Frequency below which noise is a wander of the zero, over the motion's."""
-_MISFIT: Final = 1.3
-"""chi^2 per reading from which a misfit of the motion may leak between its harmonics."""
 _NEAR_BAND: Final = (0.3, 3.0)
+"""Frequencies, over that of the motion, by whose noise its phase and amplitude are disturbed."""
 _KICKS: Final = 64
+"""Windows of a random torque: as many as the shapes that amplitude and phase resolve."""
 _SIZES: Final = np.geomspace(1e-4, 1e6, 801)
 """Variances of a kick, times the largest eigenvalue, at which the likelihood is computed."""
 _SMALLEST_EIGENVALUE: Final = 1e-3
 """Smallest eigenvalue used, over the largest: rougher shapes contain no information."""
-_LARGEST_PHASE_ERROR: Final = 0.15
-"""Phase error of the model in rad above which the test makes no sense."""
 _LARGEST_RATIO: Final = 4.0
 """Ratio of S_a from slow and fast fluctuations that a random walk may have."""
 _SMOOTH_GAIN: Final = 6.0
 """Gain in -2 ln L with squared eigenvalues from which it is not a random walk."""
 _SUSPECT: Final = 0.05
+"""Chance below which the fluctuations are worth a gain: the step to one in twenty."""
 _LARGEST_IMBALANCE: Final = 2.5
 """Largest ratio of the total gain to that of the quadrature with the smaller one."""
 
@@ -76,7 +77,7 @@ def note_wander(evidence: Evidence) -> Finding | None:
         f"most of what is left is slower than the motion: the zero wanders by {wander} rms,"
         f" and what is faster is {rest} rms"
     )
-    return Finding("wandering-zero", 1.0, summary=said, kind="note")
+    return Finding(WANDERING_ZERO, 1.0, summary=said, kind="note")
 
 
 def find_coloured_noise(evidence: Evidence) -> Finding | None:
@@ -87,7 +88,7 @@ def find_coloured_noise(evidence: Evidence) -> Finding | None:
     frequency is not reported.
     """
     data, fit, noise = evidence.data, evidence.fit, evidence.noise
-    if not data.uniform or not noise.coloured or fit.chi2 > _MISFIT * data.used:
+    if not data.uniform or not noise.coloured or fit.chi2 > CLEAN * data.used:
         return None
     frequency_hz = fit.at.sampled.motion.angular_frequency / (2.0 * math.pi)
     edges = np.append(noise.starts, len(data)) / (2.0 * len(data) * data.interval_s)
@@ -186,7 +187,7 @@ def find_random_torque(evidence: Evidence) -> Finding | None:
     motion seldom does: p = max(p_amplitude, p_phase)^2.
     """
     data, fit, sampled = evidence.data, evidence.fit, evidence.sampled
-    if data.used < 100 or fit.max_phase_error_rad > _LARGEST_PHASE_ERROR:
+    if fit.max_phase_error_rad > LARGE_PHASE_ERROR:
         return None
     amplitude, phase, per_kick = _fluctuations(evidence)
     few = min(len(amplitude.weight), len(phase.weight)) < 5

@@ -18,9 +18,11 @@ from pendpipe.diagnosis.forensics.codes import (
     raw_readings,
     read_codes,
 )
+from pendpipe.diagnosis.forensics.evidence import FEWEST
 from pendpipe.diagnosis.forensics.local import local_residual
 from pendpipe.diagnosis.found import Finding, Location
 from pendpipe.estimate import Estimate
+from pendpipe.levels import FALSE_ALARM
 from pendpipe.quantities import after_number
 
 if TYPE_CHECKING:
@@ -31,16 +33,22 @@ _FEWEST_AT_END: Final = 2
 _ROUNDING_RMS: Final = 0.5
 """Rms in steps up to which errors may be correlated by rounding alone."""
 _MASK_BELOW: Final = 1e-2
+"""p-value of an end of the range below which its readings are left out: what is left out in
+vain is one end of a hundred records, a reading or two."""
 
 Side = Literal["upper", "lower"]
 _SIGN: Final[dict[Side, float]] = {"upper": 1.0, "lower": -1.0}
 _FEWEST_EXPECTED: Final = 6.0
 """Expected readings of a code (or a residue) from which it is tested."""
 _MOST_BITS: Final = 7
+"""Bits whose codes are asked for a pattern: a comb of 2^7 codes has 128 residues, each with
+six readings of a thousand."""
 _COMMON_ERROR: Final = 0.05
 """Common error of the angles in steps, beside their individual error."""
 _SIGNIFICANT: Final = 1e-3
+"""Chance, over all residues of a period, from which a code is listed as seldom."""
 _MOST_LISTED: Final = 32
+"""Codes that are named: more fill no line that anybody reads."""
 _HARMLESS_NOISE: Final = 0.25
 """Noise before rounding, in steps, above which rounding is harmless."""
 _WHOLE_WITHIN: Final = 1e-9
@@ -70,7 +78,7 @@ def find_clipping(evidence: Evidence) -> Finding | None:
     equal, as at the end of a converter's range.
     """
     data, samples = evidence.data, evidence.samples
-    if data.time_noise or samples.counts or data.used < 60:
+    if data.time_noise or samples.counts:
         return None
     raw = raw_readings(evidence)
     lattice = lattice_of(raw.values, samples)
@@ -144,10 +152,10 @@ def find_missing_codes(evidence: Evidence) -> Finding | None:
     counts all of them.
     """
     coded = read_codes(evidence)
-    if coded is None or len(coded.code) < 100 or np.ptp(coded.code) < 2:
+    if coded is None or len(coded.code) < FEWEST or np.ptp(coded.code) < 2:
         return None
     comb = worst_comb(coded.code, _expectations(coded))
-    if comb.p_value > 0.01:
+    if comb.p_value > FALSE_ALARM:
         return Finding("missing-codes", comb.p_value, summary="codes occur as often as expected")
     codes, readings = comb.codes, len(coded.code)
     missing, sd = comb.expected - comb.found, math.sqrt(max(comb.expected, 1.0))
@@ -317,7 +325,7 @@ def find_coarse_steps(evidence: Evidence) -> Finding | None:
     """
     data = evidence.data
     coded = None if evidence.samples.promised_step is not None else read_codes(evidence)
-    if coded is None or len(coded.code) < 60:
+    if coded is None or len(coded.code) < FEWEST:
         return None
     wave = -np.sin(2.0 * math.pi * coded.position)
     wave = wave - wave.mean()

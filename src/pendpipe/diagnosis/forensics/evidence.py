@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from pendpipe.diagnosis.noise import Noise
     from pendpipe.diagnosis.refine import Fit
     from pendpipe.dynamics.any_law import Sampled
+
+
+FEWEST: Final = 60
+"""Readings from which the measurement is tested: they show the tail of their noise."""
 
 
 @dataclass(frozen=True, eq=False)

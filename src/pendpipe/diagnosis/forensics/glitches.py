@@ -10,7 +10,7 @@ from scipy.special import bdtrc
 
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.evidence import Evidence
+from pendpipe.diagnosis.forensics.evidence import FEWEST, Evidence
 from pendpipe.diagnosis.forensics.local import Local, local_residual, whitened_in_time
 from pendpipe.diagnosis.forensics.tails import Tail, fit_tail
 from pendpipe.diagnosis.found import Finding, Location
@@ -22,16 +22,25 @@ from pendpipe.quantities import after_number
 _GLITCH_NUMBERS: Final = (*range(1, 31), 40, 53, 71, 95, 126, 168, 200)
 """Numbers that are tried. One glitch that is not counted thickens the tails of the noise."""
 _CERTAIN_SD: Final = 4.5
+"""Standard deviations of an error that is no noise: one of 150,000 normal readings has it."""
 _LARGE_SD: Final = 3.0
+"""Standard deviations from which an error is asked for: noise alone gives 3 in a thousand."""
 _ROUNDS: Final = 4
+"""Times that the errors are whitened anew: a glitch hides smaller ones within its own filter."""
 _NEIGHBOURS: Final = 4
+"""Readings on either side over which a filter of short memory spreads most of an error."""
 _BESIDE: Final = (1, 1, 0, 1, 1)
+"""Two readings on either side, and not the one between: what displaces them is no glitch."""
 _MOST_ROUNDS: Final = 20
+"""Wrong readings that one window may hold: each round takes the largest of every window."""
 _FAR_SD: Final = 8.0
+"""Standard deviations where the model is wrong: half as much again as the largest of 10^5 normal
+errors (5.3), since windows in which the motion is missed scatter more."""
 _WINDOW_RAD: Final = 4.0 * math.pi
+"""Phase on either side that one window of the local fit shares: two cycles."""
 _NOT_RANDOM: Final = 1e-3
-_FEWEST: Final = 60
-"""Readings that show the tail of their noise."""
+"""Chance below which wrong readings are not where they are at random: of a thousand records with
+glitches one keeps them as saturated."""
 _EXPECTED_BY_CHANCE: Final = 0.05
 """A reading is left out if chance would give fewer than this in the whole record."""
 
@@ -50,8 +59,6 @@ def find(evidence: Evidence) -> Finding | None:
     of the motion remains in the windows, the test is the one that needs no model.
     """
     data, fit, noise = evidence.data, evidence.fit, evidence.noise
-    if data.used < _FEWEST:
-        return None
     residual, used = evidence.error, evidence.used
     local = _errors(evidence, ~used)
     lost = fit.chi2 > GROSS * data.used or fit.max_phase_error_rad > LARGE_PHASE_ERROR
@@ -62,7 +69,7 @@ def find(evidence: Evidence) -> Finding | None:
         # The whitening filter lacks neighbours at the ends: errors there are larger by themselves.
         used = used.copy()
         used[:TAPS] = used[-TAPS:] = False
-        if np.count_nonzero(used) < _FEWEST:
+        if np.count_nonzero(used) < FEWEST:
             return find_in_misfit(evidence)
         # The filter spreads a wrong reading over its neighbours.
         near = _largest_about(np.abs(local.scaled) * used)
@@ -110,7 +117,7 @@ def find_in_misfit(evidence: Evidence) -> Finding | None:
     corner of the motion displace several readings.
     """
     data, used, phase = evidence.data, evidence.used, evidence.sampled.phase
-    if data.used < _FEWEST or data.time_noise:
+    if data.time_noise:
         return None
     values = data.values - float(np.median(data.values[used]))
     mask = np.zeros(len(data), dtype=bool)

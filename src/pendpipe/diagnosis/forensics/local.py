@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from pendpipe.diagnosis.noise import Noise
 
 _WINDOW_CYCLES: Final = 2
+"""Cycles of a window: in one the level is mixed with the harmonics."""
 _WINDOW_READINGS: Final = 40
+"""Readings of a window: its nine numbers at most take a quarter of them."""
 _OUTLIER_SD: Final = 5.0
 """Standard deviations beyond which a reading is left out of its window's fit."""
 _CHANCE_CORRELATION: Final = 0.1

@@ -29,6 +29,7 @@ _WHOLE_WITHIN: Final = 0.03
 _LARGEST_ERROR: Final = 0.12
 """Standard deviation in intervals above which any step would count as whole."""
 _MOST_STEPS: Final = 40
+"""Steps that a record may have: a clock that loses more often has no cycles between them."""
 _TREND_STEPS: Final = 6
 """Neighbouring steps on each side whose median is the misfit of the model."""
 _PRICE: Final = 0.1
@@ -43,6 +44,8 @@ _INSTANTS: Final = 0.1
 _ELSEWHERE: Final = 20
 """Places of the same phase on each side, which tell how far such steps scatter."""
 _AGREE_SD: Final = 3.0
+"""Standard deviations by which two measures of one loss may differ: one pair of 400 does by
+chance."""
 
 
 class LostSamples(NamedTuple):

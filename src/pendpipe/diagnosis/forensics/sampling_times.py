@@ -34,6 +34,7 @@ _AGREE_SD: Final = 2.6
 _RULED: Final = 0.1
 """Noise before rounding, in steps, below which rounding rules the errors."""
 _ROUNDS: Final = 6
+"""Times that the weights are made anew: the variance they follow settles to a percent."""
 _FAST: Final = 0.25 * math.pi, 0.75 * math.pi
 """Phases at which the motion is fast."""
 
@@ -79,7 +80,7 @@ def find_irregular(evidence: Evidence) -> Finding | None:
     """
     data, sampled = evidence.data, evidence.sampled
     clock = None if data.time_noise else regular_clock(data.time_s)
-    if clock is None or data.used < 60:
+    if clock is None:
         return None
     even_s, interval_s = clock
     off_s = data.time_s - even_s
@@ -162,7 +163,7 @@ def find_jitter(evidence: Evidence) -> Finding | None:
     not jitter.
     """
     data = evidence.data
-    if data.time_noise or data.used < 60:
+    if data.time_noise:
         return None
     coded, squares = read_codes(evidence), _squares(evidence)
     ruled = coded is not None and coded.ratio < _RULED

@@ -21,6 +21,7 @@ from pendpipe.arrays import BoolArray, FloatArray, IntArray, scaled_qr
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.found import Confirmation, Finding, Location
 from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.remainder import CLEAN
 from pendpipe.effects.model import jacobian
 from pendpipe.estimate import Estimate
 
@@ -30,28 +31,34 @@ if TYPE_CHECKING:
 _SIGNIFICANT_SD: Final = 7.0
 """Standard deviations from which a step is significant."""
 _SLOW_CYCLES: Final = 10.0
+"""Cycles in which a level, or a rate, may turn once: slips are single, a drift is slow."""
 _HARMONICS: Final = 3
+"""Of the motion that may drift: a pendulum at 60 degrees has 6e-5 of its swing in the fifth."""
 _NUMBERS: Final = 1 << 22
 """Numbers in the basis of what varies slowly, at most."""
 _MOST: Final = 150
 """Slips at most."""
 _CHOICE: Final = 6.0
 """Price of a slip beside the places where it may have been (2 ln n)."""
-_CLEAN: Final = 1.3
-"""chi^2 per reading up to which white noise alone is left."""
 _FEWEST: Final = 4
+"""Slips: that four are whole by chance, each within a quarter, has a probability of 1/16."""
 _NEIGHBOURS: Final = 11
+"""Steps whose median is what reversals have in common; a slip in five is still an exception."""
 _IN_A_HALF_SWING: Final = 12
+"""Readings that tell the level and the size of a half swing, four and more a number."""
 _COUNTS: Final = 3.0
 """Counts that a swing has at least."""
 _BESIDE: Final = 0.055
 """Length of a side about a step of the time, in periods: what a polynomial of the fourth degree
 leaves of a swing there, 1e-6 of it, is less than the noise."""
 _OF_A_STEP: Final = 4
+"""Degree of the polynomial on both sides: see `_BESIDE`."""
 _BESIDE_A_STEP: Final = 2
 """Readings left out on each side: a step is placed within one reading or two."""
 _FEWEST_BESIDE: Final = 8
+"""Readings on a side: twice the four numbers of its polynomial."""
 _ROUNDS: Final = 3
+"""Newton steps of one size: each squares an error of a tenth of a sample."""
 
 
 class Slips(NamedTuple):
@@ -123,7 +130,7 @@ def whole_steps(evidence: Evidence, unit: FloatArray) -> Slips | None:
         What a step of one changes in each reading, rad, shape (n,).
     """
     data, fit = evidence.data, evidence.fit
-    if fit.chi2 <= _CLEAN * data.used and not evidence.noise.coloured:
+    if fit.chi2 <= CLEAN * data.used and not evidence.noise.coloured:
         return None
     unit, whole_left = unit * data.weight, data.residual(fit.at.reading) * data.weight
     slow = _slow(data, fit)

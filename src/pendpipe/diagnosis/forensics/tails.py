@@ -14,9 +14,11 @@ _INVERSE_NU: Final = np.array(
 )
 """1/nu: from a normal distribution (to 1 % at 5 sigma) to very heavy tails."""
 _BINS: Final = 200
+"""Bins of the errors: a bin is 1/40 of a standard deviation, less than any tail changes in."""
 _COARSE_BINS: Final = 80
 """Bins for errors smoothed by coarse rounding."""
 _ROUNDS: Final = 8
+"""Steps of the EM algorithm, from the scale of the median on."""
 _COARSE_STEP: Final = 1.0
 """Step of the readings, in standard deviations of the errors, up to which rounding only widens
 the distribution."""

@@ -16,6 +16,7 @@ _SMOOTH: Final = 5
 _OF_A_THIRD: Final = 5
 """Degree in time that follows the motion over a third of a period: to 1e-4 of it."""
 _FEWEST_ROWS: Final = 9
+"""Rows: a polynomial of the fifth degree leaves three of nine to judge it by."""
 
 
 def wander(samples: Samples) -> FloatArray | None:

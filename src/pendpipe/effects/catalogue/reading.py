@@ -240,6 +240,7 @@ COUNT_SLIPS: Final[Effect] = without_template(
 _WIDTHS: Final = (0.01, 0.03, 0.1)
 """Of the first amplitude: from an edge to what bends like a cubic sensor."""
 _HARD: Final = 30.0
+"""Widths beyond an edge where exp(-30) = 1e-13 is left of the bend: it is a corner there."""
 
 
 @enters(
