@@ -70,6 +70,39 @@ def test_the_period_of_small_swings_and_q_are_right_where_the_law_is_not(name: s
     assert "error ×" not in str(fit)
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("relaxed", [0.0, 3.0])
+def test_a_period_that_drifts_with_time_is_its_mean(relaxed: float, seed: int) -> None:
+    """A clock that is off by up to 0.3 %, straight or as what warms up; damping falls as fast."""
+    time = np.arange(0.1, 90.0, 0.02)
+    passed = np.linspace(0.0, 1.0, len(time))
+    late = 0.003 * (np.expm1(-relaxed * passed) / math.expm1(-relaxed) if relaxed else passed)
+    clock = time + np.cumsum(0.02 * late)
+    angle = Motion(BASE, FIRST).run(np.r_[0.0, time]).angle_rad[1:]
+    noise = 2e-4 * np.random.default_rng(seed).standard_normal(len(time))
+    fit = pp.fit(pp.Recording(clock, displacement_m=angle + noise))
+    assert fit.refuted
+    mean = 2.0 * math.pi / OMEGA * float(np.ptp(clock) / np.ptp(time))
+    assert abs(fit["period"].value - mean) < 3.0 * fit["period"].sd < 0.005 * mean
+
+
+def test_a_bent_scale_is_in_the_error_of_q() -> None:
+    """A sensor that reads x (1 − 0.1 x²), of which its third harmonic is all that tells."""
+    true, sds = true_quality("x + 0.1 x|x|"), []
+    for bent in (0.0, -0.1):
+        time = np.arange(0.1, 90.0, 0.02)
+        angle = Motion(BASE | LAWS["x + 0.1 x|x|"], FIRST).run(np.r_[0.0, time]).angle_rad[1:]
+        noise = 2e-4 * np.random.default_rng(3).standard_normal(len(time))
+        fit = pp.fit(pp.Recording(time, displacement_m=angle * (1.0 + bent * angle**2) + noise))
+        assert fit.refuted
+        for each in fit.quality_factors:
+            found = each.quality_factor
+            off = abs(found.value - float(true(math.log(each.amplitude_rad))))
+            assert off < 3.0 * found.sd
+        sds.append(fit.quality_factors[0].quality_factor.sd)
+    assert sds[1] > 2.0 * sds[0]
+
+
 def test_what_lies_beyond_the_points_is_known_the_worse_the_farther_it_is() -> None:
     """The same decay, stopped sooner: its period of small swings, and Q below its last swing."""
     sds = [decay("x + 0.1 x|x|", lasts_s=lasts)["period"].sd for lasts in (90.0, 60.0, 40.0)]

@@ -220,7 +220,10 @@ def _fit(
     restoring = result.restoring
     if method == "waveform" or _stands(result):
         return result
-    by_points = fit_points(points, baseline=baseline, fixed=fixed, restoring=restoring)
+    again = partial(
+        fit_points, baseline=baseline, fixed=fixed, restoring=restoring, bent=result.bent
+    )
+    by_points = again(points)
     if _stands(by_points):
         # What all readings deny is not quoted.
         kept = tuple(name for name in by_points.quotable if name in ("period", "Q"))
@@ -232,7 +235,7 @@ def _fit(
     for part in _larger_amplitudes(points):
         larger = _waveform(samples, part, baseline, fixed, restoring, length_m, stated=stated)
         if not _stands(larger):
-            larger = fit_points(part, baseline=baseline, fixed=fixed, restoring=restoring)
+            larger = again(part)
         if _stands(larger):
             return _of_larger(larger, points, part)
     settled = [each for each in (result, by_points) if each.settled]

@@ -33,11 +33,22 @@ _ROWS: Final = 33
 """Of the curves: 32 steps in ln y, of 7 % each over a fall to a tenth."""
 _BEYOND: Final = 0.3
 """Of the smallest amplitude seen: so far down the curves are continued."""
+_RELAXED: Final = 3.0
+"""Time constants of what warms up in a record: 95 % of it is then seen."""
+_THIRD: Final = -1.0 / 16.0
+"""Third harmonic over the first, by how much longer a swing is: -1/12 of x^3, -1/20 of x|x|."""
+_UNSURE: Final = 1.0 / 60.0
+"""Half of what these differ by."""
+_KEPT: Final = 0.05
+"""Probability that a period which seems to drift with time depends on the amplitude after all, at
+least: as no decay tells, and all springs do. T0 beside the mean is then within four errors."""
 _CORRELATED: Final = 0.9
 """Correlation of neighbours, at most, by which errors are enlarged."""
 _SECOND_ORDER: Final = 0.36
 """Standard deviation of what losses lengthen a period by, over (loss/omega)^2: nothing for dry
 friction, pi^2/8 for hysteretic, and which it is the turning points do not tell."""
+_NEAR: Final = 3
+"""Neighbours on each side that tell how turning points scatter at a place, half of what is told."""
 _SLOW: Final = 6
 """Waves along the record that the errors of turning points share."""
 _ALIKE: Final = 0.5
@@ -52,6 +63,8 @@ class _Shape(NamedTuple):
     variance: FloatArray
     scatter: float
     """Variance of the points about it over their own."""
+    left: FloatArray
+    """Points less the likeliest curve, in units of what they scatter by, shape (n,)."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +148,7 @@ class Backbone:
         )
 
 
-def backbone_of(points: TurningPoints, law: Eq8) -> Backbone | None:
+def backbone_of(points: TurningPoints, law: Eq8, bent: FloatArray | None = None) -> Backbone | None:
     """Measure the backbone of turning points.
 
     Parameters
@@ -144,6 +157,8 @@ def backbone_of(points: TurningPoints, law: Eq8) -> Backbone | None:
         Of the angle.
     law
         What was fitted: its torque and the second order of its losses are the guess of the period.
+    bent
+        Third harmonic that the readings have beyond the law's (`goodness.Goodness.bent`).
 
     Returns
     -------
@@ -170,7 +185,7 @@ def backbone_of(points: TurningPoints, law: Eq8) -> Backbone | None:
     rows = np.geomspace(largest, _BEYOND * smallest, _ROWS)
     loss, rate = _loss(clear, rows)
     decrement, decrement_sd = rate * loss.value, rate * np.sqrt(loss.variance)
-    nothing = np.full(_ROWS, math.nan)
+    nothing, longer = np.full(_ROWS, math.nan), np.zeros(_ROWS)
     small, period, period_sd, scatter = Estimate(math.nan, math.nan, "s"), nothing, nothing, 1.0
     if np.all(np.isfinite(clear.time_sd_s)):
         swing = _period(clear, law, np.append(rows, 0.0))
@@ -180,8 +195,11 @@ def backbone_of(points: TurningPoints, law: Eq8) -> Backbone | None:
         unsure = _SECOND_ORDER * typical**2
         period_sd, scatter = plain * np.sqrt(swing.variance + unsure**2), swing.scatter
         small = Estimate(float(without[-1]), float(period_sd[-1]), "s")
+        longer = swing.value[:-1] / swing.value[-1] - 1.0
         late = period_excess(rows, law.angular_frequency, *_losses(law))
         period, period_sd = without[:-1] * (1.0 + late), period_sd[:-1]
+    if bent is not None:
+        decrement_sd = np.hypot(decrement_sd, _misread(rows, decrement, bent, longer))
     return Backbone(
         rows,
         period,
@@ -193,6 +211,23 @@ def backbone_of(points: TurningPoints, law: Eq8) -> Backbone | None:
         scatter,
         loss.scatter,
     )
+
+
+def _misread(
+    rows: FloatArray, decrement: FloatArray, bent: FloatArray, longer: FloatArray
+) -> FloatArray:
+    """What the decrement is off by if a third harmonic is a sensor's: of a bent scale.
+
+    A reading ``y (1 + d)`` of an amplitude y, with d as y^2 of a cubic or as 1/y of a dead band,
+    has a third harmonic of d/4, and its loss is off by ``dd/d ln y`` and by the place y. A torque
+    that makes swings `longer` than small ones has one of its own.
+    """
+    u = rows / rows[0]
+    far, near, by_torque = bent[0] / u, bent[1] * u**2, _THIRD * longer
+    off, change = far + near - by_torque, 2.0 * near - far - np.gradient(by_torque, np.log(rows))
+    slope = np.gradient(decrement, np.log(rows))
+    unsure = np.abs(_UNSURE * longer) * (np.abs(slope) + decrement)
+    return np.asarray(4.0 * (np.abs(change * decrement) + np.abs(off * slope) + unsure))
 
 
 def _half_swing(amplitude: FloatArray, law: Eq8) -> FloatArray:
@@ -236,8 +271,15 @@ def _loss(points: TurningPoints, rows: FloatArray) -> tuple[_Shape, FloatArray]:
         for power in (1.0, -1.0)
     ]
     data, sd = -np.log(y), points.angle_sd_rad / y
-    shape = _smooth(data, sd, beside, steps, [(logs, asked)], low, high, scale, shapes)
-    return shape, rate(rows)
+    table = _table(asked, low, high)
+    shape = _smooth(data, sd, beside, steps, [(logs, table)], low, high, scale, shapes)
+    # Where neighbours scatter by more than all of them do, as after a release, it is known worse.
+    near = np.convolve(
+        np.pad(shape.left**2, _NEAR, mode="reflect"), np.ones(2 * _NEAR + 1), "valid"
+    )
+    local = np.interp(-asked, -np.minimum.accumulate(np.log(y)), near / (2 * _NEAR + 1))
+    wider = np.maximum(0.5 * (local + 1.0), 1.0)
+    return shape._replace(variance=wider * shape.variance), rate(rows)
 
 
 def _period(points: TurningPoints, law: Eq8, rows: FloatArray) -> _Shape:
@@ -252,8 +294,17 @@ def _period(points: TurningPoints, law: Eq8, rows: FloatArray) -> _Shape:
     middle = np.sqrt(y[1:] * y[:-1]) / largest
     asked = rows / largest
     time = points.time_s - points.time_s[0]
-    arguments = [(middle, asked), (middle**2, asked**2)]
-    return _smooth(time, points.time_sd_s, beside, steps, arguments, 0.0, 1.0, 1.0)
+    # Or of the time, by the record's length, straight or as what warms up: then an amplitude is
+    # that of an instant, and that of no swing the mean.
+    when = (time[1:] + time[:-1]) / (2.0 * time[-1])
+    instants = np.interp(-rows, -np.minimum.accumulate(middle * largest), when)
+    relaxed = math.expm1(-_RELAXED)
+    arguments = [(each(middle), _table(each(asked), 0.0, 1.0)) for each in (np.positive, np.square)]
+    for argument in (np.positive, lambda t: np.expm1(-_RELAXED * t) / relaxed):
+        drifting, at = _table(argument(instants), 0.0, 1.0), argument(when)
+        drifting[rows == 0.0] = np.average(_table(at, 0.0, 1.0), axis=0, weights=steps)
+        arguments.append((at, drifting))
+    return _smooth(time, points.time_sd_s, beside, steps, arguments, 0.0, 1.0, 1.0, sure=2)
 
 
 def _smooth(
@@ -266,6 +317,7 @@ def _smooth(
     high: float,
     scale: float,
     shapes: Sequence[tuple[FloatArray, FloatArray]] = (),
+    sure: int = 0,
 ) -> _Shape:
     """Fit ``data = beside + sum of steps (constant + f)``, f a Gaussian process.
 
@@ -278,7 +330,8 @@ def _smooth(
     steps
         Of the guess, shape (n - 1,).
     arguments
-        Of f, at the steps and where it is asked for: one of them holds.
+        Of f at the steps, and what it is made of where it is asked for: its values at the knots,
+        shape (m, knots). One of them holds.
     low, high
         Range of the argument.
     scale
@@ -286,6 +339,8 @@ def _smooth(
     shapes
         Functions that are added to the constant, each as large as the guess or less: its steps, and
         over the guess where it is asked for.
+    sure
+        The first arguments, so many, that keep `_KEPT` of the probability.
     """
     weight, n = 1.0 / sd, len(data)
 
@@ -313,8 +368,8 @@ def _smooth(
     waves = np.pad(waves * math.sqrt(2.0 * _ALIKE / _SLOW), ((0, more), (0, 0)))
     by_waves = by_data @ waves
     tried = []
-    for at_steps, asked in arguments:
-        table, places = _table(at_steps, low, high), _table(asked, low, high)
+    for at_steps, places in arguments:
+        table = _table(at_steps, low, high)
         columns = np.pad(summed(steps[:, None] * table) * weight[:, None], ((0, more), (0, 0)))
         out = places - by_data @ columns
         columns -= flat @ (inverse @ columns)
@@ -339,11 +394,20 @@ def _smooth(
     evidence, mean, variance = (np.concatenate(each) for each in list(zip(*tried, strict=True))[:3])
     odds = np.exp(evidence - evidence.max())
     odds /= odds.sum()
+    first = np.arange(len(odds)) < sure * len(_LENGTHS) * len(_WIDTHS)
+    if sure and (share := float(odds[first].sum())) < _KEPT:
+        own = np.exp(evidence - evidence[first].max()) * first
+        odds = _KEPT * own / own.sum() + (1.0 - _KEPT) * odds * ~first / (1.0 - share)
     *_, noise, rest = max(tried, key=lambda each: float(each[0].max()))
     correlated = of_neighbours(rest, _CORRELATED)
     value = odds @ mean
     spread = odds @ (mean - value) ** 2
-    return _Shape(value, correlated * (odds @ variance) + spread, max(noise * correlated, 1.0))
+    return _Shape(
+        value,
+        correlated * (odds @ variance) + spread,
+        max(noise * correlated, 1.0),
+        rest[:n] / math.sqrt(noise),
+    )
 
 
 def _table(places: FloatArray, low: float, high: float, count: int = _KNOTS) -> FloatArray:

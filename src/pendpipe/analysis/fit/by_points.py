@@ -235,6 +235,7 @@ def fit_points(
     baseline: Baseline = "eq8",
     fixed: Mapping[str, float] | None = None,
     restoring: Restoring = "linear",
+    bent: FloatArray | None = None,
 ) -> FitResult:
     """Fit Eq. 14 to turning points, and Eq. 8's frequency to their times.
 
@@ -251,6 +252,8 @@ def fit_points(
         Parameters that are held, by name.
     restoring
         The restoring torque.
+    bent
+        What the readings show of a bent scale (`goodness.Goodness.bent`).
 
     Returns
     -------
@@ -278,6 +281,7 @@ def fit_points(
             envelope.chi2_per_dof,
             (p_value, tail(period.chi2_per_dof / _LATE, freedom, 1e9)),
             max(stretched, 1.0),
+            bent,
         ),
         said=[late] if period.chi2_per_dof > _LATE else [],
         fixed=fixed,

@@ -296,14 +296,16 @@ def _judged(fitted: Fitted, samples: Samples, points: TurningPoints) -> Goodness
     lines = 2 - (OFFSET in held) - (DRIFT in held)
     free = 9 - len({*held, *at_bound, SHARE, OFFSET, DRIFT})
     largest = float(np.max(np.abs(problem.values)))
+    # Angles are positive at even numbers; their rates are a quarter of a cycle ahead.
+    first = float(points.side[0] < 0.0) - points.half_cycle[0] + 0.5 * (problem.seen == "rate")
     return judge(
         problem.time_s,
         problem.residual(value),
         points.time_s,
-        points.half_cycle.astype(np.float64),
+        points.half_cycle + first,
         fitted=free,
         lines=lines,
-        amplitude=points.amplitude_rad,
+        amplitude=points.amplitude_rad * problem.scale(value),
         step=samples.step,
         floor=1e-15 * largest,
     )

@@ -56,8 +56,12 @@ def judged(result: Fit, points: TurningPoints, law: Eq8, *, enlarged: float) -> 
     enlarged
         By what the variances were multiplied.
     """
-    if result.refuted and (shown := backbone_of(points, law)) is not None:
-        result = replace(_spread(result, shown, enlarged), shown=shown)
+    contradicted = any(check.contradicts for check in result.decrement_check)
+    if result.refuted and not contradicted:
+        # Of a law that contradicts the decay nothing is quoted, and another may be tried.
+        shown = backbone_of(points, law, result.bent)
+        if shown is not None:
+            result = replace(_spread(result, shown, enlarged), shown=shown)
     clear = int(np.sum(points.amplitude_rad > CLEAR * points.angle_sd_rad))
     quotable, problems = _quotable(result, clear)
     light, reason = _light(result, problems)

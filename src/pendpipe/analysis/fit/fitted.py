@@ -131,6 +131,8 @@ class Fitted:
     motion
         The waveform's law at its minimum, where b has its parts, and the turning point from which
         it moves; None where the fit was read from a file.
+    bent
+        Third harmonic that the law does not have (`goodness.Goodness.bent`).
     points, decay
         The turning points and the readings of the fitted decay; None where the fit was read
         from a file.
@@ -173,6 +175,7 @@ class Fitted:
     gravity: Estimate | None = None
     name: str = field(default="", compare=False, metadata=_APART)
     motion: tuple[Eq8, Release] | None = field(default=None, compare=False, metadata=_APART)
+    bent: FloatArray | None = field(default=None, compare=False, metadata=_APART)
     points: TurningPoints | None = field(default=None, compare=False, metadata=_APART)
     decay: Recording | None = field(default=None, compare=False, metadata=_APART)
     drawn_by: Callable[[], Any] | None = field(default=None, compare=False, metadata=_APART)
@@ -203,7 +206,7 @@ class Fitted:
         """
         if self.shown is not None or self.points is None or not self.decrement_check:
             return self.shown
-        return backbone_of(self.points, self.law)
+        return backbone_of(self.points, self.law, self.bent)
 
     @property
     def lawless(self) -> Backbone | None:

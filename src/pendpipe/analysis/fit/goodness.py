@@ -27,6 +27,9 @@ _BLOCKS: Final = 128
 _SLOW: Final = 8
 """Polynomials that follow a slow change along the record."""
 
+_IN_PHASE: Final = 0.05
+"""Part of the motion that a residual may have at its frequency where its third harmonic is read: a
+phase of 0.05 that changes in a cycle leaves a hundredth of itself there."""
 _RIDGE: Final = 1e-9
 """Of the level's square: a block with a gap has an inverse, and is then left out (`_GAPPED`)."""
 _GAPPED: Final = 60.0
@@ -52,6 +55,9 @@ class Goodness(NamedTuple):
     """Of each question."""
     enlarged: float
     """By what variances are multiplied: 1 where noise explains the residual."""
+    bent: FloatArray | None = None
+    """Third harmonic of the residual in phase with the first of the motion, over the largest
+    amplitude Y: a constant, and by (y/Y)^3; shape (2,)."""
 
     @property
     def p_value(self) -> float:
@@ -100,11 +106,12 @@ def judge(
     time_s, residual
         Readings less model, shape (n,).
     turn_s, half_cycle
-        Times and numbers of turning points: the phase of the motion, shape (k,).
+        Times and numbers of turning points, shape (k,): the readings go with cos(pi number).
     fitted, lines
         How many parameters were fitted to the motion, and how many to its level.
     amplitude
-        Of the turning points; with the step it says what rounding leaves of the motion.
+        Of the turning points, in the unit of the readings; with the step it says what rounding
+        leaves of the motion.
     step
         Of the readings, where known.
     floor
@@ -134,7 +141,14 @@ def judge(
         return Goodness(max(math.sqrt(square / freedom), least), ratio, p_values, 1.0)
     # What a, b, c suffer from is what is left at the motion's own frequency.
     own = max((each.chi2 / each.freedom for each in asked if each.name == "motion"), default=1.0)
-    return Goodness(noise, ratio, p_values, max(ratio, own, 1.0))
+    bent, large = None, float(np.max(amplitude))
+    y = np.interp(found.phase, half_cycle * math.pi, amplitude) / large
+    # What has lost the phase leaks into all harmonics.
+    near = np.linalg.norm(found.value[:, 1:3], axis=1) < _IN_PHASE * large * y
+    if harmonics > 2 and np.sum(near) > 2:
+        cubes = y[near, None] ** np.array([0.0, 3.0])
+        bent = np.linalg.lstsq(cubes, found.value[near, 5] / large)[0]
+    return Goodness(noise, ratio, p_values, max(ratio, own, 1.0), bent)
 
 
 def _binned(

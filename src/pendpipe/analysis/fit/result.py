@@ -326,6 +326,7 @@ def result_of(
         chi2_per_dof=goodness.chi2_per_dof,
         fit_p_value=combined(p_values),
         decrement_check=checks,
+        bent=goodness.bent,
         **rest,
     )
     result = judged(result, points, law, enlarged=goodness.enlarged)
@@ -401,7 +402,7 @@ def _stretched(result: FitResult, powers: Mapping[str, float], part: float) -> F
         sd = math.hypot(old.sd, part * power * old.value)
         found = scaled(old, sd / old.sd if old.sd > 0.0 else 1.0, name)
         parameters[name] = replace(found, sd=sd)
-    shown, power = result.shown, powers.get("frequency", 0.0)
+    shown, power = result.lawless, powers.get("frequency", 0.0)
     if shown is not None:
         small = shown.small_period
         wider = replace(small, sd=math.hypot(small.sd, part * power * small.value))

@@ -102,6 +102,10 @@ class Waveform:
             low[START], high[START] = -TOP, TOP
         return Bounds(low, high)
 
+    def scale(self, value: FloatArray) -> float:
+        """Amplitude of the readings over that of a small angle."""
+        return {"angle": 1.0, "rate": float(value[OMEGA]), "position": self.length_m}[self.seen]
+
     def _late(self, time_s: FloatArray) -> FloatArray:
         """Time since the middle of the readings: what the drift is multiplied by."""
         return np.asarray(time_s - 0.5 * (self.time_s[0] + self.time_s[-1]))
