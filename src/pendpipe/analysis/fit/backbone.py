@@ -226,8 +226,8 @@ def _misread(
     far, near, by_torque = bent[0] / u, bent[1] * u**2, _THIRD * longer
     off, change = far + near - by_torque, 2.0 * near - far - np.gradient(by_torque, np.log(rows))
     slope = np.gradient(decrement, np.log(rows))
-    unsure = np.abs(_UNSURE * longer) * (np.abs(slope) + decrement)
-    return np.asarray(4.0 * (np.abs(change * decrement) + np.abs(off * slope) + unsure))
+    moved = np.abs(change * decrement) + np.abs(off * slope)
+    return np.asarray(4.0 * (moved + np.abs(_UNSURE * longer) * (np.abs(slope) + decrement)))
 
 
 def _half_swing(amplitude: FloatArray, law: Eq8) -> FloatArray:
@@ -278,8 +278,9 @@ def _loss(points: TurningPoints, rows: FloatArray) -> tuple[_Shape, FloatArray]:
         np.pad(shape.left**2, _NEAR, mode="reflect"), np.ones(2 * _NEAR + 1), "valid"
     )
     local = np.interp(-asked, -np.minimum.accumulate(np.log(y)), near / (2 * _NEAR + 1))
-    wider = np.maximum(0.5 * (local + 1.0), 1.0)
-    return shape._replace(variance=wider * shape.variance), rate(rows)
+    return shape._replace(variance=np.maximum(0.5 * (local + 1.0), 1.0) * shape.variance), rate(
+        rows
+    )
 
 
 def _period(points: TurningPoints, law: Eq8, rows: FloatArray) -> _Shape:
@@ -298,9 +299,8 @@ def _period(points: TurningPoints, law: Eq8, rows: FloatArray) -> _Shape:
     # that of an instant, and that of no swing the mean.
     when = (time[1:] + time[:-1]) / (2.0 * time[-1])
     instants = np.interp(-rows, -np.minimum.accumulate(middle * largest), when)
-    relaxed = math.expm1(-_RELAXED)
     arguments = [(each(middle), _table(each(asked), 0.0, 1.0)) for each in (np.positive, np.square)]
-    for argument in (np.positive, lambda t: np.expm1(-_RELAXED * t) / relaxed):
+    for argument in (np.positive, lambda t: np.expm1(-_RELAXED * t) / math.expm1(-_RELAXED)):
         drifting, at = _table(argument(instants), 0.0, 1.0), argument(when)
         drifting[rows == 0.0] = np.average(_table(at, 0.0, 1.0), axis=0, weights=steps)
         arguments.append((at, drifting))

@@ -56,8 +56,7 @@ def judged(result: Fit, points: TurningPoints, law: Eq8, *, enlarged: float) -> 
     enlarged
         By what the variances were multiplied.
     """
-    contradicted = any(check.contradicts for check in result.decrement_check)
-    if result.refuted and not contradicted:
+    if result.refuted and not any(check.contradicts for check in result.decrement_check):
         # Of a law that contradicts the decay nothing is quoted, and another may be tried.
         shown = backbone_of(points, law, result.bent)
         if shown is not None:
