@@ -21,6 +21,8 @@ from pendpipe_challenge.motion import Motion
 from pendpipe_challenge.torques import BOOK
 from pendpipe_challenge.world import Bench, Cause, Scene
 
+from ..effects.integration import integrate
+
 # What stands on the bench: noise, evidence, and causes that do what their names say.
 
 LAWS = [law for laws in (CATALOGUE | OUTSIDE).values() for law in laws]
@@ -308,37 +310,15 @@ MOTION_LAWS: dict[str, tuple[dict[str, float], Callable[[float, float, float], f
 
 
 def by_scipy(extra: Callable[[float, float, float], float], *, sine: bool) -> FloatArray:
-    """Half cycle by half cycle with DOP853, restarted at every reversal."""
-    found = np.full(len(TIME), np.nan)
-    t, state, way = 0.0, np.array([AMPLITUDE, 0.0]), -1.0
+    """Half cycle by half cycle, restarted at every reversal."""
 
-    def rates(t: float, s: FloatArray) -> list[float]:
+    def law(t: float, state: FloatArray, way: float, _turn: float) -> float:
         # The direction holds throughout a half cycle, also in trial steps beyond its end.
-        v = way * max(way * s[1], 1e-300)
-        law = eq8(s[0], v, sine=sine) + extra(t, s[0], v)
-        return [s[1], law + LOSSES["gamma"] * (v - s[1])]
+        x, v = float(state[0]), way * max(way * float(state[1]), 1e-300)
+        every = eq8(x, v, sine=sine) + extra(t, x, v)
+        return every + LOSSES["gamma"] * (v - float(state[1]))
 
-    def turn(t: float, s: FloatArray) -> float:
-        return float(s[1])
-
-    turn.terminal = True  # type: ignore[attr-defined]
-    while t < TIME[-1]:
-        turn.direction = -way  # type: ignore[attr-defined]
-        run = solve_ivp(
-            rates,
-            (t, TIME[-1] + 1e-9),
-            state,
-            method="DOP853",
-            rtol=1e-11,
-            atol=1e-14,
-            events=turn,
-            dense_output=True,
-            max_step=0.02,
-        )
-        here = (t <= TIME) & (run.t[-1] >= TIME)
-        found[here] = run.sol(TIME[here])[0]
-        t, state, way = run.t[-1], np.array([run.y[0, -1], 0.0]), -way
-    return found
+    return integrate(law, AMPLITUDE, 0.0, TIME, longest_s=0.02)
 
 
 @pytest.mark.parametrize("law", MOTION_LAWS)

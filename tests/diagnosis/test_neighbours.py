@@ -164,10 +164,9 @@ def test_no_name_for_a_part_of_a_misfit_is_confident() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first_hz", [0.86, 1.76])
-def test_what_chance_does_not_explain_is_never_called_consistent(first_hz: float) -> None:
-    """A line that sweeps by the fundamental, or the second harmonic, and is in no catalogue."""
-    sweep = 1e-3 * np.sin(2.0 * np.pi * (first_hz + 4e-4 * TIME_S) * TIME_S)
+def test_what_chance_does_not_explain_is_never_called_consistent() -> None:
+    """A line that sweeps by the fundamental, and is in no catalogue."""
+    sweep = 1e-3 * np.sin(2.0 * np.pi * (0.86 + 4e-4 * TIME_S) * TIME_S)
     found = diagnose_recording(recording(other_engine(TRUTH) + sweep, 5))
     assert found.p_value < 0.01
     assert found.verdict == "missing-physics"

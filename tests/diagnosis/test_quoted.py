@@ -126,10 +126,9 @@ def test_a_period_that_jumps_is_quoted_in_the_mean_with_its_span() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "period_s"), [("n01_softening", 0.8), ("n01_hull", 0.8)])
-def test_a_ship_that_softens_is_quoted_with_its_small_swings(name: str, period_s: float) -> None:
+def test_a_ship_that_softens_is_quoted_with_its_small_swings() -> None:
     """Its first swings take 4 % longer; fit and diagnosis are right within their errors."""
-    path = INPUTS / f"{name}.csv"
+    path, period_s = INPUTS / "n01_softening.csv", 0.8
     if not path.exists():
         pytest.skip(f"{path} is not here")
     outcome = pp.diagnose(str(path), restoring="linear")
@@ -230,6 +229,7 @@ def test_a_set_of_effects_whose_fit_is_stuck_is_no_description(
     assert [each.fit.value is found.baseline.value for each in described] == [True]
 
 
+@pytest.mark.slow
 def test_what_chance_excludes_is_no_description_beside_one_that_leaves_noise() -> None:
     """The fit has 8 % for "none of these", and lies thirty errors of the descriptions away."""
     outcome = softening()
@@ -273,6 +273,7 @@ def test_a_fault_of_the_measurement_alone_leaves_one_description_without_it() ->
 # What explains nothing shrinks no error.
 
 
+@pytest.mark.slow
 def test_what_leaves_more_than_noise_is_no_surer_than_the_fit() -> None:
     """The same answer, once as if chance did not explain what is left."""
     outcome = softening()

@@ -26,6 +26,7 @@ def integrate(
     more: tuple[float, ...] = (),
     more_rates: StateRate | None = None,
     kicks: tuple[tuple[float, float, float], ...] = (),
+    longest_s: float = 0.2,
 ) -> Floats:
     """Return the angles at rising times, from a turning point.
 
@@ -35,6 +36,8 @@ def integrate(
         Further state, and its rates.
     kicks
         (instant, jump of the angle, jump of the velocity), in their order.
+    longest_s
+        Of a step, lest it pass over what acts for a short time.
     """
     state = np.array([start_rad, 0.0, *more])
     now, turn = start_s, start_rad
@@ -62,7 +65,7 @@ def integrate(
             dense_output=True,
             rtol=1e-11,
             atol=1e-14,
-            max_step=0.2,
+            max_step=longest_s,
         )
         inside = (time_s >= now) & (time_s <= piece.t[-1])
         if np.any(inside):
