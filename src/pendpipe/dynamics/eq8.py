@@ -271,8 +271,10 @@ class Release:
 
 
 _NONE: FloatArray = np.empty(0)
+"""No times."""
 _COLUMNS = len(JACOBIAN_COLUMNS)
 _NO_LIMIT = 2**62
+"""Turning points: as many as there are."""
 
 
 @dataclass(frozen=True)

@@ -168,6 +168,7 @@ def sensitivities(work: Work, node: FloatArray, radius: float, half_width: float
 
 
 _BLOCK = 16
+"""Readings in whole multiples of which a panel is evaluated: loops without remainders."""
 
 
 @kernel(inline=True)

@@ -16,43 +16,18 @@ import sys
 from collections.abc import Callable, Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, NamedTuple, TypeAlias, TypeVar, cast
+from typing import Any, Final, TypeAlias, TypeVar, cast
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.dynamics.layout import KINDS, WORD, Kind
 
 _F = TypeVar("_F", bound="Callable[..., Any]")
 
 Matrix: TypeAlias = FloatArray
 Stack: TypeAlias = FloatArray
 IntMatrix: TypeAlias = IntArray
-
-_WORD: Final[Any] = ctypes.c_int64
-
-
-class Kind(NamedTuple):
-    """What an annotation means."""
-
-    item: np.dtype[Any] | None
-    """The type of an array's numbers; None for a number."""
-    axes: int
-    words: list[Any]
-    """What stands for it in a call: the number; a record's address; or of an array who owns it
-    (two), its size, that of an item, its address, its shape and its strides."""
-
-
-KINDS: Final = {
-    "FloatArray": Kind(np.dtype(np.float64), 1, 7 * [_WORD]),
-    "Matrix": Kind(np.dtype(np.float64), 2, 9 * [_WORD]),
-    "Stack": Kind(np.dtype(np.float64), 3, 11 * [_WORD]),
-    "IntArray": Kind(np.dtype(np.int64), 1, 7 * [_WORD]),
-    "IntMatrix": Kind(np.dtype(np.int64), 2, 9 * [_WORD]),
-    "Work": Kind(np.dtype(np.float64), 1, [_WORD]),
-    "float": Kind(None, 0, [ctypes.c_double]),
-    "int": Kind(None, 0, [_WORD]),
-    "None": Kind(None, 0, [_WORD]),
-}
 
 SHIPPED: Final = Path(__file__).parent / "shipped"
 """Machine code for many machines, made while the package is built (`setup.py`)."""
@@ -101,7 +76,7 @@ class Kernel:
             else:
                 words += (0, 0, argument.size, item.itemsize, address(argument))
                 words += (*argument.shape, *argument.strides)
-        result, fault = self.returns.words[0](), _WORD()
+        result, fault = self.returns.words[0](), WORD()
         self.machine_code(ctypes.byref(result), ctypes.byref(fault), *words)
         return result.value if self.returns is not KINDS["None"] else None
 
@@ -121,7 +96,7 @@ class Kernel:
         """Numba's own function, for the kernels that call this one."""
         from pendpipe.dynamics import numba_side
 
-        return numba_side.dispatcher(self)
+        return numba_side.dispatcher(self.function, self.options)
 
     @property
     def _numba_type_(self) -> Any:
@@ -152,7 +127,7 @@ class Kernel:
 
         if sys.stderr.isatty():
             print(f"compiling, once: {self.__name__} (march: half a minute)", file=sys.stderr)
-        library, entry = numba_side.compiled(self)
+        library, entry = numba_side.compiled(self.function, self.options)
         own = library.get_pointer_to_function(entry), library
         for path in _trusted(name):
             try:
@@ -174,7 +149,7 @@ class Kernel:
         paths = {cpu: path for cpu, path in shipped(self.file_name()).items() if not path.exists()}
         if not paths:
             return
-        library, entry = numba_side.compiled(self)
+        library, entry = numba_side.compiled(self.function, self.options)
         for processor, path in paths.items():
             machine_code.keep(path, library.get_llvm_str(), entry, processor)
 

@@ -5,14 +5,43 @@ engine allocates nothing. `WORK` declares what lies in the record; kernels read 
 fields as attributes, `work.sigma`. What a call is about stands first, in the order of `REQUEST`.
 """
 
+import ctypes
 import struct
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+
+WORD: Final[Any] = ctypes.c_int64
+
+
+class Kind(NamedTuple):
+    """What an annotation means."""
+
+    item: np.dtype[Any] | None
+    """The type of an array's numbers; None for a number."""
+    axes: int
+    words: list[Any]
+    """What stands for it in a call: the number; a record's address; or of an array who owns it
+    (two), its size, that of an item, its address, its shape and its strides."""
+
+
+KINDS: Final = {
+    "FloatArray": Kind(np.dtype(np.float64), 1, 7 * [WORD]),
+    "Matrix": Kind(np.dtype(np.float64), 2, 9 * [WORD]),
+    "Stack": Kind(np.dtype(np.float64), 3, 11 * [WORD]),
+    "IntArray": Kind(np.dtype(np.int64), 1, 7 * [WORD]),
+    "IntMatrix": Kind(np.dtype(np.int64), 2, 9 * [WORD]),
+    "Work": Kind(np.dtype(np.float64), 1, [WORD]),
+    "float": Kind(None, 0, [ctypes.c_double]),
+    "int": Kind(None, 0, [WORD]),
+    "None": Kind(None, 0, [WORD]),
+}
+"""By the name of an annotation."""
 
 DEGREE: Final = 16
 """Of the polynomials on a panel."""
 NODE_COUNT: Final = DEGREE + 1
+"""Lobatto's, of which both ends are nodes."""
 NODE_SIZE: Final = 504
 """Of the workspace of one panel; see `panel.py`."""
 SLOTS: Final = 16
@@ -24,6 +53,7 @@ FEW_POINTS, MOST_POINTS = 12, 18
 MOST_PANELS: Final = 8
 """Panels to a half cycle in a table."""
 THETA: Final = 512
+"""Places within a panel whose waves are computed together: 4 kB stay in the nearest cache."""
 
 TABLE: Final = MOST_POINTS + 1
 ROW: Final = TABLE + MOST_POINTS
@@ -35,6 +65,7 @@ ENDINGS: Final = 3
 """How a march ends."""
 
 _RATES: Final = 4
+"""a, both parts of b, and c."""
 _S: Final = _RATES + 1
 """Sensitivities: to the amplitude, and to the rates."""
 Work = Any

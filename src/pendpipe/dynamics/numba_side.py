@@ -1,11 +1,11 @@
 """All that is Numba's: how a kernel is compiled."""
 
+from collections.abc import Callable
 from typing import Any
 
 from numba import from_dtype, njit, types
 
-from pendpipe.dynamics.kernel import KINDS, Kernel
-from pendpipe.dynamics.layout import WORK
+from pendpipe.dynamics.layout import KINDS, WORK
 
 _OPTIONS: dict[str, Any] = {"_nrt": False, "error_model": "numpy"}
 """No reference counts (which forbids to allocate), and no exceptions of division."""
@@ -17,23 +17,21 @@ _NUMBERS: dict[str, Any] = {
 }
 
 
-def dispatcher(kernel: Kernel) -> Any:
+def dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     """Return a kernel as Numba's function, of which Python's entry is not made."""
     make: Any = njit
-    return make(**_OPTIONS, **kernel.options, no_cpython_wrapper=True, no_cfunc_wrapper=True)(
-        kernel.function
-    )
+    return make(**_OPTIONS, **options, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
 
 
-def compiled(kernel: Kernel) -> tuple[Any, str]:
+def compiled(function: Callable[..., Any], options: dict[str, Any]) -> tuple[Any, str]:
     """Compile a kernel for what its annotations say; return Numba's library, and its name there.
 
     Its arguments are a place for what it returns and one for exceptions, and then what
-    stands for each (`kernel.KINDS`).
+    stands for each (`layout.KINDS`).
     """
-    noted = dict(kernel.function.__annotations__)
+    noted = dict(function.__annotations__)
     returns = _kind(noted.pop("return"))
-    made: Any = dispatcher(kernel)
+    made: Any = dispatcher(function, options)
     made.compile(returns(*map(_kind, noted.values())))
     (found,) = made.overloads.values()
     return found.library, found.fndesc.llvm_func_name

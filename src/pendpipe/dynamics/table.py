@@ -35,14 +35,18 @@ SMOOTH_FROM = 20.0
 _LOSS_TOLERANCE = 5e-11
 """Of the last two coefficients, relative to the least loss; what follows is 30 times less."""
 _WAVEFORM_TOLERANCE = 1e-10
+"""Of the last coefficients of a waveform, over the amplitude: the engine's own accuracy."""
 _EXCESS_TOLERANCE = 1e-11
+"""The same of what a pendulum's half cycle lasts longer, which adds up over a record."""
 _LOW_POWERS = 4
+"""Of time in x/y that are asked: the higher ones are mostly rounding."""
 
 _POWERS: FloatArray = powers_of_chebyshev(MOST_POINTS)
 _FEW_NODES, _MANY_NODES = chebpts1(FEW_POINTS), chebpts1(MOST_POINTS)
 _FEW_ANALYSIS, _MANY_ANALYSIS = analysis(_FEW_NODES), analysis(_MANY_NODES)
 
 _NONE: FloatArray = np.empty(0)
+"""No times."""
 
 # Entries of a segment's description.
 LOW, HIGH, MIDDLE, INVERSE, POINTS, PANELS = range(6)

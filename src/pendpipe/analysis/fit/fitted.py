@@ -42,7 +42,11 @@ _RATES: Final = {
 
 
 def units(unit: str) -> dict[str, str]:
-    """Unit of each parameter, for motions in a unit."""
+    """Unit of each parameter, for motions in a unit.
+
+    >>> units("rad")["a"], units("m/s")["c"]
+    ('1/(rad s)', 'm/s^2')
+    """
     a, c = _RATES.get(unit, (f"1/({unit} s)", f"{unit}/s"))
     return {
         "a": a,
