@@ -15,6 +15,7 @@ AnyArray: TypeAlias = npt.NDArray[Any]
 Numbers: TypeAlias = Any
 """A number or an array of numbers; several arguments broadcast against each other."""
 _ROWS_AT_ONCE: Final = 1 << 15
+"""Rows whose columns stay in the processor's cache."""
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
 

@@ -12,6 +12,7 @@ from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import Restoring
+from pendpipe.estimate import Z95
 
 TORQUES: Final[tuple[Restoring, Restoring]] = ("linear", "sine")
 TOP: Final = 3.13
@@ -27,8 +28,6 @@ _FEWEST: Final = 6
 SEEN: Final = 3.0
 """Standard deviations from which an amplitude, or a coefficient, is seen, and up to which the
 coefficient may be off."""
-_AGREES: Final = 2.0
-"""Standard deviations within which the coefficient agrees with 1 where it has to tell by itself."""
 _NEAR: Final = 0.2
 """How near to 1 it must be where sin x removes most of chi^2."""
 
@@ -50,7 +49,7 @@ class Coefficient(NamedTuple):
         coefficient is within 0.2 of 1, or as near as a drift would bring it.
         """
         off = abs(self.value - 1.0)
-        near = off < _AGREES * self.sd and self.value > SEEN * self.sd
+        near = off < Z95 * self.sd and self.value > SEEN * self.sd
         return near or (self.removed > 0.5 and off < max(_NEAR, self.sd))
 
     @property

@@ -21,6 +21,7 @@ CLOSENESS: Final = np.array([0.03, 0.08, 0.16, 0.28, 0.42, 0.5])
 DEPTHS: Final = np.array([0.02, 0.06, 0.14, 0.3])
 """Penetration depths, in radii: those of water between 1 Hz and 0.05 Hz, and of glycerol."""
 _FEW_NEAR: Final = CLOSENESS[[0, 2, 3, 5]]
+"""Of `CLOSENESS`: see `_FEW_DEPTHS`."""
 _FEW_DEPTHS: Final = DEPTHS[::3]
 """Those at which other heights are computed, which change less."""
 _ORDER: Final = 10

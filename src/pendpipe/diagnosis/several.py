@@ -59,8 +59,6 @@ from pendpipe.recording import Recording
 
 _HEAD: Final = 0.25
 """Part of a predicted recording to which its own values (its start) are fitted."""
-_NOT_ZERO_SD: Final = 2.0
-"""Standard deviations, with all that widens them, from which a size is not zero."""
 
 
 @np.errstate(over="ignore", divide="ignore", invalid="ignore")
@@ -426,7 +424,7 @@ class _Together:
                 continue
             sizes = [one.parameters[each.name] for each in effect.parameters[: effect.sizes]]
             known = effect.parameter_free or effect.kind == "unnamed"
-            if not known and all(abs(e.value) < _NOT_ZERO_SD * e.sd for e in sizes):
+            if not known and all(abs(e.value) < Z95 * e.sd for e in sizes):
                 one = replace(one, probability=min(one.probability, DOUBTFUL))
             everywhere = Location(summary="in all recordings together")
             named.append(replace(one, location=everywhere))

@@ -11,14 +11,13 @@ from scipy.ndimage import uniform_filter1d
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
+from pendpipe.estimate import Z95
 
 _OVERSAMPLING: Final = 2
 """Frequencies in an interval of 1/duration."""
 _BESIDE: Final = 12.0
 _LINE: Final = 2.0
 """Frequencies beside a line, in 1/duration: how far they reach, and how far the line does."""
-_LOUD: Final = 2.0
-"""Standard deviations by which they are louder than the noise explains."""
 OFF_HARMONIC: Final = 0.1
 """Distance of a separate line from the nearest harmonic, over the motion's frequency."""
 _VISIBLE: Final = 0.02
@@ -101,7 +100,7 @@ class ToneScan:
         steady = self.size / len(self.envelope)
         found = [self._about(scores, resolved) for resolved in (steady, steady * self.wider)]
         level, beside = (np.where(self.as_steady, *each) for each in zip(*found, strict=True))
-        return np.where(level > 1.0 + _LOUD / np.sqrt(beside), level, 1.0), beside
+        return np.where(level > 1.0 + Z95 / np.sqrt(beside), level, 1.0), beside
 
     def _about(self, scores: FloatArray, resolved: float) -> tuple[FloatArray, FloatArray]:
         """Return the mean of the frequencies about each one, and their number.

@@ -19,7 +19,7 @@ from pendpipe.diagnosis.outcome import Outcome
 from pendpipe.diagnosis.remainder import Remainder
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier, declared
 from pendpipe.effects.curves import CURVES
-from pendpipe.estimate import LISTED, Estimate
+from pendpipe.estimate import LISTED, Z95, Estimate
 from pendpipe.files import fields_of
 from pendpipe.levels import FALSE_ALARM
 from pendpipe.quantities import compact, listed, with_error
@@ -32,14 +32,10 @@ DOUBTFUL: Final = 0.05
 """Probability up to which a name only describes and is not to be quoted."""
 CANDIDATE: Final = 0.2
 """Probability from which it is a candidate."""
-_MOVED: Final = 2.0
-"""Standard deviations from which a number is said to move."""
 _SURE: Final = 0.95
 """Probability from which a name without rivals needs no further measurement."""
 _SHOWN: Final = 4
 """Of what was looked for."""
-_KNOWN: Final = 2.0
-"""Standard deviations from which a parameter of an effect is printed."""
 UNNAMED: Final = {
     "unnamed-damping": "a loss of unknown form",
     "unnamed-restoring": "a restoring torque of unknown form",
@@ -301,7 +297,7 @@ def numbers_of(effect: FoundEffect) -> str:
             sd = math.hypot(each.sd * each.value, sine.sd * sine.value) / value if value else 0.0
             each = Estimate(value, sd, each.unit)
         # What is as it always is (a drift that is straight) says nothing.
-        if abs(each.value) > _KNOWN * each.sd and each.value != parameter.default:
+        if abs(each.value) > Z95 * each.sd and each.value != parameter.default:
             number = with_error(each.value, each.sd, each.unit, short=True)
             said.append(f"{parameter.word or name} {number}")
     return ", ".join([*said, *filter(None, [effect.location.mains])])
@@ -355,7 +351,7 @@ def _matters(diagnosis: Outcome, changes: Sequence[Change], unit: str) -> str:
     """Say how large the misfit is, and which numbers it moves."""
     left = compact(diagnosis.baseline.residual_rms_rad, unit)
     noise = compact(diagnosis.noise_rms_rad, unit)
-    moved = [each for each in changes if each.quantity != "Q" and each.moved_sd > _MOVED]
+    moved = [each for each in changes if each.quantity != "Q" and each.moved_sd > Z95]
     words = [
         f"{_title(each)} {replace(each.fitted, unit='').or_limit()} →"
         f" {replace(each.with_missing, unit=each.fitted.unit).or_limit()}"
@@ -446,7 +442,7 @@ def _quote(diagnosis: Outcome, changes: Sequence[Change]) -> str:
     if good:
         ends = good if len(good) < 3 else [good[0], good[-1]]
         said.append(f"Q {', '.join(ends)}")
-    moved = [each.quantity for each in changes if each.quantity in "abc" and each.moved_sd > _MOVED]
+    moved = [each.quantity for each in changes if each.quantity in "abc" and each.moved_sd > Z95]
     if moved:
         said.append(f"not {', '.join(moved)}")
     return "; ".join(said)

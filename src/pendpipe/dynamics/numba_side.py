@@ -1,7 +1,7 @@
 """All that is Numba's: how a kernel is compiled."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 from numba import from_dtype, njit, types
 
@@ -19,8 +19,9 @@ _NUMBERS: dict[str, Any] = {
 
 def dispatcher(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     """Return a kernel as Numba's function, of which Python's entry is not made."""
-    make: Any = njit
-    return make(**_OPTIONS, **options, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+    return cast("Any", njit)(**_OPTIONS, **options, no_cpython_wrapper=True, no_cfunc_wrapper=True)(
+        function
+    )
 
 
 def compiled(function: Callable[..., Any], options: dict[str, Any]) -> tuple[Any, str]:
@@ -41,6 +42,5 @@ def _kind(annotation: str) -> Any:
     """Return Numba's type of what a kernel is given, or returns."""
     if annotation in _NUMBERS:
         return _NUMBERS[annotation]
-    item: Any = KINDS[annotation].item
-    make: Any = types.Array
-    return make(from_dtype(item), KINDS[annotation].axes, "C")
+    kind = KINDS[annotation]
+    return cast("Any", types.Array)(from_dtype(cast("Any", kind.item)), kind.axes, "C")

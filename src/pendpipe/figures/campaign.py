@@ -285,6 +285,7 @@ CAUSES: Final[dict[str, tuple[str, str, Any]]] = {
     "both": ("both", INK, "-"),
 }
 _SHIFTS_PERCENT: Final = (1, 2, 5, 10, 20, 40, 60, 70, 80)
+"""Where the second scale has its marks."""
 
 
 @styled

@@ -372,6 +372,7 @@ def _measured_quality(x: FloatArray, value: FloatArray, sd: FloatArray) -> Mark:
 
 
 _MARGINS: Final = {"top": 0.872, "bottom": 0.105, "hspace": 0.09}
+"""Parts of the sheet: a title above two panels, one scale below them."""
 
 
 @styled

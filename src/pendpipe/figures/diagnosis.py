@@ -181,7 +181,9 @@ def draw_decay(content: Shown) -> Figure:
 
 
 PHASES: Final = 24
+"""Rows of the map: 15 degrees of the cycle each."""
 _COLUMNS: Final = 90
+"""Columns of the map at most: each is a millimetre wide in print."""
 _IN_A_CELL: Final = 4
 """Readings, usually: fewer would leave holes."""
 _CHARACTER: Final = 0.0165
@@ -270,7 +272,9 @@ def residual_map(content: Shown, fit: Fit) -> FloatArray:
 
 
 _BANDS: Final = 500
+"""Of the spectrum, even in ln f: as many as a figure has dots across."""
 _HARMONICS: Final = 8
+"""Of the motion that are marked."""
 
 
 @styled

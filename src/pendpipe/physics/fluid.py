@@ -234,6 +234,7 @@ POTENTIAL_FLOW_ADDED_MASS = 0.5
 
 
 _ROUNDS: Final = 50
+"""Of a fixed point at most."""
 
 
 @equation

@@ -14,6 +14,7 @@ from pendpipe.arrays import FloatArray, Numbers, equation
 from pendpipe.physics.fluid import POTENTIAL_FLOW_ADDED_MASS, added_mass_coefficient
 
 STANDARD_GRAVITY_M_PER_S2 = 9.80665
+"""As the third General Conference on Weights and Measures defined it in 1901."""
 
 
 @dataclass(frozen=True)

@@ -198,6 +198,7 @@ def _together(name: str, kept: Sequence[Estimate], of: int, *, mean: bool) -> To
 HEAD: Final = ("file", "light", "period", "Q", "at", "loses most by", "remark")
 WIDE: Final = ("a", "b", "c")
 _REMARK: Final = 60
+"""Characters of a remark, so that a row fits a page on its side."""
 
 
 def printed(fits: Sequence[Fitted], *, wide: bool = False, mean: bool = False) -> str:

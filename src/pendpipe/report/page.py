@@ -52,6 +52,7 @@ BUDGET_BYTES: Final = 5_000_000
 MANY: Final = 100
 """Beyond this only records that were refused, failed or miss something are drawn."""
 _RESERVE_BYTES: Final = 250_000
+"""For what is on every page: style, script and words."""
 _ROW_BYTES, _RECORD_BYTES = 2_000, 4_500
 """What a record takes beside its drawings: in the tables, and in words where it is drawn."""
 

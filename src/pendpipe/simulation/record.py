@@ -18,6 +18,7 @@ STEP_V = {"di154": 20.0 / 2**12, "di2108": 20.0 / 2**16}
 """The step of each simulated converter; both span -10 V to +10 V."""
 
 FEWEST_PERIODS = 8.0
+"""Of a record: fewer show no decay."""
 
 
 def generator(campaign: Campaign, name: str) -> np.random.Generator:

@@ -22,6 +22,7 @@ from pendpipe.files import read_json
 FEWEST_RECORDS = 3
 """With fewer there is nothing to compare."""
 POINTS_OF_A_CURVE = 60
+"""Of a theoretical branch: a smooth line on a page."""
 
 
 @dataclass(frozen=True)

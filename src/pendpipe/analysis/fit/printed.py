@@ -15,7 +15,6 @@ from pendpipe.analysis.fit.fitted import Fitted
 from pendpipe.analysis.fit.quality import (
     LEAST_QUALITY,
     LOSSES,
-    SEEN,
     Quality,
     mean_square,
     period_of_frequency,
@@ -24,7 +23,7 @@ from pendpipe.analysis.fit.quality import (
 )
 from pendpipe.analysis.torque import TOP, swing_phase
 from pendpipe.answer import SMALLEST, Answer
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import Z95, Estimate
 from pendpipe.quantities import compact, pretty_unit, stretch, with_error
 
 WITHOUT_LAW: Final = "from the turning points alone"
@@ -211,7 +210,7 @@ def energy(result: Fitted) -> str:
         return f"the decay does not separate drag, viscous loss and dry friction (at {where})"
     seen, limits = [], []
     for name, share in sorted(large.losses.items(), key=lambda pair: -pair[1].value):
-        if share.value > SEEN * share.sd and not share.at_bound:
+        if share.value > Z95 * share.sd and not share.at_bound:
             seen.append(f"{percent(share)} {SHORT[name]} ({name})")
         else:
             limits.append(f"{SHORT[name]} ({name}) < {100.0 * share.bounds95[1]:.2g} %")

@@ -18,7 +18,7 @@ from pendpipe.analysis.fit.fitted import Fit, Fitted
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.estimate import Estimate, over
+from pendpipe.estimate import Z95, Estimate, over
 from pendpipe.quantities import after_number
 
 LEAST_QUALITY: Final = 3.0
@@ -31,8 +31,6 @@ LOSSES: Final = {
 """The three losses of Eq. 13 in words."""
 TOLD_APART: Final = 0.15
 """Standard deviation of a loss's share up to which it is told from the others."""
-SEEN: Final = 2.0
-"""Standard deviations from which a loss is seen, and Q, its reciprocal, has an error."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +101,7 @@ def seen_qualities(result: Fitted) -> tuple[Quality, ...]:
         return ()
     found = (_seen_quality(result, shown, each.amplitude_rad) for each in result.decrement_check)
     return tuple(
-        each for each in found if 0.0 < SEEN * each.damping_time_s.sd < each.damping_time_s.value
+        each for each in found if 0.0 < Z95 * each.damping_time_s.sd < each.damping_time_s.value
     )
 
 

@@ -14,6 +14,7 @@ from pendpipe.diagnosis.forensics.local import whitened_series
 from pendpipe.diagnosis.forensics.tails import tail_of_squares
 from pendpipe.diagnosis.found import Finding
 from pendpipe.estimate import Estimate
+from pendpipe.levels import deviations
 from pendpipe.quantities import with_error
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ _CLIP_SD: Final = 3.0
 """Standard deviations at which errors are clipped."""
 _CONSTANT: Final = 1e-3
 """Relative variation of the mean of v^2 over a cycle below which it counts as constant."""
-_AGREE_SD: Final = 2.6
+_AGREE_SD: Final = deviations(1)
 """Standard deviations by which the part at twice the frequency may be too small."""
 _RULED: Final = 0.1
 """Noise before rounding, in steps, below which rounding rules the errors."""
