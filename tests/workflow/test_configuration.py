@@ -224,8 +224,8 @@ def test_a_part_of_a_record_ends_after_it_has_begun(
 
 def test_records_share_the_relative_error_of_their_sensor() -> None:
     """One caliper run, one error of the scale: no record averages it away."""
-    own = {"volts_per_radian": {"value": 2.0, "sd": 0.5}, "from": "the table of records"}
-    run = {"volts_per_radian": {"value": -3.85, "sd": 0.0077}, "from": "the caliper run"}
+    own = {"volts_per_radian": {"value": 2.0, "sd": 0.5}, "shared": False}
+    run = {"volts_per_radian": {"value": -3.85, "sd": 0.0077}, "shared": True}
     record = Record("x", "simulated")
     results = [RecordResult(record, None, calibration) for calibration in (own, run, run)]
     assert common_relative_sd(results) == pytest.approx(0.002)

@@ -7,7 +7,7 @@ in the angle it is ordinary (weighted) least squares.
 """
 
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,7 +18,7 @@ from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Z95, Estimate, chi_square_p_value
-from pendpipe.files import read_text
+from pendpipe.files import fields_of, plain, read_text
 from pendpipe.levels import FALSE_ALARM
 from pendpipe.recording import decimal_step
 
@@ -174,7 +174,7 @@ class Calibration:
     """
 
     volts_per_radian: Estimate
-    offset: Estimate
+    offset: Estimate = field(metadata={"json": "offset_volts"})
     covariance: float
     angle_rad: FloatArray
     volts: FloatArray
@@ -182,36 +182,14 @@ class Calibration:
     angle_sd_rad: FloatArray
     residual_sd_volts: float
     chi2_p_value: float
-    linearity: Linearity | None
+    linearity: Linearity | None = field(metadata={"json": "linear"})
 
     def as_json(self) -> dict[str, Any]:
         """Return the form in which it is kept on disk."""
-        columns = zip(
-            self.angle_rad.tolist(),
-            self.volts.tolist(),
-            self.volts_sd.tolist(),
-            self.angle_sd_rad.tolist(),
-            strict=True,
-        )
-        names = ("angle_rad", "volts", "volts_sd", "angle_sd_rad")
-        curve = self.linearity
-        return {
-            "schema_version": 1,
-            "volts_per_radian": self.volts_per_radian.as_json(),
-            "offset_volts": self.offset.as_json(),
-            "covariance": self.covariance,
-            "residual_sd_volts": self.residual_sd_volts,
-            "chi2_p_value": self.chi2_p_value,
-            "linear": None
-            if curve is None
-            else {
-                "p_value": curve.p_value,
-                "largest_deviation": curve.largest_deviation,
-                "quadratic": curve.quadratic.as_json(),
-                "cubic": curve.cubic.as_json(),
-            },
-            "points": [dict(zip(names, row, strict=True)) for row in columns],
-        }
+        found, names = fields_of(self), ("angle_rad", "volts", "volts_sd", "angle_sd_rad")
+        rows = zip(*(found.pop(name) for name in names), strict=True)
+        points = [dict(zip(names, row, strict=True)) for row in rows]
+        return dict(plain({"schema_version": 1, **found, "points": points}))
 
     def __str__(self) -> str:
         """Say the result in a few lines."""

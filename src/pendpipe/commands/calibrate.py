@@ -108,7 +108,7 @@ def _of_record(arguments: Arguments) -> None:
     metres needs none: ``"volts_per_radian": null``.
     """
     recording = read_plain(arguments.file)
-    constant, warnings = None, list[str]()
+    constant, shared, warnings = None, False, list[str]()
     given = arguments.volts_per_radian
     own = given if given is not None else recording.number("volts_per_radian", arguments.file)
     if recording.quantity != "volts":
@@ -118,7 +118,7 @@ def _of_record(arguments: Arguments) -> None:
         constant = {"value": own, "sd": 0.0, "unit": "V/rad"}
         warnings = ["the sensor constant is given without an uncertainty"]
     elif arguments.sensor is not None:
-        origin, result = "the caliper run", read_json(arguments.sensor)
+        origin, shared, result = "the caliper run", True, read_json(arguments.sensor)
         constant, warnings = result["volts_per_radian"], _range_warnings(recording, result)
     else:
         raise InputError(
@@ -128,7 +128,7 @@ def _of_record(arguments: Arguments) -> None:
         )
     if short := recording.metadata.get("incomplete"):
         warnings = [*warnings, f"the recording is incomplete: {short}"]
-    content = {"volts_per_radian": constant, "warnings": warnings, "from": origin}
+    content = {"volts_per_radian": constant, "warnings": warnings, "from": origin, "shared": shared}
     write_json(arguments.out, {"schema_version": 1, **content})
 
 

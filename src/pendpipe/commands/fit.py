@@ -218,7 +218,7 @@ def _table(arguments: Arguments) -> int:
     content = {
         "schema_version": 1,
         "fits": found,
-        "together": [each.as_json() for each in together(fits, mean=arguments.mean)],
+        "together": together(fits, mean=arguments.mean),
     }
     if arguments.out:
         write_fits(arguments.out, fits, content)

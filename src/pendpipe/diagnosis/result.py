@@ -55,38 +55,39 @@ class Diagnosis(Outcome):
         """Return the content of ``diagnosis.json``."""
         held, found = self.held_out, {each.identifier for each in self.effects}
         densities = (held.before, held.after, held.gain, held.gain_sd) if held else _NOT_HELD
-        content: dict[str, Any] = plain(
-            {
-                "schema_version": 1,
-                "baseline": {"name": self.baseline_name, **self.baseline.as_json()},
-                "restoring": self.restoring,
-                "drag_form": self.drag_form,
-                "noise_rms_rad": self.noise_rms_rad,
-                "verdict": self.verdict,
-                "p_value": self.p_value,
-                "effects": self.effects,
-                "improved": self.improved,
-                "held_out": dict(zip(_DENSITIES, densities, strict=True)),
-                "prediction": held,
-                "unexplained": {
-                    "residual_rms_rad": self.improved.residual_rms_rad,
-                    "p_value": self.unexplained_p_value,
-                },
-                "remainder": self.remainder,
-                "small_amplitudes": self.small_swings,
-                "statement": self.statement,
-                "summary": self.summary,
-                "details": self.details,
-                "excluded": [
-                    {"id": name, "p_value": p} for name, p in self.scanned if name not in found
-                ],
-                "figures": (),
-                "warnings": self.warnings,
-                "provenance": self.provenance,
-                **({"recordings": self.recordings} if self.recordings else {}),
-            }
+        return dict(
+            plain(
+                {
+                    "schema_version": 1,
+                    "baseline": {"name": self.baseline_name, **self.baseline.as_json()},
+                    "restoring": self.restoring,
+                    "drag_form": self.drag_form,
+                    "noise_rms_rad": self.noise_rms_rad,
+                    "verdict": self.verdict,
+                    "p_value": self.p_value,
+                    "effects": self.effects,
+                    "improved": self.improved,
+                    "held_out": dict(zip(_DENSITIES, densities, strict=True)),
+                    "prediction": held,
+                    "unexplained": {
+                        "residual_rms_rad": self.improved.residual_rms_rad,
+                        "p_value": self.unexplained_p_value,
+                    },
+                    "remainder": self.remainder,
+                    "small_amplitudes": self.small_swings,
+                    "statement": self.statement,
+                    "summary": self.summary,
+                    "details": self.details,
+                    "excluded": [
+                        {"id": name, "p_value": p} for name, p in self.scanned if name not in found
+                    ],
+                    "figures": (),
+                    "warnings": self.warnings,
+                    "provenance": self.provenance,
+                    **({"recordings": self.recordings} if self.recordings else {}),
+                }
+            )
         )
-        return content
 
     def save(
         self, folder: str | Path, *, figures: bool = True, force: bool = False
@@ -153,19 +154,20 @@ def not_analysable(
     nothing = FittedModel({}, math.nan, math.nan, math.nan)
     answer = f"This recording can't be analysed: {reason}."
     empty = Diagnosis(baseline, nothing, nothing, math.nan, (), None, math.nan).to_dict()
-    content: dict[str, Any] = plain(
-        {
-            **empty,
-            "restoring": None,
-            "drag_form": None,
-            "verdict": "not-analysable",
-            "reason": reason,
-            "held_out": dict.fromkeys(_DENSITIES),
-            "statement": answer,
-            "summary": Summary(f"not analysable: {reason}"),
-            "details": "",
-            "provenance": provenance or {},
-        },
-        only_finite=True,
+    return dict(
+        plain(
+            {
+                **empty,
+                "restoring": None,
+                "drag_form": None,
+                "verdict": "not-analysable",
+                "reason": reason,
+                "held_out": dict.fromkeys(_DENSITIES),
+                "statement": answer,
+                "summary": Summary(f"not analysable: {reason}"),
+                "details": "",
+                "provenance": provenance or {},
+            },
+            only_finite=True,
+        )
     )
-    return content

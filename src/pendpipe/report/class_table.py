@@ -61,10 +61,6 @@ class Together(NamedTuple):
     chi2: float
     p_value: float
 
-    def as_json(self) -> dict[str, Any]:
-        """Return its form in JSON."""
-        return self._asdict() | {"mean": self.mean.as_json()}
-
     def __str__(self) -> str:
         mean, unit = self.mean, self.mean.unit
         if math.isnan(mean.value):

@@ -102,7 +102,7 @@ def common_relative_sd(results: list[RecordResult]) -> float:
     shared = [
         result.calibration["volts_per_radian"]
         for result in results
-        if result.calibration.get("from") == "the caliper run"
+        if result.calibration.get("shared")
     ]
     return float(shared[0]["sd"]) / abs(float(shared[0]["value"])) if shared else 0.0
 

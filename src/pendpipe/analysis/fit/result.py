@@ -217,45 +217,41 @@ class FitResult(Fitted):
     def to_dict(self) -> dict[str, Any]:
         """Return the content of ``fit.json``."""
         limit = self.quality_factor_limit or Estimate(math.nan, math.nan, "", (math.nan, math.nan))
-        content: dict[str, Any] = plain(
-            {
-                "schema_version": 1,
-                **fields_of(self),
-                "backbone": self.backbone,
-                "period_check": self.period_check,
-                "period": self.period,
-                "quality_factors": self.quality_factors,
-                "damping": self.damping(),
-                "quality_factor_limit": limit,
-                "covariance": {"order": PARAMETERS, "matrix": self.covariance},
-            }
+        return dict(
+            plain(
+                {
+                    "schema_version": 1,
+                    **fields_of(self),
+                    "backbone": self.backbone,
+                    "period_check": self.period_check,
+                    "period": self.period,
+                    "quality_factors": self.quality_factors,
+                    "damping": self.damping(),
+                    "quality_factor_limit": limit,
+                    "covariance": {"order": PARAMETERS, "matrix": self.covariance},
+                }
+            )
         )
-        return content
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> FitResult:
         """Rebuild a result from the content of ``fit.json``."""
-        kept = {each.name: each.metadata.get("json", each.name) for each in fields(cls)}
-        found: dict[str, Any] = {
-            here: content[there] for here, there in kept.items() if there in content
-        }
-        # An estimate is told by its keys, and null where it is a number is NaN.
-        for name, entry in found.items():
-            if isinstance(entry, dict) and "sd" in entry:
-                found[name] = Estimate.from_json(entry)
-            elif isinstance(entry, list):
-                found[name] = tuple(entry)
+        names = ((each.name, each.metadata.get("json", each.name)) for each in fields(cls))
+        there = {here: content[name] for here, name in names if content.get(name) is not None}
+        found: dict[str, Any] = {name: _read(entry) for name, entry in there.items()}
         found |= {name: number(content[name]) for name in _NUMBERS}
-        found["parameters"] = {
-            name: Estimate.from_json(entry) for name, entry in content["parameters"].items()
-        }
+        found["parameters"] = {name: _read(each) for name, each in content["parameters"].items()}
         found["decrement_check"] = tuple(Check(**check) for check in content["decrement_check"])
         shown, matrix = content.get("backbone"), content["covariance"]["matrix"]
-        return cls(
-            **found,
-            covariance=np.array(matrix, dtype=np.float64),
-            shown=shown and Backbone.from_json(shown),
-        )
+        found["shown"] = shown and Backbone.from_json(shown)
+        return cls(**found, covariance=np.array(matrix, dtype=np.float64))
+
+
+def _read(entry: Any) -> Any:
+    """Return an estimate, told by its keys, a tuple, or what else an entry is."""
+    if isinstance(entry, dict) and "sd" in entry:
+        return Estimate.from_json(entry)
+    return tuple(entry) if isinstance(entry, list) else entry
 
 
 _NUMBERS: Final = ("noise_rms_rad", "residual_rms_rad", "chi2_per_dof")
