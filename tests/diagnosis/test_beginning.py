@@ -319,8 +319,8 @@ def diagnoses_agree(name: str, one: View, other: View) -> None:
     assert second.verdict == first.verdict
     assert second.p_value == pytest.approx(first.p_value, rel=0.01)
     assert second.noise_rms_rad == pytest.approx(size * first.noise_rms_rad, rel=1e-4)
-    left = size * first.unexplained_rms_rad
-    assert second.unexplained_rms_rad == pytest.approx(left, rel=1e-5)
+    left = size * first.improved.residual_rms_rad
+    assert second.improved.residual_rms_rad == pytest.approx(left, rel=1e-5)
     # Averages: the errors go as the root of probabilities, which are the same to 0.02 of 0.2.
     same(first.improved.parameters, second.improved.parameters, change, errors=0.05)
     assert [each.identifier for each in second.effects] == [

@@ -121,7 +121,7 @@ def test_a_period_that_jumps_is_quoted_in_the_mean_with_its_span() -> None:
     # A curve of 12 % shares with the fit, whose period is known to 150 ppm.
     assert quotes.sd < 0.5 * 2e-4 * FREQUENCY_HZ
     assert span == pytest.approx((T0_S / 1.0002, T0_S), abs=0.2e-4)
-    assert outcome.to_dict()["improved"]["period_span_s"] == span
+    assert outcome.to_dict()["improved"]["period_span_s"] == list(span)
     assert "s in the mean, drifting by 2" in outcome.summary.quote
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from pendpipe.analysis.noise import noise_rms
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics.kernel import kernel
+from pendpipe.levels import deviations
 
 _PER_HALF_CYCLE: Final = 40
 """Samples a half cycle that are kept: a turning point is then low by 0.03 %."""
@@ -104,8 +105,8 @@ def _find_extremes(values: FloatArray, least: float, found: IntArray) -> int:
     return count
 
 
-SEEN: Final = 6.5
-"""Standard deviations of the noise from which a swing is seen."""
+SEEN: Final = deviations(1e8)
+"""Standard deviations of the noise from which a swing is seen: the largest of 10^8 readings."""
 _SMALL: Final = 0.15
 """Of both neighbours: a swing below is a ripple."""
 

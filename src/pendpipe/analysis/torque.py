@@ -19,15 +19,13 @@ TOP: Final = 3.13
 """Amplitude in rad beyond which a half swing says nothing of the frequency."""
 
 
-_CLEAR: Final = 3.0
-"""Standard deviations by which an amplitude stands out of the noise."""
 _LARGE: Final = 0.2
 """Of the largest amplitude: below, sin x lengthens the period by 4 % of what it does there."""
 _FEWEST: Final = 6
 """Turning points: the times have four numbers, among them the coefficient and a drift."""
 SEEN: Final = 3.0
 """Standard deviations from which an amplitude, or a coefficient, is seen, and up to which the
-coefficient may be off."""
+coefficient may be off: chance makes one of 400 so large."""
 _NEAR: Final = 0.2
 """How near to 1 it must be where sin x removes most of chi^2."""
 
@@ -128,7 +126,7 @@ def phases(
 def clear(points: TurningPoints, least: float = 0.0) -> TurningPoints:
     """Take those below the top that stand out of the noise, and above a part of the largest."""
     amplitude = points.amplitude_rad
-    seen = (amplitude > _CLEAR * points.angle_sd_rad) & (amplitude < TOP)
+    seen = (amplitude > SEEN * points.angle_sd_rad) & (amplitude < TOP)
     return points.chosen(seen & (amplitude > least * np.max(amplitude, where=seen, initial=0.0)))
 
 

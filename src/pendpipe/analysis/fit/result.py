@@ -239,12 +239,18 @@ class FitResult(Fitted):
         names = ((each.name, each.metadata.get("json", each.name)) for each in fields(cls))
         there = {here: content[name] for here, name in names if content.get(name) is not None}
         found: dict[str, Any] = {name: _read(entry) for name, entry in there.items()}
-        found |= {name: number(content[name]) for name in _NUMBERS}
-        found["parameters"] = {name: _read(each) for name, each in content["parameters"].items()}
-        found["decrement_check"] = tuple(Check(**check) for check in content["decrement_check"])
-        shown, matrix = content.get("backbone"), content["covariance"]["matrix"]
-        found["shown"] = shown and Backbone.from_json(shown)
-        return cls(**found, covariance=np.array(matrix, dtype=np.float64))
+        shown, known = content.get("backbone"), content["covariance"]
+        places = [PARAMETERS.index(name) for name in known["order"]]
+        covariance = np.zeros((len(PARAMETERS), len(PARAMETERS)))
+        covariance[np.ix_(places, places)] = np.array(known["matrix"], dtype=np.float64)
+        found |= {
+            **{name: number(content[name]) for name in _NUMBERS},
+            "parameters": {name: _read(each) for name, each in content["parameters"].items()},
+            "decrement_check": tuple(Check(**check) for check in content["decrement_check"]),
+            "shown": shown and Backbone.from_json(shown),
+            "covariance": covariance,
+        }
+        return cls(**found)
 
 
 def _read(entry: Any) -> Any:

@@ -210,8 +210,6 @@ _PHASE_WANTED: Final = 0.01
 """Phase, in rad, to which the smoothed times should be known."""
 _BLOCK: Final = 8
 """Half cycles followed at once, at least."""
-_VISIBLE: Final = 3.0
-"""Standard deviations of the mean amplitude from which swings are still seen."""
 
 
 def first_places(rough: Rough) -> Places:
@@ -303,7 +301,7 @@ def _visible(measured: Measured, noise: float) -> bool:
     if not weight.any():
         return False
     mean = float(np.sum(weight * np.nan_to_num(measured.amplitude)) / weight.sum())
-    return mean > _VISIBLE * noise / float(np.sqrt(weight.sum()))
+    return mean > _SEEN * noise / float(np.sqrt(weight.sum()))
 
 
 _LOCKED: Final = 0.1
@@ -578,7 +576,8 @@ def _local_lines(
 _LEAST_SHARE: Final = 0.3
 """Of the readings that its neighbours have; a half cycle with fewer is not kept."""
 _SEEN: Final = 3.0
-"""Standard deviations by which the last half cycle must stand out, with its neighbours."""
+"""Standard deviations by which the last half cycle, with its neighbours, or the mean of those that
+are followed must stand out: chance makes one of 400 do so."""
 
 
 def finished(
