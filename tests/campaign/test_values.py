@@ -91,7 +91,7 @@ def test_eq_17_at_the_papers_record() -> None:
 @pytest.mark.slow
 def test_pulls_of_every_number_are_normal() -> None:
     """Over campaigns whose inputs are off by what the configuration states."""
-    design, count = default(0.0), 30
+    design, count = default(0.0), 16
     low_1, low_7 = number_of("water-low-1"), number_of("water-low-7")
     pulls: dict[str, list[float]] = {}
     for seed in range(count):

@@ -149,7 +149,6 @@ _READINGS: dict[str, Callable[[], FloatArray]] = {
     "dropped-samples": _dropped,
     "camera-geometry": _pivot_misplaced,
     "two steps": _two_steps,
-    "two": lambda: with_effects("equilibrium-step", "tone-pickup"),
     "linear": lambda: other_engine(LINEAR),
 }
 

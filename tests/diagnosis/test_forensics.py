@@ -487,10 +487,8 @@ def judged(record: Fitted) -> dict[str, tuple[float, float]]:
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-@pytest.mark.parametrize(("slower", "larger"), [(1.0 / 16.0, 64.0), (8.0, 1.0 / 32.0)])
-def test_a_fault_is_as_clear_in_other_units(
-    fault: str, slower: float, larger: float, clean: FloatArray
-) -> None:
+def test_a_fault_is_as_clear_in_other_units(fault: str, clean: FloatArray) -> None:
+    slower, larger = 1.0 / 16.0, 64.0
     record = FAULTS[fault].make(clean, np.random.default_rng([17, 5]))
     scaled = fitted(
         Scaled(rate_hz=AIR.rate_hz / slower, slower=slower, larger=larger),
