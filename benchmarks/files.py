@@ -1,4 +1,4 @@
-"""Are strangers' files read right, are their periods right, is a green light ever false.
+"""Are others' files read right, are their periods right, is a green light ever false.
 
     python -m benchmarks.files [--only NAME] [--number N]
 
@@ -38,7 +38,7 @@ Row = dict[str, Any]
 
 @cache
 def judge_of(place: str, name: str) -> Any:
-    """The module that a collection of strangers brings."""
+    """The module that a collection of others brings."""
     sys.path.insert(0, str(SHARED / "strangers" / place))
     return importlib.import_module(name)
 
@@ -52,14 +52,14 @@ def rows() -> list[tuple[str, str]]:
     }
     second = judge_of("second", "cases")
     files = dict.fromkeys(case["file"] for case in second.CASES)
-    strangers = [
+    second = [
         name
         for name in files
         if hashlib.sha256(Path(second.p(name)).read_bytes()).digest() not in taken
     ]
     return [
         *(("recordings", row["file"]) for row in of_shared_files()),
-        *(("second", name) for name in strangers),
+        *(("second", name) for name in second),
         *(("third", case["id"]) for case in of_third()),
         *(("inputs4", row["file"]) for row in kinds()),
     ]

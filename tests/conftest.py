@@ -54,18 +54,19 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Name the tests that should carry the mark `slow`: ``pytest -m "not slow"`` is to be quick."""
-    passed = terminalreporter.getreports("passed")
-    took = {
-        one.nodeid: dict(one.user_properties)["cpu_s"]
-        for one in passed
-        if one.when == "call" and "slow" not in one.keywords
-    }
-    for name, seconds in sorted(took.items()):
-        if seconds > MARGIN * SLOW_S:
-            terminalreporter.line(
-                f"{name}: {seconds:.1f} s of processor: mark it slow", yellow=True
-            )
+    """Name the tests that should carry the mark `slow`: ``pytest -m "not slow"`` is to be quick.
+
+    With ``--durations=20`` also the twenty that took most processor time, on a busy machine too.
+    """
+    calls = [one for one in terminalreporter.getreports("passed") if one.when == "call"]
+    took = {one.nodeid: dict(one.user_properties)["cpu_s"] for one in calls}
+    quick = {one.nodeid for one in calls if "slow" not in one.keywords}
+    asked = terminalreporter.config.getoption("durations") or 0
+    for place, name in enumerate(sorted(took, key=took.__getitem__, reverse=True)):
+        late = name in quick and took[name] > MARGIN * SLOW_S
+        if late or place < asked:
+            words = f"{name}: {took[name]:.1f} s of processor" + ": mark it slow" * late
+            terminalreporter.line(words, yellow=late)
 
 
 @pytest.fixture(scope="session")

@@ -33,8 +33,8 @@ def test_a_retired_word_stays_retired() -> None:
     words = retired()
     assert len(words) > 10
     any_of_them = re.compile(
-        # "lopsided" in quotation marks is the challenge's label.
-        rf"(?<![a-z\"])({'|'.join(map(re.escape, words))})(?![a-z])",
+        # "lopsided" in quotation marks is the challenge's label; names of folders are no words.
+        rf"(?<![a-z\"/`])({'|'.join(map(re.escape, words))})(?![a-z])",
         re.IGNORECASE,
     )
     found = [

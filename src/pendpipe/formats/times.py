@@ -41,7 +41,7 @@ _TICKS: Final = (
     (1e-9, "nanoseconds"),
 )
 _OTHER_PERIODS: Final = 0.01
-"""How often a swing lies outside: two of 190 files of strangers do, one a balance of 211 s."""
+"""How often a swing lies outside: two of 190 files of others do, one a balance of 211 s."""
 
 
 @dataclass

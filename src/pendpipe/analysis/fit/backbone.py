@@ -64,7 +64,7 @@ class _Shape(NamedTuple):
     scatter: float
     """Variance of the points about it over their own."""
     left: FloatArray
-    """Points less the likeliest curve, in units of what they scatter by, shape (n,)."""
+    """Points less the most likely curve, in units of what they scatter by, shape (n,)."""
 
 
 @dataclass(frozen=True)
