@@ -57,7 +57,7 @@ class Answer:
         tables = [in_columns(list(zip(*table, strict=True))) for table in self.tables]
         return [
             _fitting(heads, width),
-            *(f"  {line}" for line in self.remarks),
+            *(_within(f"  {line}", width) for line in self.remarks),
             *(_within(f"  {title:<22}{text}", width) for title, text in self.rows),
             *(f"  {row}" for row in _fitting(tables, width - 2).splitlines()),
             *([f"Copy: {self.sentence}"] if self.sentence else []),
@@ -92,9 +92,10 @@ def _fitting(texts: list[str], width: float) -> str:
 
 
 def _within(line: str, width: float) -> str:
-    """Leave out the last clauses of a line until it is short enough."""
-    while len(line) > width and "; " in line:
-        line = line.rpartition("; ")[0]
+    """Leave out the last clauses of a line until it is short enough, then what explains them."""
+    for mark in ("; ", ": "):
+        while len(line) > width and mark in line:
+            line = line.rpartition(mark)[0]
     return line
 
 

@@ -403,7 +403,7 @@ def test_a_law_that_contradicts_the_decay_is_not_printed(tmp_path: Path, answer_
     asked += ["--fix", "b=0.04"]
     printed = answer_of(asked, 2)
     assert printed.out.splitlines()[0].endswith("RED")
-    assert printed.out.splitlines()[1].startswith("  the fitted law contradicts the decay: at ")
+    assert printed.out.splitlines()[1].startswith("  the law contradicts the decay; at ")
     assert "−dy/dt" not in printed.out
     assert printed.err.splitlines()[0].startswith(f"pendpipe: {tmp_path / 'decay.csv'}: ")
     content = json.loads((tmp_path / "fit.json").read_text())

@@ -27,6 +27,7 @@ from pendpipe.analysis.turning_points import (
     is_turning_points,
     read_turning_points,
 )
+from pendpipe.answer import WIDTH
 from pendpipe.arguments import FILES, Arguments, command, name_of, print_answer, read_motion, tell
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import over
@@ -188,7 +189,8 @@ def _scale_percent(arguments: Arguments) -> float | None:
 def _text(arguments: Arguments, result: FitResult) -> str:
     """The answer in words."""
     answer = answer_of(result, law=arguments.accept)
-    return "\n".join(answer.lines(name_of(arguments.file), inf))
+    width = inf if arguments.verbose else WIDTH
+    return "\n".join(answer.lines(name_of(arguments.file), width))
 
 
 def _status(arguments: Arguments, result: FitResult) -> int:

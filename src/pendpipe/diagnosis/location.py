@@ -20,6 +20,8 @@ from pendpipe.effects.curves import Curve
 from pendpipe.estimate import Z95, Estimate
 from pendpipe.quantities import after_number, compact, listed, with_error
 
+_ROUNDING: Final = 1e-9
+"""Of the usual size: a motion is right to 1e-10 of itself, and a curve below tells of that."""
 _INTERVAL_SHARE: Final = 0.9
 """Part of what an effect explains that its intervals hold."""
 _LARGE_PHASE_RAD: Final = 0.3
@@ -85,7 +87,8 @@ def curve_told(fit: Fit, effect: Curve, unit: str) -> dict[str, Any]:
     for name, both in curves_of(fit, effect, whole, odd=effect.is_torque).items():
         subject, larger, smaller = effect.words[name]
         value, sd = (each[right] / at if effect.is_torque else each for each in both)
-        beyond = np.flatnonzero(np.abs(value) > Z95 * sd)
+        whole_size = 1.0 if effect.is_torque else abs(effect.scale(fit.model.pendulum(fit.value)))
+        beyond = np.flatnonzero(np.abs(value) > np.maximum(Z95 * sd, _ROUNDING * whole_size))
         sides = np.split(beyond, np.flatnonzero(np.diff(np.sign(value[beyond]))) + 1)
         here = max(sides, key=lambda side: float(np.abs(value[side]).sum()))
         total = float(np.abs(value[here]).sum())

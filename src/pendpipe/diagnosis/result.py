@@ -11,7 +11,7 @@ from pendpipe.analysis.fit.result import drawer_of
 from pendpipe.diagnosis.found import FittedModel
 from pendpipe.diagnosis.outcome import Outcome
 from pendpipe.diagnosis.summary import Summary, details_of, summarise
-from pendpipe.files import plain
+from pendpipe.files import finite, plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,7 +56,7 @@ class Diagnosis(Outcome):
         held, found = self.held_out, {each.identifier for each in self.effects}
         densities = (held.before, held.after, held.gain, held.gain_sd) if held else _NOT_HELD
         return dict(
-            plain(
+            finite(
                 {
                     "schema_version": 1,
                     "baseline": {"name": self.baseline_name, **self.baseline.as_json()},

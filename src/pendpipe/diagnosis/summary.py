@@ -148,10 +148,16 @@ class Summary:
         short = self.headline
         for cause in self.missing:
             short = short.replace(cause, cause if cause.endswith("together)") else _bare(cause))
+        shorter = short
+        for cause in self.missing:
+            first, *others = cause.split(" or ")
+            if len(others) > 1:
+                p = cause.rpartition(" (")[2]
+                shorter = shorter.replace(cause, f"{first} or {len(others)} others ({p}")
         of_q = [each for each in self.consequence if each.quantity == "Q"]
         fewer = [each for each in self.consequence if each not in of_q[1:-1]]
         tables = (_table(self.consequence), _table(fewer)) if self.consequence else ()
-        headlines = self.headline, short
+        headlines = self.headline, short, shorter
         return Answer(headlines, tuple(self.pairs()), tables=tables, sentence=self.sentence)
 
 

@@ -187,7 +187,7 @@ def _light(result: Fitted, problems: Sequence[str]) -> tuple[Light, str]:
         worst = max(wrong, key=lambda check: abs(check.excess))
         of = "amplitudes" if result.method == "amplitudes" else "turning points"
         said = worst.sentence(result.parameters["amplitude"].unit, of)
-        return "red", f"the fitted law contradicts the decay: {said}"
+        return "red", f"the law contradicts the decay; {said}"
     if problems:
         return "amber", f"don't quote {'; nor '.join(problems)}"
     if result.method == "amplitudes":

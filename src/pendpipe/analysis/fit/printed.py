@@ -169,7 +169,7 @@ def facts(result: Fitted, *, law: bool = False) -> Iterator[tuple[str, str]]:
             f"{_number(each.quality_factor)} at {size(each.amplitude_rad, unit)}" for each in known
         )
         lawless = result.light == "red" or result.lawless is not None
-        without = f", {WITHOUT_LAW}" if lawless else ""
+        without = f"; {WITHOUT_LAW}" if lawless else ""
         if math.isfinite(period.value):
             yield "Q", found + without
         yield "damping", damping(result)
@@ -214,7 +214,7 @@ def energy(result: Fitted) -> str:
             seen.append(f"{percent(share)} {SHORT[name]} ({name})")
         else:
             limits.append(f"{SHORT[name]} ({name}) < {100.0 * share.bounds95[1]:.2g} %")
-    return f"{', '.join([*seen, *limits])}, at {where}"
+    return "; ".join([f"{', '.join(seen[:2])}, at {where}", *seen[2:], *limits])
 
 
 def percent(share: Estimate) -> str:
@@ -250,7 +250,7 @@ def misfit(result: Fitted) -> str:
     if not result.refuted:
         return f"the fit follows the {what} to {share:.2g} %; nothing but noise is left"
     story = "right to 5 %, but the law is" if result.light == "green" else "the law is"
-    missed = f"the fit misses the {what} by {share:.2g} % (noise {noise:.1g} %)"
+    missed = f"it misses the {what} by {share:.2g} % (noise {noise:.1g} %)"
     return f"{missed}: {story} not the whole story"
 
 
