@@ -119,11 +119,8 @@ def test_a_period_that_jumps_is_quoted_in_the_mean_with_its_span() -> None:
     quotes, span = outcome.improved.parameters["frequency"], outcome.improved.period_span_s
     assert abs(quotes.value - FREQUENCY_HZ * (1.0 + 0.6 * 2e-4)) < 3.0 * quotes.sd
     # A curve stands for the fit, which knows it badly: the mean variance has its share of that.
-    (first,), fit = outcome.effects, outcome.fit
-    assert fit is not None
-    shared = first.indistinguishable[0]
-    assert shared.id == "unnamed-measurement"
-    assert quotes.sd < 1.1 * math.sqrt(shared.probability) * fit.parameters["frequency"].sd
+    shared = dict(outcome.effects[0].indistinguishable)["unnamed-measurement"]
+    assert quotes.sd < 1.1 * math.sqrt(shared) * outcome.fit.parameters["frequency"].sd  # type: ignore[union-attr]
     assert span == pytest.approx((T0_S / 1.0002, T0_S), abs=0.2e-4)
     assert outcome.to_dict()["improved"]["period_span_s"] == list(span)
     assert "s in the mean, drifting by 2" in outcome.summary.quote
