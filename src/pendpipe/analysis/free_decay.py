@@ -34,6 +34,8 @@ from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.quantities import after_number, with_error
 from pendpipe.recording import Recording
 
+_FEWEST: Final = 8
+"""Readings of a piece: fewer hold no half cycle with its neighbours."""
 # Loose on purpose: an impulse or a beat is physics to be diagnosed, not to be cut.
 _RISE: Final = 1.3
 _FALL: Final = 0.3
@@ -387,7 +389,7 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     # A gap of a period parts the record: in it the motion could have done anything.
     edges = (np.flatnonzero(np.diff(time) > 2.0 * half_period) + 1).tolist()
     parted = pairwise([0, *edges, len(time)])
-    pieces = [slice(first, last) for first, last in parted if last - first >= 8]
+    pieces = [slice(first, last) for first, last in parted if last - first >= _FEWEST]
     parts = [half_cycles(time[piece], values[piece], least, half_period) for piece in pieces]
     gapless = pieces == [slice(0, len(time))]
     whole = parts[0] if gapless else half_cycles(time, values, least, half_period)
@@ -448,9 +450,9 @@ def _looked_at(
     time, values = recording.time_s[usable], recording.values[usable]
     span = float(np.ptp(values)) if len(values) else 0.0
     refuse_if(
-        len(values) < 8 or span == 0.0,
+        len(values) < _FEWEST or span == 0.0,
         place,
-        "the reading never changes" if len(values) >= 8 else f"{len(values)} samples only",
+        "the reading never changes" if len(values) >= _FEWEST else f"{len(values)} samples only",
         "choose another with --channel or --column",
         NotAnalysableError,
     )

@@ -250,36 +250,31 @@ def _presumed(diagnosis: Outcome) -> str:
     return " and ".join(names)
 
 
-def class_of(effect: FoundEffect) -> list[tuple[float, str]]:
-    """Return the members of an effect's class with their names, the most probable first."""
-    rivals = [(p, name_of(identifier)) for identifier, p in effect.indistinguishable]
+def class_of(effect: FoundEffect) -> list[tuple[float, str, str]]:
+    """Return an effect's class: probability, name and identifier, the most probable first."""
     own = effect.name if effect.kind != "unnamed" else name_of(effect.identifier)
-    # The sort is stable: of the equally probable the effect itself is first, as in `_leader`.
-    return sorted([(effect.probability, own), *rivals], key=lambda member: -member[0])
-
-
-def _leader(effect: FoundEffect) -> tuple[float, str]:
-    """The most probable member of an effect's class: its probability and identifier."""
-    rivals = [(p, identifier) for identifier, p in effect.indistinguishable]
-    return max([(effect.probability, effect.identifier), *rivals], key=lambda member: member[0])
+    rivals = [(p, name_of(identifier), identifier) for identifier, p in effect.indistinguishable]
+    # The sort is stable: of the equally probable the effect itself is first.
+    members = [(effect.probability, own, effect.identifier), *rivals]
+    return sorted(members, key=lambda member: -member[0])
 
 
 def _is_described(effect: FoundEffect) -> bool:
     """Whether a curve is more likely than not: it describes a cause, and names none."""
-    p, identifier = _leader(effect)
+    p, _, identifier = class_of(effect)[0]
     return identifier in UNNAMED and p >= NAMED
 
 
 def _named(effect: FoundEffect) -> str:
     """Name a cause, or its class, that is more likely than not; nothing otherwise."""
     members = class_of(effect)
-    total = sum(p for p, _ in members)
+    total = sum(member[0] for member in members)
     if total < NAMED or _is_described(effect):
         return ""
     if members[0][0] >= NAMED:
-        numbers = numbers_of(effect) if _leader(effect)[1] == effect.identifier else ""
+        numbers = numbers_of(effect) if class_of(effect)[0][2] == effect.identifier else ""
         return f"{members[0][1]} ({numbers})" if numbers else members[0][1]
-    likely = [name for p, name in members if p >= LISTED]
+    likely = [name for p, name, _ in members if p >= LISTED]
     return f"{' or '.join(likely)} ({percent(min(total, 1.0))} together)"
 
 
@@ -287,7 +282,7 @@ def _candidate(effect: FoundEffect) -> str:
     members = class_of(effect)
     if _is_described(effect):
         return f"described by {effect.name if effect.kind == 'unnamed' else members[0][1]}"
-    likely = [f"{name} ({percent(p)})" for p, name in members if p >= CANDIDATE]
+    likely = [f"{name} ({percent(p)})" for p, name, _ in members if p >= CANDIDATE]
     return " or ".join(likely)
 
 
@@ -369,7 +364,7 @@ def _matters(diagnosis: Outcome, changes: Sequence[Change], unit: str) -> str:
 
 def _where(diagnosis: Outcome, found: Sequence[FoundEffect]) -> str:
     """Say where the most probable effect shows, and where the rest lies."""
-    first = max(found, key=_leader)
+    first = max(found, key=lambda each: class_of(each)[0][0])
     text = first.location.summary
     curves = [each.curve for each in (first, *found) if each.curve and each.curve["summary"]]
     told = list({curve["name"]: curve["summary"] for curve in reversed(curves)}.values())
@@ -416,7 +411,7 @@ def _test_of(effect: FoundEffect) -> str:
     tests = {each.identifier: each.discriminating_test for each in reversed(CURVES)}
     tests |= {each.identifier: each.discriminating_test for each in CATALOGUE}
     tests[effect.identifier] = effect.discriminating_test
-    return tests.get(_leader(effect)[1], effect.discriminating_test)
+    return tests.get(class_of(effect)[0][2], effect.discriminating_test)
 
 
 def _decide_by(found: Sequence[FoundEffect]) -> str:
@@ -426,9 +421,9 @@ def _decide_by(found: Sequence[FoundEffect]) -> str:
         for each in found
         if each.probability < _SURE or any(p > 1.0 - _SURE for _, p in each.indistinguishable)
     ]
-    leaders = [(*_leader(each), each) for each in doubted]
-    best = max(leaders, key=lambda one: (one[1] not in UNNAMED, one[0]), default=None)
-    return _test_of(best[2]) if best else ""
+    leaders = [(class_of(each)[0], each) for each in doubted]
+    best = max(leaders, key=lambda one: (one[0][2] not in UNNAMED, one[0][0]), default=None)
+    return _test_of(best[1]) if best else ""
 
 
 def _quote(diagnosis: Outcome, changes: Sequence[Change]) -> str:
@@ -446,8 +441,7 @@ def _quote(diagnosis: Outcome, changes: Sequence[Change]) -> str:
         if q.sd < 0.1 * q.value
     ]
     if good:
-        ends = good if len(good) < 3 else [good[0], good[-1]]
-        said.append(f"Q {', '.join(ends)}")
+        said.append(f"Q {', '.join(dict.fromkeys((good[0], good[-1])))}")
     moved = [each.quantity for each in changes if each.quantity in "abc" and each.moved_sd > Z95]
     if moved:
         said.append(f"not {', '.join(moved)}")
@@ -537,9 +531,9 @@ def _effect(effect: FoundEffect) -> str:
     # What a test has counted, its location says.
     wanted = declared(effect.identifier) or effect.parameters
     members = class_of(effect)
-    whose = "" if _leader(effect)[1] == effect.identifier else f"of {effect.name}: "
+    whose = "" if class_of(effect)[0][2] == effect.identifier else f"of {effect.name}: "
     parts = [
-        ", ".join(f"{name} {percent(p)}" for p, name in members)
+        ", ".join(f"{name} {percent(p)}" for p, name, _ in members)
         + (" (not distinguished)" if len(members) > 1 else ""),
         *(
             f"{whose}{name} = {each}"

@@ -244,7 +244,9 @@ class FitResult(Fitted):
         covariance = np.zeros((len(PARAMETERS), len(PARAMETERS)))
         covariance[np.ix_(places, places)] = np.array(known["matrix"], dtype=np.float64)
         found |= {
-            **{name: number(content[name]) for name in _NUMBERS},
+            "noise_rms_rad": number(content["noise_rms_rad"]),
+            "residual_rms_rad": number(content["residual_rms_rad"]),
+            "chi2_per_dof": number(content["chi2_per_dof"]),
             "parameters": {name: _read(each) for name, each in content["parameters"].items()},
             "decrement_check": tuple(Check(**check) for check in content["decrement_check"]),
             "shown": shown and Backbone.from_json(shown),
@@ -260,7 +262,6 @@ def _read(entry: Any) -> Any:
     return tuple(entry) if isinstance(entry, list) else entry
 
 
-_NUMBERS: Final = ("noise_rms_rad", "residual_rms_rad", "chi2_per_dof")
 _MIXED: Final = 0.95
 """Correlation of a and b from which a record tells their sum, and not each."""
 _UNCLEAR: Final = 0.1

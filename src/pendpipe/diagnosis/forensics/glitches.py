@@ -80,7 +80,7 @@ def find(evidence: Evidence) -> Finding | None:
     tail = _noise_tail(ordered, step)
     mask, size = np.zeros(len(data), dtype=bool), np.zeros(len(data))
     for _ in range(_ROUNDS):
-        beyond = (error > 3.0) & used & ~mask & (p_value < _EXPECTED_BY_CHANCE)
+        beyond = (error > _LARGE_SD) & used & ~mask & (p_value < _EXPECTED_BY_CHANCE)
         expected = np.count_nonzero(used) * tail.beyond(error[beyond]) * repeats[beyond]
         beyond[beyond] = expected < _EXPECTED_BY_CHANCE
         if noise.coloured:
