@@ -15,7 +15,6 @@ from pendpipe import cli
 from pendpipe.analysis.fit import fit_recording
 from pendpipe.analysis.fit.by_points import fit_energies
 from pendpipe.analysis.fit.fixed import Held
-from pendpipe.analysis.fit.least_squares import covariance
 from pendpipe.analysis.fit.printed import facts, pendulum_of
 from pendpipe.analysis.fit.start import start_values
 from pendpipe.analysis.torque import elliptic, restoring_of, sine_coefficient
@@ -26,6 +25,7 @@ from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.estimate import Estimate
 from pendpipe.files import read_json
 from pendpipe.recording import Recording
+from pendpipe.solve import covariance
 
 from .test_one_fit import SHARED, pendulum, recorded
 

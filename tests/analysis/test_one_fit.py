@@ -427,7 +427,7 @@ def test_a_fit_that_did_not_settle_is_no_result(monkeypatch: pytest.MonkeyPatch)
     def hasty(*arguments: object, **options: object) -> object:
         return minimise(*arguments, **options | never)  # type: ignore[arg-type]
 
-    minimise, never = by_waveform.minimise, {"most": 1, "chi2": None, "tolerance": 0.0}
+    minimise, never = by_waveform.minimise, {"rounds": 1, "trust": -1.0, "tolerance": 0.0}
     monkeypatch.setattr(by_waveform, "minimise", hasty)
     time = np.arange(0.0, 200.0, 0.05)
     decay = recorded(sample(Eq8(OMEGA, 0.1, 0.0, 0.01), Release(-0.3, 0.1), time), time, 1e-5)

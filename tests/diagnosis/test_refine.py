@@ -17,7 +17,6 @@ from pendpipe.diagnosis.projection import finer_shape
 from pendpipe.diagnosis.refine import (
     Fit,
     best_fit,
-    damping_for,
     fit_in_growing_window,
     pulled,
     refine,
@@ -217,14 +216,6 @@ def test_a_start_beyond_all_numbers_is_none() -> None:
         assert best_fit(fit.model, data, noise, [beyond]) is None
         found = best_fit(fit.model, data, noise, [beyond, fit.value])
     assert found.chi2 == pytest.approx(fit.chi2, rel=1e-6)
-
-
-def test_a_step_without_a_limit_is_not_damped_however_long_it_is() -> None:
-    """Where its length overflows, too: an imitation that leaves 1e152 of itself."""
-    pull, squares = np.array([-1e152, 1e142]), np.array([5.9, 1e-9])
-    with np.errstate(over="ignore"):
-        assert damping_for(pull, squares, np.inf) == 0.0
-    assert damping_for(np.array([3.0]), np.array([1.0]), 1.0) == pytest.approx(2.0, rel=1e-2)
 
 
 # Which effects are refitted, and which refits are carried to the end.

@@ -6,7 +6,7 @@ What these say of k, the drag and the added mass stands beside the numbers of th
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from pendpipe.campaign.design import Design, Terms, solve, terms_of
 from pendpipe.campaign.effects import CATALOGUE, CampaignEffect
 from pendpipe.estimate import Estimate, chi_square_p_value
 from pendpipe.physics import POTENTIAL_FLOW_ADDED_MASS
+from pendpipe.solve import Bounds, Problem, Weighted, minimise
 
 STEP: Final = 1e-4
 """Of the derivatives, in standard deviations of the priors."""
@@ -23,6 +24,8 @@ STEP: Final = 1e-4
 _APPROACH: Final = (1e-4, 1e-2)
 """Weights of the data on the way to the optimum. Where weights nearly balance, the frequency that
 is configured can be several times the measured one, by a million of its standard deviations."""
+_TOLERANCE: Final = 1e-9
+"""Of chi^2: 3e-5 of a standard deviation."""
 
 
 class Candidate(NamedTuple):
@@ -134,7 +137,7 @@ class JointFit:
     @property
     def free(self) -> BoolArray:
         """Which unknowns are fitted, shape (unknowns,): all but the sizes on their bounds."""
-        low, high = _limits(self.design, self.added)
+        low, high = _bounds(self.design, self.added)
         return np.asarray((self.unknowns > low) & (self.unknowns < high))
 
     @cached_property
@@ -216,26 +219,30 @@ def joint_fit(
     first = np.zeros(count + len(added))
     if start is not None:
         first[: len(start)] = start[: len(first)]
-    low, high = _limits(design, added)
+    bounds = _bounds(design, added)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        free = np.ones(len(first), dtype=np.bool_)
-        for weight in _APPROACH if start is None else ():
-            loose = data._replace(whitening=weight * data.whitening)
-            first = _least_squares(design, loose, added, first, free)
-        at = _least_squares(design, data, added, first, free)
-        outside = (at < low) | (at > high)
-        if outside.any():  # that size stays on its bound
-            at = _least_squares(design, data, added, np.clip(at, low, high), ~outside)
-        at = np.clip(at, low, high)
-        rows = _residuals(design, data, added, at), _derivatives(design, data, added, at)
-    return JointFit(design, data, added, at, *rows)
+        for weight in (*(_APPROACH if start is None else ()), 1.0):
+            weighted = data._replace(whitening=weight * data.whitening)
+            problem = Problem(partial(_weighted, design, weighted, added), bounds)
+            found = minimise(problem, first, tolerance=_TOLERANCE)
+            first = found.value
+        return JointFit(design, data, added, first, -found.point.residual, found.point.columns)
 
 
-def _limits(design: Design, added: Sequence[Candidate]) -> tuple[FloatArray, FloatArray]:
+def _weighted(
+    design: Design, data: Measured, added: Sequence[Candidate], unknowns: FloatArray
+) -> Weighted:
+    return Weighted(
+        unknowns,
+        -_residuals(design, data, added, unknowns),
+        partial(_derivatives, design, data, added),
+    )
+
+
+def _bounds(design: Design, added: Sequence[Candidate]) -> Bounds:
     """Least and largest values of the unknowns, of which the effects' sizes alone are bound."""
     nuisances = [(-np.inf, np.inf)] * len(design.nuisances)
-    low, high = np.array([*nuisances, *(one.bounds for one in added)]).T
-    return low, high
+    return Bounds(*np.array([*nuisances, *(one.bounds for one in added)]).T)
 
 
 def chi2_near(
@@ -247,35 +254,6 @@ def chi2_near(
         basis, _ = np.linalg.qr(_derivatives(design, data, added, unknowns))
     left = residuals - basis @ (basis.T @ residuals)
     return float(left @ left)
-
-
-def _least_squares(
-    design: Design,
-    data: Measured,
-    added: Sequence[Candidate],
-    first: FloatArray,
-    free: BoolArray,
-) -> FloatArray:
-    """Return the unknowns at the optimum, those not `free` held where they are."""
-    from scipy.optimize import least_squares
-
-    def whole(part: FloatArray) -> FloatArray:
-        at = first.copy()
-        at[free] += part
-        return at
-
-    def residuals(part: FloatArray) -> FloatArray:
-        return _residuals(design, data, added, whole(part))
-
-    def derivatives(part: FloatArray) -> FloatArray:
-        return np.asarray(_derivatives(design, data, added, whole(part))[:, free])
-
-    # From zero: MINPACK's first step goes as far as its starting point lies from there.
-    start = np.zeros(int(free.sum()))
-    found = least_squares(
-        residuals, start, jac=derivatives, method="lm", xtol=1e-10, ftol=1e-10, max_nfev=100
-    )
-    return whole(found.x)
 
 
 def _residuals(

@@ -19,7 +19,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data, gather
 from pendpipe.diagnosis.unwrapped import anchored
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.dynamics.eq8 import Restoring
+from pendpipe.dynamics.eq8 import Drag, Restoring
 from pendpipe.effects.baseline import (
     BASELINE,
     OFFSET,
@@ -94,23 +94,24 @@ def begin(
     torque: Restoring = fit.restoring if fit else restoring_of(angles, stated=stated)
     if beats:
         torque = "linear"
-    start = start_values(angles, held, torque, samples=samples)
-    value, drag = start.value[: len(BASELINE)].copy(), None
+    drag: Drag = "energy"
     starts: tuple[Start, ...] = ()
-    span = usable_span(samples, angles, start)
+    if fit is not None and fit.motion is not None and fit.light != "red":
+        law, release = fit.motion
+        drag, value = law.drag, values_of(law, release, fit.value("offset"))
+        span = usable_span(samples, angles, value, at_release=release.time_s >= samples.time_s[0])
+    else:
+        start = start_values(angles, held, torque, samples=samples)
+        value = start.value[: len(BASELINE)].copy()
+        span = usable_span(samples, angles, value, at_release=start.before == 0)
     if beats:
         # The turning points of a beat tell nothing of either mode.
         span = slice(None)
         readings = samples.time_s, samples.values, 2.0 * math.pi / float(value[OMEGA])
         starts = tuple(each for effect in CATALOGUE if (each := effect.start(*readings)))
         value = values_of(starts[0].law, starts[0].release, float(value[OFFSET]))
-    elif fit is not None and fit.motion is not None and fit.light != "red":
-        law, release = fit.motion
-        drag, value = law.drag, values_of(law, release, fit.value("offset"))
-        before = int(release.time_s < samples.time_s[0])
-        span = usable_span(samples, angles, start._replace(value=value, before=before))
     omega, angle = float(value[OMEGA]), float(value[START])
-    own = replace(pendulum_of(value), restoring=torque, drag=drag or "energy")
+    own = replace(pendulum_of(value), restoring=torque, drag=drag)
     data = gather(
         samples.time_s[span],
         samples.values[span],
@@ -136,7 +137,7 @@ def begin(
         parts=held.parts,
         scale=1.0 if is_angle else abs(angle),
         restoring=torque,
-        drag=drag or "energy",
+        drag=drag,
         seen="rate" if samples.unit == "rad/s" else "angle",
     )
     data, model, at = _before_the_stop(data, model, value)

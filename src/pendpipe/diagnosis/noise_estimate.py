@@ -22,6 +22,7 @@ from scipy.ndimage import maximum_filter1d, median_filter
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.noise import TAPS, Noise, level_of_counts
+from pendpipe.solve import Bounds, Problem, Quadratic, Summed, minimise
 
 if TYPE_CHECKING:
     from pendpipe.diagnosis.data import Data
@@ -437,19 +438,14 @@ def _maximised(
         return float(number @ log + total @ np.exp(-log) + at @ at)
 
     information = 0.5 * columns.T @ (columns * number[:, None]) + np.eye(len(at))
-    root = np.asarray(np.linalg.cholesky(information), dtype=np.float64)
-    here = cost(at)
-    for _ in range(_ROUNDS):
+
+    def derivatives(at: FloatArray) -> Quadratic:
         pull = 0.5 * columns.T @ (total * np.exp(-(columns @ at)) - number) - at
-        step = np.linalg.solve(root.T, np.linalg.solve(root, pull))
-        expected = float(pull @ step)
-        for part in (1.0, 0.3, 0.1, 0.03):
-            there = cost(at + part * step)
-            if there < here:
-                at, here = at + part * step, there
-                break
-        else:
-            break
-        if expected < _CONVERGED:
-            break
-    return at, root
+        return Quadratic(cost(at), pull, information)
+
+    def there(at: FloatArray) -> Summed:
+        return Summed(at, cost(at), derivatives)
+
+    problem = Problem(there, Bounds.none(len(at)))
+    found = minimise(problem, at, tolerance=_CONVERGED, rounds=_ROUNDS)
+    return found.value, np.asarray(np.linalg.cholesky(information), dtype=np.float64)

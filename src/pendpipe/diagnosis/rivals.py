@@ -20,7 +20,7 @@ from pendpipe.diagnosis.detect import (
 )
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.projection import finer_shape
-from pendpipe.diagnosis.refine import ROUNDS, SETTLED, Fit, Refining, pulled
+from pendpipe.diagnosis.refine import ROUNDS, SETTLED, Evaluation, Fit, fitted, pulled, searching
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.spectrum import OFF_HARMONIC
@@ -30,6 +30,7 @@ from pendpipe.effects import Effect
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.curves import Curve
 from pendpipe.estimate import Estimate
+from pendpipe.solve import Search
 
 CLASS: Final = 6.0
 """Twice the log-likelihood ratio within which effects are of one class."""
@@ -507,28 +508,26 @@ def _limit(
     data: Data,
     noise: Noise,
     leads: Sequence[Lead],
-    refits: Sequence[Refining | None],
+    refits: Sequence[Search[Evaluation] | None],
 ) -> float:
     """Return the largest useful chi^2, from the best credible refit so far."""
     found = [
-        (refit, lead.effect.kind == "unnamed")
+        (fitted(refit), lead.effect.kind == "unnamed")
         for lead, refit in zip(leads, refits, strict=True)
-        if refit and believable(base, refit.fit, lead.effect)
+        if refit and believable(base, fitted(refit), lead.effect)
     ]
     if not found:
         return math.inf
-    best = min((refit for refit, _ in found), key=lambda refit: refit.chi2)
-    scale = Scale.of(best.fit, data, noise)
+    best = min((fit for fit, _ in found), key=lambda fit: fit.chi2)
+    scale = Scale.of(best, data, noise)
     if not scale.clean:
         return scale.within(NEAR)
-    return min(
-        useful_chi2(refit.chi2, base.chi2 - refit.chi2, drawn=drawn) for refit, drawn in found
-    )
+    return min(useful_chi2(fit.chi2, base.chi2 - fit.chi2, drawn=drawn) for fit, drawn in found)
 
 
 def _started(
     base: Fit, data: Data, noise: Noise, lead: Lead, held: Sequence[int], little: float
-) -> Refining | None:
+) -> Search[Evaluation] | None:
     """Start a lead's refit: its first rounds."""
     effect = lead.effect
     if isinstance(effect, ReleasedParameter):
@@ -538,7 +537,7 @@ def _started(
     )
     try:
         model = base.model.adding(effect)
-        refit = Refining(model, data, noise, start, held=held, little=little)
+        refit = searching(model, data, noise, start, held=held, little=little)
         refit.go(_FIRST_ROUNDS)
     except (NoMotionError, np.linalg.LinAlgError):
         return None
@@ -550,9 +549,9 @@ def _sizes(effect: Effect) -> FloatArray:
     return np.ones(1) if effect.parameter_free else np.zeros(min(effect.sizes, effect.count))
 
 
-def _finished(refit: Refining, useful: float) -> Fit | None:
+def _finished(refit: Search[Evaluation], useful: float) -> Fit | None:
     try:
         refit.go(ROUNDS - _FIRST_ROUNDS, useful)
     except (NoMotionError, np.linalg.LinAlgError):
         return None
-    return refit.fit
+    return fitted(refit)

@@ -149,7 +149,7 @@ def _angle_of(
     """The angle arcsin((s - s0)/L) of a pendulum's position s, with the s0 and L of its fit."""
     from pendpipe.analysis.fit import fit_recording, fitted_arm
 
-    arm = fitted_arm(prepare(part, place), points, length, scale_of(part))
+    arm = fitted_arm(points.readings or prepare(part, place), points, length, scale_of(part))
     fit = fit_recording(part, points=points, restoring="sine", length=arm, place=place)
     sine = (part.values - fit.value("offset")) / arm.value
     step = None if part.resolution is None else part.resolution / arm.value
@@ -197,7 +197,7 @@ def diagnose_decay(
     """
     fixed = fixed or {}
     check_fixed(fixed, baseline)
-    samples = with_true_step(prepare(part, place))
+    samples = with_true_step(points.readings or prepare(part, place))
     progress("fitting Eq. 8 to all readings")
     fit = _fit_of(part, points, baseline, fixed, restoring, place)
     try:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from pendpipe.analysis.fit.fitted import PARAMETERS, units
-from pendpipe.analysis.fit.least_squares import Bounds, intervals95
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.refine import Fit
@@ -20,6 +19,7 @@ from pendpipe.effects.baseline import OFFSET, OMEGA, TIME, A, B, C
 from pendpipe.effects.curves import Curve, damping_curve
 from pendpipe.effects.model import Evaluated
 from pendpipe.estimate import Estimate, over
+from pendpipe.solve import Bounds, intervals95
 
 _FIRST_CYCLES: Final = 4.0
 """Cycles of the model by which its first turning point is differentiated."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from pendpipe.arrays import AnyArray, FloatArray, of_neighbours
 from pendpipe.estimate import Estimate
+from pendpipe.solve import Bounds, NoStartError, minimise, squares
 
 _WINDOWS: Final = 120
 """Of a record at most: fifteen beats of eight each."""
@@ -73,7 +74,7 @@ def two_modes(
     -----
     The motion's slow complex amplitude is the sum of two complex exponentials. These are the
     eigenvalues of the step from one part of its strongest two-dimensional signal space to the next
-    (ESPRIT); a few Gauss-Newton steps on all readings follow.
+    (ESPRIT), at which a fit of all readings begins.
     """
     found = _fitted(time_s, values, half_period_s, 2)
     if found is None or not _explained(found[-1], values):
@@ -139,19 +140,42 @@ def _fitted(
     space = np.linalg.svd(rows, full_matrices=False)[2][:count].T
     step = np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0]
     rates = np.log(np.linalg.eigvals(step)) / width + 1j * slow
-    for _ in range(_STEPS):
+    waves = np.exp(np.outer(time, rates))
+    columns = np.stack([np.ones_like(time), *waves.real.T, *waves.imag.T], axis=1)
+    level_and_sizes = np.linalg.lstsq(columns, values, rcond=None)[0]
+    start = np.array([*level_and_sizes, *rates.real, *rates.imag])
+    # Each number's own chance is small against the scatter of what the start leaves.
+    scale = math.sqrt(max(float(np.mean((values - columns @ level_and_sizes) ** 2)), 1e-300))
+
+    def residual(value: FloatArray) -> FloatArray:
+        rates, size = _complex(value, count)
         waves = np.exp(np.outer(time, rates))
-        columns = [np.ones_like(time), *waves.real.T, *waves.imag.T]
-        level, *sizes = np.linalg.lstsq(np.stack(columns, axis=1), values, rcond=None)[0]
-        size = np.array(sizes[:count]) - 1j * np.array(sizes[count:])
+        return np.asarray((values - value[0] - (waves * size).real.sum(axis=1)) / scale)
+
+    def derivatives(value: FloatArray) -> FloatArray:
+        rates, size = _complex(value, count)
+        waves = np.exp(np.outer(time, rates))
         by_rate = time[:, None] * waves * size
-        design = np.stack([*columns, *by_rate.real.T, *(-by_rate.imag).T], axis=1)
-        residual = values - level - (waves * size).real.sum(axis=1)
-        change = np.linalg.lstsq(design, residual, rcond=None)[0][-2 * count :]
-        rates = rates + change[:count] + 1j * change[count:]
-        if not np.all(np.abs(rates - 1j * slow) < _APART * slow):
-            return None
-    return rates, size, design, residual
+        parts = waves.real, waves.imag, by_rate.real, -by_rate.imag
+        return np.concatenate([np.ones((len(time), 1)), *parts], axis=1) / scale
+
+    low, high = bounds = Bounds.none(len(start))
+    low[-2 * count : -count], high[-2 * count : -count] = -_APART * slow, _APART * slow
+    low[-count:], high[-count:] = (1.0 - _APART) * slow, (1.0 + _APART) * slow
+    try:
+        found = minimise(squares(residual, derivatives, bounds), start, rounds=_STEPS)
+    except NoStartError:
+        return None
+    if not np.all((low < found.value) & (found.value < high)):
+        return None
+    design, left = scale * derivatives(found.value), scale * residual(found.value)
+    return *_complex(found.value, count), design, left
+
+
+def _complex(value: FloatArray, count: int) -> tuple[AnyArray, AnyArray]:
+    """The complex rates and sizes of modes, from a level and their real and imaginary parts."""
+    _, cosine, sine, grown, turned = np.split(value, np.cumsum([1, count, count, count]))
+    return grown + 1j * turned, cosine - 1j * sine
 
 
 def slow_amplitude(phase: FloatArray, values: FloatArray, edges: list[int]) -> AnyArray:

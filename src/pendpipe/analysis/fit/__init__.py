@@ -101,7 +101,8 @@ def fit_recording(
         or the search did not come to its end.
     """
     check_fixed(fixed or {}, baseline)
-    samples = prepare(recording, place)
+    readings = points.readings if points is not None else None
+    samples = prepare(recording, place) if readings is None else readings
     points = turning_points_of(samples, place) if points is None else points
     position = restoring == "sine" and samples.unit == "m"
     arm = fitted_arm(samples, points, length, scale_of(recording)) if position else None
@@ -112,7 +113,7 @@ def fit_recording(
         points = replace(points, notes=(*points.notes, said))
     length_m, stated = arm.value if arm else None, recording.unit_is_stated
     result = _fit(samples, method, restoring, baseline, fixed, points, length_m, place, stated)
-    result = replace(result, points=points)
+    result = replace(result, points=replace(points, readings=None))
     if arm and arm.sd:
         result = replace(with_scale(result, 100.0 * arm.sd / arm.value), scale_percent=None)
     if points.beats:

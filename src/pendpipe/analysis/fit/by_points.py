@@ -7,6 +7,7 @@ amplitude: they also tell which torque the half swings favour, and where fits of
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -14,15 +15,6 @@ import numpy as np
 from pendpipe.analysis.fit.fitted import Baseline
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness, tail
-from pendpipe.analysis.fit.least_squares import (
-    Bounds,
-    Quadratic,
-    bounded_step,
-    covariance,
-    intervals95,
-    minimise,
-    moved,
-)
 from pendpipe.analysis.fit.period import Period, fit_period
 from pendpipe.analysis.fit.result import FitResult, result_of
 from pendpipe.analysis.half_cycles import LEAST_HALF_CYCLES
@@ -33,6 +25,15 @@ from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.levels import REFUTED
 from pendpipe.physics.decay import amplitude_and_gradient
+from pendpipe.solve import (
+    Bounds,
+    Priors,
+    Quadratic,
+    covariance,
+    intervals95,
+    minimise,
+    squares,
+)
 
 ENVELOPE: Final = ("a", "b", "c", "amplitude", "level")
 Decay = Callable[..., tuple[FloatArray, FloatArray]]
@@ -77,38 +78,32 @@ def fit_envelope(
     decay
         The amplitude at some times by y0, a, b, c, with its derivatives; Eq. 14.
     """
-    time = points.time_s - points.time_s[0]
+    time, sd = points.time_s - points.time_s[0], points.angle_sd_rad
     measured = points.amplitude_rad
     shared = -points.level_coupling * points.side
 
-    def evaluate(value: FloatArray) -> Quadratic:
+    def residual(value: FloatArray) -> FloatArray:
         a, b, c, y0, level = value
-        model, gradient = decay(time, y0, a, b, c)
-        jacobian = np.concatenate([gradient[:, 1:], gradient[:, :1], shared[:, None]], axis=1)
-        if not np.all(np.isfinite(jacobian)):
-            return Quadratic(np.inf, np.zeros(5), np.eye(5))
-        return _quadratic(points, measured - model - shared * level, jacobian, float(level))
+        return np.asarray((measured - decay(time, y0, a, b, c)[0] - shared * level) / sd)
+
+    def derivatives(value: FloatArray) -> FloatArray:
+        a, b, c, y0, _ = value
+        gradient = decay(time, y0, a, b, c)[1]
+        columns = np.concatenate([gradient[:, 1:], gradient[:, :1], shared[:, None]], axis=1)
+        return columns / sd[:, None]
 
     start, held = _start(points, fixed or {})
-    found = minimise(evaluate, start, BOUNDS, held=held)
+    found = minimise(squares(residual, derivatives, BOUNDS, _of_level(points)), start, held=held)
     a, b, c, y0, level = found.value
     model = decay(time, y0, a, b, c)[0]
-    residual = measured - model - shared * level
-    return EnvelopeFit(found.value, found.quadratic, held, model, residual, found.converged)
+    left = measured - model - shared * level
+    return EnvelopeFit(found.value, found.point.quadratic, held, model, left, found.converged)
 
 
-def _quadratic(
-    points: TurningPoints, residual: FloatArray, jacobian: FloatArray, level: float
-) -> Quadratic:
-    """chi^2 of the amplitudes and of the level's error, which has a prior."""
-    weighted = jacobian / points.angle_sd_rad[:, None] ** 2
-    normal, gradient = weighted.T @ jacobian, weighted.T @ residual
+def _of_level(points: TurningPoints) -> Priors:
+    """The prior of the level's error."""
     least = 1e-12 * float(np.max(np.abs(points.amplitude_rad)))
-    prior = 1.0 / max(points.level_sd_rad, least) ** 2
-    normal[4, 4] += prior
-    gradient[4] -= prior * level
-    chi2 = float(np.sum((residual / points.angle_sd_rad) ** 2)) + prior * level**2
-    return Quadratic(chi2, gradient, normal)
+    return Priors(np.array([4]), np.zeros(1), np.array([max(points.level_sd_rad, least)]))
 
 
 def fit_energies(
@@ -137,7 +132,7 @@ def fit_energies(
     share
         The hysteretic share of b.
     """
-    measured = points.amplitude_rad
+    measured, sd, prior = points.amplitude_rad, points.angle_sd_rad, _of_level(points)
     base = np.array([0.0, 0.0, 0.0, measured[0], 0.0])
     start, held = _with_held(points, fixed or {}, base)
     free = fit_period(points, measured, (0.0, 0.0, 0.0), share=share, restoring=restoring)
@@ -152,15 +147,23 @@ def fit_energies(
         losses = _half_swing_losses(y, share, sine=sine) * swings
         lost = np.cumsum(np.pad(losses, ((0, 0), (1, 0))), axis=1)
         jacobian = np.stack([*(-lost / slope), slope[0] / slope, shared], axis=1)
-        residual = (energy - energy[0]) / slope - jacobian @ (start - base)
-        quadratic = _quadratic(points, residual, jacobian, float(start[4]))
-        step = bounded_step(quadratic.normal, quadratic.gradient, BOUNDS.about(start), held)
-        value = BOUNDS.clip(start + step)
-        residual = residual - jacobian @ step
-        model = measured - residual - shared * value[4]
+        change, rows = (energy - energy[0]) / slope, jacobian / sd[:, None]
+        problem = squares(
+            partial(_of_line, change / sd, rows, base), partial(_rows_of_line, rows), BOUNDS, prior
+        )
+        found = minimise(problem, start, held=held)
+        residual = change - jacobian @ (found.value - base)
+        model = measured - residual - shared * found.value[4]
         y = np.clip(model, 0.0, most)
-    quadratic = moved(quadratic, step)
-    return EnvelopeFit(value, quadratic, held, model, residual, converged=True)
+    return EnvelopeFit(found.value, found.point.quadratic, held, model, residual, converged=True)
+
+
+def _rows_of_line(rows: FloatArray, _: FloatArray) -> FloatArray:
+    return rows
+
+
+def _of_line(data: FloatArray, rows: FloatArray, base: FloatArray, value: FloatArray) -> FloatArray:
+    return np.asarray(data - rows @ (value - base))
 
 
 def _half_swing_losses(y: FloatArray, share: float, *, sine: bool) -> FloatArray:

@@ -16,13 +16,6 @@ import numpy as np
 from pendpipe.analysis.fit.fitted import Baseline, DragForm
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness, combined, judge
-from pendpipe.analysis.fit.least_squares import (
-    AS_PROMISED,
-    Minimum,
-    covariance,
-    intervals95,
-    minimise,
-)
 from pendpipe.analysis.fit.result import FitResult, result_of
 from pendpipe.analysis.fit.rounding import best_noise
 from pendpipe.analysis.fit.share import Marginal, marginalised
@@ -36,6 +29,16 @@ from pendpipe.dynamics import turning_points_with_jacobian
 from pendpipe.dynamics.eq8 import OFFSET, OMEGA, SHARE, TIME, A, B, C, Restoring
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import with_error
+from pendpipe.solve import (
+    AS_PROMISED,
+    Bounds,
+    Minimum,
+    NoStartError,
+    Summed,
+    covariance,
+    intervals95,
+    minimise,
+)
 
 _DITHERED: Final = 0.4
 """Noise over step from which the rounding is as good as random."""
@@ -76,7 +79,7 @@ class Fitted:
     """
 
     problem: Waveform
-    minimum: Minimum
+    minimum: Minimum[Summed]
     held: tuple[int, ...]
     start: Start
     marginal: Marginal | None = None
@@ -89,7 +92,7 @@ class Fitted:
     @property
     def chi2(self) -> float:
         """Of the readings, in units of the noise that was weighed with."""
-        return self.minimum.quadratic.chi2
+        return self.minimum.chi2
 
     @property
     def noise_rms(self) -> float:
@@ -191,7 +194,7 @@ def fitted_waveform(
     fixed_values = Held(fixed or {}, baseline, points.apparent_frequency_hz)
     held = fixed_values.places
     start = start_values(points, fixed_values, restoring, samples=samples)
-    span = usable_span(samples, points, start)
+    span = usable_span(samples, points, start.value, at_release=start.before == 0)
     seen: Seen = "position" if length_m else "rate" if samples.unit == "rad/s" else "angle"
     problem = Waveform(
         samples.time_s[span],
@@ -239,17 +242,23 @@ def _fitted(
     start: Start,
     bar: float | None = None,
 ) -> Fitted:
-    """Minimise chi^2 from a value on: at its share, or with the share free beside a rival's."""
-    minimum = minimise(
-        problem.evaluate,
-        value,
-        problem.bounds,
-        held=(*held, SHARE) if bar is None else held,
-        tolerance=_TOLERANCE,
-        chi2=problem.chi2,
-        curved=problem.curved,
-        bar=math.inf if bar is None else bar,
-    )
+    """Minimise chi^2 from a value on: at its share, or with the share free beside a rival's.
+
+    A release that is a half period earlier would be another turning point.
+    """
+    low, high = problem.bounds
+    low[TIME] = value[TIME] - math.pi / value[OMEGA]
+    try:
+        minimum = minimise(
+            replace(problem.problem, bounds=Bounds(low, high)),
+            value,
+            held=(*held, SHARE) if bar is None else held,
+            tolerance=_TOLERANCE,
+            trust=AS_PROMISED,
+            useful=math.inf if bar is None else bar,
+        )
+    except NoStartError:
+        minimum = Minimum(Summed(value, math.inf, problem.evaluate), converged=False)
     return Fitted(problem, minimum, held, start)
 
 
@@ -283,10 +292,12 @@ def _at_mean_share(found: Fitted) -> Fitted:
     if abs(step[SHARE]) <= _SETTLED * math.sqrt(marginal.covariance[SHARE, SHARE]):
         return replace(found, marginal=marginal)
     at = problem.bounds.clip(problem.curved(minimum.value, step))
-    expected = minimum.quadratic.chi2 + marginal.chi2
-    settled = minimum.converged and abs(problem.chi2(at) - expected) < AS_PROMISED
-    there = Minimum(at, minimum.quadratic._replace(chi2=expected), minimum.converged)
-    return replace(found, minimum=there, marginal=marginal if settled else None)
+    expected = minimum.chi2 + marginal.chi2
+    there = problem.at(at)
+    settled = minimum.converged and there and abs(there.chi2 - expected) < AS_PROMISED
+    point = Summed(at, expected, problem.evaluate)
+    minimum = Minimum(point, minimum.converged)
+    return replace(found, minimum=minimum, marginal=marginal if settled else None)
 
 
 def _judged(fitted: Fitted, samples: Samples, points: TurningPoints) -> Goodness:

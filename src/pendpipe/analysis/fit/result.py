@@ -17,7 +17,6 @@ from pendpipe.analysis.fit.damping import damping_of
 from pendpipe.analysis.fit.decrement import Check, check_decrement
 from pendpipe.analysis.fit.fitted import PARAMETERS, PARTS, Fitted, units
 from pendpipe.analysis.fit.goodness import Goodness, combined
-from pendpipe.analysis.fit.least_squares import CHI2_95
 from pendpipe.analysis.fit.printed import answer_of, called, pendulum_of
 from pendpipe.analysis.fit.quality import (
     mean_square,
@@ -35,6 +34,7 @@ from pendpipe.estimate import Estimate, number
 from pendpipe.files import fields_of, plain, read_json, write_json, writing
 from pendpipe.levels import REFUTED
 from pendpipe.quantities import compact
+from pendpipe.solve import CHI2_95
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

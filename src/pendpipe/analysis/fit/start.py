@@ -100,15 +100,18 @@ def _release(
     return side * (-1.0) ** before * earlier, first_s - back, before
 
 
-def usable_span(samples: Samples, points: TurningPoints, start: Start) -> slice:
+def usable_span(
+    samples: Samples, points: TurningPoints, value: FloatArray, *, at_release: bool
+) -> slice:
     """The readings that are compared: while the motion is seen, and not about the stop.
 
-    Where Coulomb friction has stopped the pendulum is a discontinuous function of the
-    parameters; so the last half cycles before the stop are left out.
+    None is before a release that is the first turning point itself (`at_release`). Where Coulomb
+    friction has stopped the pendulum is a discontinuous function of the parameters; so the last
+    half cycles before the stop are left out.
     """
-    a, b, c, _, omega, _, time, *_ = start.value.tolist()
+    a, b, c, _, omega, _, time, *_ = value.tolist()
     half_period = math.pi / omega
-    first = time + 0.05 * half_period if start.before == 0 else samples.time_s[0]
+    first = time + 0.05 * half_period if at_release else samples.time_s[0]
     last = float(points.time_s[-1]) + 0.5 * half_period
     width = 0.5 * half_period * c
     y0, end = abs(float(points.angle_rad[0])), abs(float(points.angle_rad[-1]))

@@ -9,7 +9,6 @@ from typing import Final, Literal
 
 import numpy as np
 
-from pendpipe.analysis.fit.least_squares import Bounds, Quadratic
 from pendpipe.analysis.fit.rounding import rounded
 from pendpipe.analysis.torque import TOP
 from pendpipe.arrays import FloatArray
@@ -27,6 +26,7 @@ from pendpipe.dynamics.eq8 import (
     Restoring,
     share_of,
 )
+from pendpipe.solve import Bounds, Problem, Quadratic, Summed
 
 Seen = Literal["angle", "rate", "position"]
 
@@ -144,12 +144,19 @@ class Waveform:
         seen = turns < 2.0 * len(self.values) and bool(np.isfinite(model.stop_rad))
         return seen and release.time_s <= self.time_s[0]
 
-    def chi2(self, value: FloatArray) -> float:
-        """What `evaluate` has, without the derivatives."""
+    @property
+    def problem(self) -> Problem[Summed]:
+        """What is minimised."""
+        return Problem(self.at, self.bounds, moved=self.curved)
+
+    def at(self, value: FloatArray) -> Summed | None:
+        """chi^2 at some values; None where nothing moves, or it is overdamped."""
         try:
-            return self.deviance(self.residual(value)) if self._has_motion(value) else math.inf
+            chi2 = self.deviance(self.residual(value)) if self._has_motion(value) else math.inf
         except ValueError:
-            return math.inf
+            return None
+        count = len(self.values)
+        return Summed(value, chi2, self.evaluate, count) if math.isfinite(chi2) else None
 
     def deviance(self, residual: FloatArray) -> float:
         """Return -2 ln likelihood of some residuals."""
@@ -192,17 +199,10 @@ class Waveform:
 
     def evaluate(self, value: FloatArray) -> Quadratic:
         """chi^2, gradient and normal matrix, summed over pieces of the record."""
-        refused = Quadratic(np.inf, np.zeros(len(value)), np.eye(len(value)))
-        if not self._has_motion(value):
-            return refused
         chi2, slope, normal = 0.0, np.zeros(len(value)), np.zeros((len(value), len(value)))
         for first in range(0, len(self.values), _PIECE):
             piece = slice(first, first + _PIECE)
-            try:
-                reading, jacobian = self.read(value, self.time_s[piece])
-            except ValueError:
-                # Overdamped: far from anything that turns.
-                return refused
+            reading, jacobian = self.read(value, self.time_s[piece])
             residual = self.values[piece] - reading
             if self.step == 0.0:
                 part, score, weighted = float(residual @ residual), residual, jacobian

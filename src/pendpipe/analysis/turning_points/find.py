@@ -345,10 +345,11 @@ def turning_points_of(
     """As `find_turning_points`, of readings that are prepared already; of `long` ones in a pass."""
     points = None
     if (fine := between(samples.time_s, samples.values)) is not None:
-        return _of_few(samples, fine, place)
+        return replace(_of_few(samples, fine, place), readings=samples)
     if len(samples) > long:
         points = follow(samples, lambda head: _measured(head, place), long // 128)
-    return far_points(samples, _measured(samples, place) if points is None else points)
+    found = far_points(samples, _measured(samples, place) if points is None else points)
+    return replace(found, readings=samples)
 
 
 def _of_few(samples: Samples, fine: Between, place: str | Path) -> TurningPoints:

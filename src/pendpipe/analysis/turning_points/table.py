@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from pendpipe.cells import original
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import MARK, read_text, replaced
 from pendpipe.recording import table_lines, whole_lines
+
+if TYPE_CHECKING:
+    from pendpipe.analysis.turning_points.measure import Samples
 
 COLUMNS: Final = (
     "half_cycle",
@@ -87,6 +90,8 @@ class TurningPoints:
         Which two modes beat, where they do.
     metadata, notes
         Provenance for the file's head; and what the user should know, a clause each.
+    readings
+        From which they were measured; None of a table.
     """
 
     half_cycle: IntArray
@@ -108,6 +113,7 @@ class TurningPoints:
     beats: str = ""
     metadata: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    readings: "Samples | None" = field(default=None, repr=False, compare=False)
 
     def __len__(self) -> int:
         return len(self.time_s)

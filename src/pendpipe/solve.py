@@ -1,0 +1,779 @@
+"""One least-squares solver: bounded, damped Gauss-Newton steps, covariance and profile intervals.
+
+What is minimised is chi^2, a sum of squares of residuals r(p), those of priors among them. About a
+point, with the Jacobian J = dr/dp, chi^2 is as good as ``|r + J d|^2``; its least value within the
+bounds, and within a radius of trust, is the next step. A `Problem` says what chi^2 is at a point
+(`Point`); `Squares` has residuals and their Jacobian, `Summed` normal equations that were added up
+piece by piece, or those of a likelihood that is no sum of squares.
+
+scipy's `least_squares` takes 0.8 s to import, as long as a thousand of these fits, and 3 ms for
+five steps of five parameters. It needs the Jacobian of all readings in memory (10^8 have none), has
+no normal equations, no steps on trust, none that follow a curve, and can't be interrupted and
+resumed, as refits are that compete. So this is ours.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, Generic, NamedTuple, Self, TypeVar
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray, IntArray, scaled_qr
+
+_SLACK: Final = 1e-9
+"""Rounding error of the gradient."""
+_SAFE: Final = 1e-5
+"""Least entry of a root's diagonal with which a system is solved as it is: it loses five digits of
+sixteen, and half of them."""
+_PRECISE: Final = 1e-11
+"""Singular value over the largest from which a direction is seen."""
+_HAIR: Final = 1e-13
+"""Least square of a singular value of normal equations: their rounding error."""
+_RADIUS_MET: Final = 0.01
+"""Relative precision of the length of a damped step."""
+_LEAST_DAMPING: Final = 1e-12
+"""Of the damping of a step along the gradient: with it no length overflows."""
+_LINEAR_WITHIN: Final = 0.02
+"""Relative difference between the expected and the actual gain up to which the model counts as
+linear."""
+AS_PROMISED: Final = 0.03
+"""By how much chi^2 behind a step may differ from what is promised for the step to be the last:
+what bends the model by e standard deviations makes it differ by about 2 e."""
+_SLOW: Final = 12.5
+"""Tolerances: a search ends after three rounds that gain less."""
+_FAR_OFF: Final = 50.0
+"""Tolerances from which a step is worth several tries."""
+_LAST_STEPS: Final = 3
+"""Last steps from which the gain of further ones is extrapolated."""
+_TRIES: Final = 6
+"""Lengths of one step that are tried: from a tenth each, six reach 1e-6 of it."""
+_POOR: Final = 0.25
+_GOOD: Final = 0.75
+"""Parts of the expected gain below (above) which a step was too long (may be longer)."""
+_SHORTER: Final = (0.1, 0.5)
+"""Least and usual part of a step by which it is shortened, as More (1978) has them."""
+_LONGER: Final = 2.0
+"""Radius of the next step over the length of the last; with the two above as More (1978) has."""
+_CLOSE: Final = 0.1
+"""Of what a law is worse by than its rival."""
+_ROUNDING: Final = 1e-12
+_BY_ROUNDING: Final = 1e-6
+"""Parts of chi^2 that are gained, and promised, by rounding errors alone."""
+
+
+class Bounds(NamedTuple):
+    """Least and greatest value of each entry, infinite where there is none; shape (n,) each."""
+
+    lower: FloatArray
+    upper: FloatArray
+
+    @classmethod
+    def none(cls, size: int) -> Self:
+        """No bounds."""
+        return cls(np.full(size, -np.inf), np.full(size, np.inf))
+
+    def about(self, value: FloatArray) -> Self:
+        """The bounds of a step from `value`."""
+        return type(self)(self.lower - value, self.upper - value)
+
+    def clip(self, value: FloatArray) -> FloatArray:
+        """Put each entry within its bounds."""
+        return np.clip(value, self.lower, self.upper)
+
+
+class Quadratic(NamedTuple):
+    """chi^2 at a point, with minus half its gradient and its normal matrix."""
+
+    chi2: float
+    gradient: FloatArray
+    normal: FloatArray
+
+
+class Linear(NamedTuple):
+    """Chi^2 about a point, of what is free: ``|triangle (scale d) - right|^2`` and a constant."""
+
+    triangle: FloatArray
+    """Shape (k, n), with columns of unit length."""
+    scale: FloatArray
+    """Of the columns, shape (n,)."""
+    right: FloatArray
+    """Shape (k,)."""
+    free: IntArray
+    """Indices of what is free among all values."""
+
+    def measured(self, lengths: FloatArray) -> Self:
+        """The same, with columns measured by other lengths, which are updated to the largest."""
+        lengths[self.free] = longest = np.maximum(lengths[self.free], self.scale)
+        return self._replace(triangle=self.triangle * (self.scale / longest), scale=longest)
+
+    def falls(self, step: FloatArray) -> float:
+        """By how much chi^2 falls along a step of all values."""
+        change = self.triangle @ (self.scale * step[self.free])
+        return float(2.0 * self.right @ change - change @ change)
+
+    def step(self, room: Bounds, radius: float = math.inf) -> tuple[FloatArray, float]:
+        """The best step within `room`, and its length, which is `radius` at most.
+
+        The length is that of the changes that each value makes by itself in the residuals (More
+        1978): values that compensate each other have long steps.
+        """
+        step = np.zeros(len(room.lower))
+        floor, ceiling = room.lower[self.free] * self.scale, room.upper[self.free] * self.scale
+        best, damping = self._damped(radius)
+        if np.any(best < floor) or np.any(best > ceiling):
+            matrix = np.vstack([self.triangle, math.sqrt(damping) * np.eye(len(best))])
+            right = np.append(self.right, np.zeros(len(best)))
+            best = bounded_least_squares(matrix, right, floor, ceiling)
+        step[self.free] = best / self.scale
+        return room.clip(step), float(np.linalg.norm(best))
+
+    def _damped(self, radius: float) -> tuple[FloatArray, float]:
+        """The best step of a length, and the damping that it takes."""
+        rows, columns = self.triangle.shape
+        if rows == columns and np.abs(self.triangle.diagonal()).min(initial=1.0) > _SAFE:
+            best = np.asarray(np.linalg.solve(self.triangle, self.right), dtype=np.float64)
+            if float(np.linalg.norm(best)) <= radius:
+                return best, 0.0
+        left, singular, turned = np.linalg.svd(self.triangle, full_matrices=False)
+        seen = singular > _PRECISE * np.max(singular, initial=0.0)
+        pull, squares = (singular * (left.T @ self.right))[seen], singular[seen] ** 2
+        damping = damping_for(pull, squares, radius)
+        return turned[seen].T @ (pull / (squares + damping)), damping
+
+
+def damping_for(pull: FloatArray, squares: FloatArray, radius: float) -> float:
+    """The least damping with which a step ``pull/(squares + damping)`` is no longer than a radius.
+
+    One over its length is concave in the damping, so that Newton's steps from zero come to it from
+    below (Hebden 1973).
+    """
+    # Without a limit there is nothing to damp, and the length may overflow.
+    damping = 0.0 if math.isinf(radius) else _LEAST_DAMPING * float(np.linalg.norm(pull)) / radius
+    while not math.isinf(radius):
+        step = pull / (squares + damping)
+        length = float(np.linalg.norm(step))
+        if length <= (1.0 + _RADIUS_MET) * radius:
+            break
+        steepness = float(np.sum((step / length) ** 2 / (squares + damping)))
+        damping += (length / radius - 1.0) / steepness
+    return damping
+
+
+def of_normal(
+    normal: FloatArray, gradient: FloatArray, free: IntArray | Sequence[int] | None = None
+) -> Linear:
+    """The linear problem of ``d' H d/2 - g' d`` in what is free of d, with a root of H."""
+    chosen = np.arange(len(normal)) if free is None else np.asarray(free, dtype=np.int64)
+    part, scale = _scaled(normal, chosen)
+    right = gradient[chosen] / scale
+    try:
+        root = np.asarray(np.linalg.cholesky(part).T)
+    except np.linalg.LinAlgError:
+        root = np.zeros((1, 1))
+    if len(root) != len(part) or root.diagonal().min(initial=1.0) < _SAFE:
+        # A hair for what the readings do not tell apart.
+        squares, axes = np.linalg.eigh(part)
+        root = np.sqrt(np.maximum(squares, _HAIR))[:, None] * axes.T
+    turned = np.asarray(np.linalg.solve(root.T, right), dtype=np.float64)
+    return Linear(root, scale, turned, chosen)
+
+
+def bounded_step(
+    normal: FloatArray, gradient: FloatArray, bounds: Bounds, held: Sequence[int] = ()
+) -> FloatArray:
+    """Minimise ``d' H d/2 - g' d`` with some entries of d bounded.
+
+    Parameters
+    ----------
+    normal, gradient
+        H, shape (n, n), positive definite in what is free, and g, shape (n,).
+    bounds
+        Of d; zero is within them.
+    held
+        Entries that stay zero.
+    """
+    return of_normal(normal, gradient, _others(len(normal), held)).step(bounds)[0]
+
+
+def bounded_least_squares(
+    matrix: FloatArray, right: FloatArray, floor: FloatArray, ceiling: FloatArray
+) -> FloatArray:
+    """Minimise |matrix x - right| with floor <= x <= ceiling, by active sets.
+
+    The values move from zero (which must be within the bounds) towards the free optimum. A value
+    that meets a bound is held there, and released if that lowers the sum (Stark and Parker 1995).
+
+    Parameters
+    ----------
+    matrix, right
+        Shapes (m, n) and (m,).
+    floor, ceiling
+        Shape (n,); infinite for no bound.
+    """
+    x = np.clip(np.zeros(len(floor)), floor, ceiling)
+    held = np.zeros(len(floor), dtype=bool)
+    for _ in range(10 * len(floor) + 10):
+        goal = x.copy()
+        rest = right - matrix[:, held] @ x[held]
+        goal[~held] = np.linalg.lstsq(matrix[:, ~held], rest, rcond=1e-11)[0]
+        within = np.clip(goal, floor, ceiling)
+        out = within != goal
+        if out.any():
+            share = np.full(len(x), np.inf)
+            np.divide(within - x, goal - x, out=share, where=out)
+            met = int(np.argmin(share))
+            x = np.clip(x + max(float(share[met]), 0.0) * (goal - x), floor, ceiling)
+            x[met], held[met] = within[met], True
+            continue
+        x, pull = goal, matrix.T @ (right - matrix @ goal)
+        inwards = np.where(x <= floor, pull, -pull) * held
+        released = int(np.argmax(inwards))
+        if inwards[released] <= _SLACK * (1.0 + float(np.abs(right).max())):
+            break
+        held[released] = False
+    return x
+
+
+class Priors(NamedTuple):
+    """Normal priors of some values: each counts as one more datum."""
+
+    places: IntArray
+    mean: FloatArray
+    sd: FloatArray
+
+    def residual(self, value: FloatArray) -> FloatArray:
+        """What is to be explained of each."""
+        return (self.mean - value[self.places]) / self.sd
+
+    def rows(self, size: int) -> FloatArray:
+        """Derivatives of what explains it, shape (priors, size)."""
+        found = np.zeros((len(self.places), size))
+        found[np.arange(len(self.places)), self.places] = 1.0 / self.sd
+        return found
+
+
+NO_PRIORS: Final = Priors(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+
+
+@dataclass(frozen=True)
+class Squares:
+    """A sum of squares.
+
+    Parameters
+    ----------
+    value
+        Of the model, shape (n,).
+    residual
+        Data less model, and priors behind, each in standard deviations; shape (m,).
+    """
+
+    value: FloatArray
+    residual: FloatArray
+
+    @cached_property
+    def chi2(self) -> float:
+        """The sum."""
+        return float(self.residual @ self.residual)
+
+    @property
+    def unit(self) -> float:
+        """The chi^2 that counts as 1: more where it is a misfit beyond the noise."""
+        return 1.0
+
+    @cached_property
+    def columns(self) -> FloatArray:
+        """Derivatives of the model, shape (m, n)."""
+        raise NotImplementedError
+
+    @cached_property
+    def factored(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """QR factors of the derivatives with columns of unit length, and their lengths."""
+        if not np.all(np.isfinite(self.columns)):
+            raise np.linalg.LinAlgError("derivatives are not finite")
+        return scaled_qr(self.columns)
+
+    def linear(self, free: IntArray, at: Self | None = None) -> Linear:
+        """About another point with the derivatives here; by default here."""
+        basis, triangle, scale = self.factored
+        right = basis.T @ (at or self).residual
+        return Linear(triangle[:, free], scale[free], right, free)
+
+
+@dataclass(frozen=True)
+class Weighted(Squares):
+    """A sum of squares whose derivatives a function has, shape (m, n)."""
+
+    derivatives: Callable[[FloatArray], FloatArray]
+
+    @cached_property
+    def columns(self) -> FloatArray:
+        """Of the model."""
+        return self.derivatives(self.value)
+
+
+@dataclass(frozen=True)
+class Summed:
+    """chi^2 whose derivatives are normal equations.
+
+    Parameters
+    ----------
+    value, chi2
+        Where, and what it is there.
+    derivatives
+        Has the normal equations where they are asked for.
+    count
+        Of the data; if chi^2 is more, so is the scatter by which a step counts.
+    """
+
+    value: FloatArray
+    chi2: float
+    derivatives: Callable[[FloatArray], Quadratic]
+    count: float = math.inf
+
+    @property
+    def unit(self) -> float:
+        """The scatter's variance, in units of what was expected, where that is less."""
+        return max(1.0, self.chi2 / self.count)
+
+    @cached_property
+    def quadratic(self) -> Quadratic:
+        """About the point."""
+        return self.derivatives(self.value)
+
+    def linear(self, free: IntArray) -> Linear:
+        """About the point.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If a derivative is not finite.
+        """
+        _, gradient, normal = self.quadratic
+        if not np.isfinite(normal).all():
+            raise np.linalg.LinAlgError("derivatives are not finite")
+        return of_normal(normal, gradient, free)
+
+
+AnyPoint = TypeVar("AnyPoint", bound=Squares | Summed)
+
+
+@dataclass(frozen=True)
+class Problem(Generic[AnyPoint]):
+    """What is minimised.
+
+    Parameters
+    ----------
+    at
+        The model at some values within the bounds; None where it has none.
+    bounds
+        Of the values.
+    room
+        Within what a step from some values stays; by default the bounds.
+    moved
+        Where a step from some values ends, where more is known of the model than its derivatives.
+    places
+        Values along which chi^2 has many minima, such as an instant: such a one stays where it is
+        if a step overshoots, unless the gain is its own.
+    """
+
+    at: Callable[[FloatArray], AnyPoint | None]
+    bounds: Bounds
+    room: Callable[[FloatArray], Bounds] | None = None
+    moved: Callable[[FloatArray, FloatArray], FloatArray] = np.add
+    places: Sequence[int] | IntArray = ()
+
+
+def squares(
+    residual: Callable[[FloatArray], FloatArray],
+    derivatives: Callable[[FloatArray], FloatArray],
+    bounds: Bounds,
+    priors: Priors = NO_PRIORS,
+) -> Problem[Summed]:
+    """The problem of a function that returns data less model, and one that has the derivatives.
+
+    Parameters
+    ----------
+    residual
+        Data less model in standard deviations, shape (m,), at some values.
+    derivatives
+        Of the model (not of the residuals), shape (m, n).
+    bounds, priors
+        Of the values.
+
+    Examples
+    --------
+    >>> t, y = np.arange(4.0), np.array([2.0, 1.2, 0.75, 0.42])
+    >>> law = lambda p: p[0] * np.exp(-p[1] * t)
+    >>> by_p = lambda p: np.stack([law(p) / p[0], -t * law(p)], axis=1)
+    >>> problem = squares(lambda p: y - law(p), by_p, Bounds(np.zeros(2), np.full(2, np.inf)))
+    >>> minimise(problem, np.array([1.0, 1.0])).value.round(3)
+    array([2.   , 0.506])
+    """
+
+    def at(value: FloatArray) -> Summed | None:
+        rows = np.append(residual(value), priors.residual(value))
+
+        def quadratic(value: FloatArray) -> Quadratic:
+            columns = np.vstack([derivatives(value), priors.rows(len(value))])
+            return Quadratic(chi2, columns.T @ rows, columns.T @ columns)
+
+        chi2 = float(rows @ rows)
+        return Summed(value, chi2, quadratic) if math.isfinite(chi2) else None
+
+    return Problem(at, bounds)
+
+
+class Minimum(NamedTuple, Generic[AnyPoint]):
+    """Where a search ended."""
+
+    point: AnyPoint
+    converged: bool
+
+    @property
+    def value(self) -> FloatArray:
+        """The values there."""
+        return self.point.value
+
+    @property
+    def chi2(self) -> float:
+        """The sum of squares there."""
+        return self.point.chi2
+
+
+class NoStartError(ArithmeticError):
+    """The model has no value where a search should begin."""
+
+
+def minimise(
+    problem: Problem[AnyPoint],
+    start: FloatArray,
+    *,
+    held: Iterable[int] = (),
+    tolerance: float = 1e-5,
+    trust: float = 0.0,
+    useful: float = math.inf,
+    rounds: int = 60,
+) -> Minimum[AnyPoint]:
+    """Search for the minimum from one start; parameters are those of `Search`.
+
+    Raises
+    ------
+    NoStartError
+        If the model has no value at the start.
+    """
+    search = Search(problem, start, held=held, tolerance=tolerance, trust=trust)
+    with suppress(np.linalg.LinAlgError):
+        search.go(rounds, useful)
+    return Minimum(search.here, search.converged)
+
+
+class Search(Generic[AnyPoint]):
+    """A search for the minimum that can be interrupted and resumed.
+
+    Each step is the best within the bounds and a radius of trust, which grows where chi^2 falls as
+    the derivatives promise, and shrinks where it does not (More 1978).
+
+    Parameters
+    ----------
+    problem
+        What is minimised.
+    start
+        Where to begin, shape (n,).
+    held
+        Indices of values that are not fitted.
+    tolerance
+        Fall of chi^2 below which a step is the last: 1e-5 is 0.003 standard deviations.
+    trust
+        By how much chi^2 behind a step of its full length may differ from what is promised for it
+        to be the last. Without it, the last step is one with the derivatives of the step before.
+    little
+        The search ends after two rounds that gain less, or three that gain less than 12.5
+        tolerances.
+
+    Raises
+    ------
+    NoStartError
+        If the model has no value at the start.
+    """
+
+    def __init__(
+        self,
+        problem: Problem[AnyPoint],
+        start: FloatArray,
+        *,
+        held: Iterable[int] = (),
+        tolerance: float = 1e-5,
+        trust: float = 0.0,
+        little: float | None = None,
+    ) -> None:
+        self._problem, self._tolerance, self._trust = problem, tolerance, trust
+        self._free = _others(len(start), held)
+        self._still = self._free[~np.isin(self._free, problem.places)]
+        here = problem.at(problem.bounds.clip(start))
+        if here is None:
+            raise NoStartError
+        self.here = here
+        self._gains: list[float] = []
+        self._lengths = np.zeros(len(start))
+        self._radius = math.inf
+        little = tolerance if little is None else little
+        self._stalled = ((2, little), (3, max(little, _SLOW * tolerance)))
+        self._ended = self.converged = self.hopeless = False
+
+    @property
+    def free(self) -> IntArray:
+        """Indices of what is fitted."""
+        return self._free
+
+    def go(self, rounds: int, useful: float = math.inf) -> None:
+        """Run some rounds, or fewer if the search converges or becomes hopeless.
+
+        Parameters
+        ----------
+        rounds
+            How many.
+        useful
+            Largest chi^2 that is of any use: the search stops where the remaining rounds, gaining
+            what the last ones did, would not reach it; and the farther above it, the less chi^2
+            needs to be as promised (`trust`).
+        """
+        for left in range(rounds, 0, -1):
+            self.hopeless = self._cannot_reach(useful, left)
+            if self._ended or self.hopeless:
+                break
+            self._round(useful)
+        # The factors are as large as the derivatives; a point that is kept needs only those.
+        vars(self.here).pop("factored", None)
+
+    def _cannot_reach(self, useful: float, left: int) -> bool:
+        last = self._gains[-_LAST_STEPS:]
+        return len(last) == _LAST_STEPS and self.here.chi2 - left * sum(last) / _LAST_STEPS > useful
+
+    def _from(self, here: AnyPoint, step: FloatArray) -> AnyPoint | None:
+        """The model a step away, within the bounds; None where it has no value."""
+        return self._problem.at(self._problem.bounds.clip(self._problem.moved(here.value, step)))
+
+    def _room(self, here: AnyPoint) -> Bounds:
+        room = self._problem.room
+        return room(here.value) if room else self._problem.bounds.about(here.value)
+
+    def _round(self, useful: float) -> None:
+        """Go one step: the whole one if chi^2 falls by what it promises, else a shorter one."""
+        here, free, tries = self.here, self._free, 0
+        enough, room = self._tolerance * here.unit, self._room(here)
+        while True:
+            linear = here.linear(free).measured(self._lengths)
+            step, length = linear.step(room, self._radius)
+            expected, whole = linear.falls(step), length < self._radius
+            there = self._from(here, step)
+            if tries == 0 and len(self._still) < len(free):
+                # Along a place chi^2 has many minima: it stays, unless the gain is its own.
+                without = here.linear(self._still).measured(self._lengths)
+                lost = there is None or there.chi2 > here.chi2
+                if lost and without.falls(without.step(room, self._radius)[0]) > _POOR * expected:
+                    tries, free = 1, self._still
+                    continue
+            there = self._corrected(there, free, expected)
+            gained = here.chi2 - there.chi2 if there else -math.inf
+            if gained < _POOR * expected:
+                # Where the parabola through chi^2 here, its slope, and chi^2 there is least.
+                least = expected / (2.0 * expected - gained) if expected > 0.0 else 0.0
+                self._radius = min(max(least, _SHORTER[0]), _SHORTER[1]) * length
+            elif gained > _GOOD * expected:
+                self._radius = max(self._radius, _LONGER * length)
+            if gained > -0.5 * self._tolerance:
+                break
+            tries += 1
+            if tries > (_TRIES if expected > _FAR_OFF * enough else 1) or expected < enough:
+                self._ended, self.converged = True, expected < 10.0 * enough
+                return
+        assert there is not None
+        self.here = there
+        self._gains.append(gained)
+        rounding = gained <= _ROUNDING * here.chi2 and expected < _BY_ROUNDING * here.chi2
+        settled = gained < enough and expected < _FAR_OFF * enough
+        if expected < enough or settled or rounding:
+            self._ended = self.converged = True
+        elif tries == 0 and self._trust > 0.0:
+            trust = max(self._trust * there.unit, _CLOSE * (there.chi2 - useful))
+            self._ended = self.converged = whole and abs(expected - gained) < trust
+        elif tries == 0 and abs(expected - gained) < _LINEAR_WITHIN * expected:
+            self._settle(here)
+        self._ended |= self._stalls()
+
+    def _corrected(
+        self, there: AnyPoint | None, free: IntArray, expected: float
+    ) -> AnyPoint | None:
+        """Step back to where chi^2 is what it should be, with the derivatives at the start.
+
+        Two laws of friction that replace each other leave the motion unchanged to first order; to
+        second order the frequency changes, which accumulates over the record. A correction no
+        longer than what was not expected of the residuals leaves the exchange as it is.
+        """
+        here = self.here
+        # Of normal equations no residuals are kept.
+        while isinstance(here, Squares) and isinstance(there, Squares):
+            missing = expected - (here.chi2 - there.chi2)
+            if missing <= (1.0 - _POOR) * max(expected, 0.0):
+                break
+            step, _ = here.linear(free, there).step(self._room(there), math.sqrt(missing))
+            nearer = self._from(there, step)
+            if nearer is None or expected - (here.chi2 - nearer.chi2) > _POOR * missing:
+                break
+            there = nearer
+        return there
+
+    def _stalls(self) -> bool:
+        """Whether steps no longer gain what is expected.
+
+        A derivative is wrong there (that of an instant, say), the motion stops just beyond, or two
+        values compensate each other.
+        """
+        return any(
+            len(self._gains) >= rounds and max(self._gains[-rounds:]) < little * self.here.unit
+            for rounds, little in self._stalled
+        )
+
+    def _settle(self, before: AnyPoint) -> None:
+        """Take the last, negligible step with the derivatives of the step before.
+
+        They are as good as new ones where the step before gained what was expected.
+        """
+        here, enough = self.here, self._tolerance * self.here.unit
+        if not (isinstance(before, Squares) and isinstance(here, Squares)):
+            return
+        linear = before.linear(self._free, here)
+        # The shape of an effect has no influence while its size is zero.
+        if not np.all(np.any(linear.triangle, axis=0)):
+            return
+        step, _ = linear.step(self._room(here))
+        if linear.falls(step) < enough:
+            there = self._from(here, step)
+            if there and there.chi2 < here.chi2 + 0.5 * self._tolerance:
+                self.here = there
+            self._ended = self.converged = True
+
+
+def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
+    """Invert the normal matrix; rows and columns of what is held are zero.
+
+    A bound is not used: what it would take off the standard deviations depends on where
+    the truth lies, so they are those of the free estimate.
+    """
+    free = _others(len(normal), held)
+    scaled, scale = _scaled(normal, free)
+    if not np.isfinite(scaled).all():
+        # A search that got to where nothing moves has no errors, and does not count as settled.
+        return np.full_like(normal, np.nan)
+    result, own = np.zeros_like(normal), np.linalg.pinv(scaled, rcond=1e-14, hermitian=True)
+    result[np.ix_(free, free)] = own / scale[:, None] / scale
+    return result
+
+
+def _others(size: int, held: Iterable[int]) -> IntArray:
+    """Indices of what is not held."""
+    return np.setdiff1d(np.arange(size), np.fromiter(held, dtype=np.int64))
+
+
+def _scaled(normal: FloatArray, free: IntArray) -> tuple[FloatArray, FloatArray]:
+    """The normal matrix of what is free with a diagonal of ones, and the scale of each entry.
+
+    Parameters differ by many orders of size.
+    """
+    part = normal[np.ix_(free, free)]
+    scale = np.sqrt(np.maximum(part.diagonal(), 1e-300))
+    return part / scale[:, None] / scale, scale
+
+
+CHI2_95: Final = 3.841458820694124
+"""95 % point of chi^2 with one degree of freedom."""
+_FAR: Final = 8.0
+"""Standard deviations from which a bound is out of sight."""
+_CLOSE_TO: Final = 1e-10
+_NEWTON: Final = 50
+"""Steps to the end of an interval, at most."""
+
+
+def intervals95(
+    value: FloatArray,
+    normal: FloatArray,
+    gradient: FloatArray,
+    bounds: Bounds,
+    indices: Sequence[int],
+    held: Sequence[int] = (),
+    matrix: FloatArray | None = None,
+) -> list[tuple[float, float]]:
+    """Profile-likelihood intervals of some parameters, the others refitted within their bounds.
+
+    Parameters
+    ----------
+    value
+        The bounded optimum, shape (n,).
+    normal, gradient
+        Of chi^2/2 there; the gradient (-d chi^2/2) is not zero at a bound that is met.
+    bounds
+        Of the parameters.
+    indices
+        The parameters whose intervals are wanted.
+    held
+        Parameters that are not fitted.
+    matrix
+        The covariance, where it is known.
+
+    Notes
+    -----
+    chi^2 is taken as quadratic. Where truth lies on a bound the interval covers it in at
+    least 95 % of the cases (97.5 % with one bound), never less.
+    """
+    matrix = covariance(normal, held) if matrix is None else matrix
+    deviations = np.sqrt(np.maximum(matrix.diagonal(), 0.0))
+    pull = np.abs(gradient * deviations)
+    fitted = [j for j in range(len(value)) if j not in held]
+    at_rest = bool((pull if len(held) == 0 else pull[fitted]).max(initial=0.0) < 1e-2)
+    half = math.sqrt(CHI2_95) * deviations
+    room = bounds.about(value)
+    if at_rest and bool(((room.lower <= -half) & (half <= room.upper)).all()):
+        # None can come to a bound, since following another moves it by 1.96 of its own at most.
+        return [(float(value[j] - half[j]), float(value[j] + half[j])) for j in indices]
+    found = []
+    for j in indices:
+        ways = (-float(half[j]), float(half[j]))
+        low, high = (_profiled_end(value, normal, gradient, room, j, held, way) for way in ways)
+        found.append((low, high))
+    return found
+
+
+def _profiled_end(
+    value: FloatArray,
+    normal: FloatArray,
+    gradient: FloatArray,
+    room: Bounds,
+    index: int,
+    held: Sequence[int],
+    half: float,
+) -> float:
+    """One end of an interval that a bound takes part in, `half` away without it.
+
+    The others follow within their bounds. Chi^2 along the way is convex, and made of parabolas, so
+    that Newton's steps come to where it has risen enough.
+    """
+    side = math.copysign(1.0, half)
+    wall = float(room.upper[index] if side > 0.0 else -room.lower[index])
+    most = min(_FAR / math.sqrt(CHI2_95) * abs(half), wall)
+    if not most > 0.0:
+        return float(value[index])
+    end, moved = min(abs(half), most), np.zeros(len(value))
+    for _ in range(_NEWTON):
+        moved[index] = side * end
+        step = moved + bounded_step(normal, gradient - normal @ moved, room, (*held, index))
+        pull = normal @ step - gradient
+        risen, slope = float(step @ (pull - gradient)), 2.0 * side * float(pull[index])
+        before, end = end, most
+        if slope > 0.0:
+            end = min(max(before + (CHI2_95 - risen) / slope, 0.0), most)
+        if abs(end - before) <= _CLOSE_TO * end:
+            break
+    return float(value[index] + side * end)
