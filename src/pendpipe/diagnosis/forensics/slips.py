@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from scipy.special import ndtr
 
-from pendpipe.analysis.half_cycles import find_extremes
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray, scaled_qr
 from pendpipe.diagnosis.data import Data
@@ -212,7 +211,7 @@ def find_counts(evidence: Evidence) -> Finding | None:
     slips = whole_steps(evidence, np.full(len(data), count)) if count else None
     if slips is None:
         return None
-    finding = _described(data, slips, count, steps_of_the_level(evidence.samples, count))
+    finding = _described(data, slips, count, steps_of_the_level(evidence, count))
     return replace(finding, taken=count * slips.staircase(len(data)))
 
 
@@ -270,17 +269,21 @@ def count_of(samples: Samples) -> float:
     return samples.step or 0.0
 
 
-def steps_of_the_level(samples: Samples, count: float) -> Confirmation | None:
-    """Test whether the level changes by whole counts between half swings, without any model.
+def steps_of_the_level(evidence: Evidence, count: float) -> Confirmation | None:
+    """Test whether the level changes by whole counts between half swings, whatever the model's is.
 
-    Four half swings at a time are one oscillation with slopes and a third harmonic, each at a
-    level of its own; the step between the middle two counts. Above half a count it is whole,
-    or not.
+    The model tells where they end. Four half swings at a time are one oscillation with slopes and a
+    third harmonic, each at a level of its own; the step between the middle two counts. Above half a
+    count it is whole, or not.
     """
     from scipy.ndimage import median_filter
 
-    # Where the record begins and ends is no turning point.
-    ends = find_extremes(samples.values, _COUNTS * count)[1:-1].tolist()
+    samples, sampled = evidence.samples, evidence.sampled
+    swings = sampled.amplitude > 0.5 * _COUNTS * count
+    last = np.max(sampled.phase[swings], initial=sampled.phase[0])
+    turns = np.pi * np.arange(np.ceil(sampled.phase[0] / np.pi), last / np.pi)
+    turns_s = np.interp(turns, sampled.phase, sampled.time_s)
+    ends = np.searchsorted(samples.time_s, turns_s).tolist()
     found = [
         _middle_step(samples, ends[first : first + 5]) / count for first in range(len(ends) - 4)
     ]
