@@ -52,14 +52,14 @@ def rows() -> list[tuple[str, str]]:
     }
     second = judge_of("second", "cases")
     files = dict.fromkeys(case["file"] for case in second.CASES)
-    second = [
+    others = [
         name
         for name in files
         if hashlib.sha256(Path(second.p(name)).read_bytes()).digest() not in taken
     ]
     return [
         *(("recordings", row["file"]) for row in of_shared_files()),
-        *(("second", name) for name in second),
+        *(("second", name) for name in others),
         *(("third", case["id"]) for case in of_third()),
         *(("inputs4", row["file"]) for row in kinds()),
     ]

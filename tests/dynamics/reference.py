@@ -24,6 +24,7 @@ def integrated(model: Eq8, y: float) -> Motion:
     rates = of_rates(
         *(model.angular_frequency, model.quadratic),
         *(model.viscous, model.hysteretic, model.coulomb),
+        speed=model.drag == "speed",
     )
     return Motion(rates | {"sine": float(model.restoring == "sine"), "step_phase": 0.04}, y)
 
