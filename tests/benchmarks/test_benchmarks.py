@@ -1,5 +1,6 @@
 """The benchmarks judge as they say."""
 
+import ast
 import json
 from argparse import Namespace
 from dataclasses import replace
@@ -33,6 +34,12 @@ def test_a_folder_keeps_its_budget_of_statements_or_its_row_says_why_it_was_rais
 @pytest.mark.parametrize("row", house.rows("concepts.tsv"), ids=lambda row: row["concept"])
 def test_each_way_to_one_thing_stands_where_the_table_says(row: dict[str, str]) -> None:
     assert house.ways(ROOT, row["definitions"]) == row["definitions"].split()
+
+
+@pytest.mark.slow
+def test_no_files_import_each_other_not_even_for_their_types() -> None:
+    trees = {path: ast.parse(path.read_text("utf-8")) for path in house.files_of(ROOT)["library"]}
+    assert house.circles((house.importers(trees), 9)) == 0
 
 
 # The judge of apparatus: items by set and number, and what an answer about one is worth.
