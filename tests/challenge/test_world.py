@@ -321,6 +321,7 @@ def by_scipy(extra: Callable[[float, float, float], float], *, sine: bool) -> Fl
     return integrate(law, AMPLITUDE, 0.0, TIME, longest_s=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", MOTION_LAWS)
 def test_motion_is_that_of_another_integrator(law: str) -> None:
     parameters, extra = MOTION_LAWS[law]

@@ -71,6 +71,7 @@ def test_several_recordings_make_one_table_and_a_bad_one_stops_nothing(
     assert cli.main(["fit", str(bad), str(bad)]) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["csv", "xlsx", "html", "tex", "json"])
 def test_the_suffix_decides_the_form_of_the_table(
     form: str, tmp_path: Path, answer_of: Any

@@ -90,6 +90,7 @@ def test_smoothed_noise_has_no_glitches(monkeypatch: pytest.MonkeyPatch) -> None
     assert min(found) > 2.5e-4
 
 
+@pytest.mark.slow
 def test_the_p_values_of_the_jitter_test_are_uniform() -> None:
     values = np.concatenate([p_values(kind)["jitter"] for kind in ("white", "Student, nu = 5")])
     # Kolmogorov and Smirnov's distance from the diagonal, at 1 %.

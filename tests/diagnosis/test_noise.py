@@ -439,6 +439,7 @@ def remembered(random: np.random.Generator) -> FloatArray:
     return np.asarray(drawn[99 : 99 + len(TIME)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kappa", [0.8, -0.5])
 def test_a_wander_along_one_line_is_named_and_taken_off(tmp_path: Path, kappa: float) -> None:
     random = np.random.default_rng(3)

@@ -112,6 +112,7 @@ def test_of_a_contact_the_smallest_swings_that_were_seen_are_the_small_ones() ->
     assert found > 1.003 * T0_S
 
 
+@pytest.mark.slow
 def test_a_period_that_jumps_is_quoted_in_the_mean_with_its_span() -> None:
     jump = by_identifier("frequency-step")
     readings = Model(TIME_S, INTERVAL_S, (jump,)).reading(np.append(TRUTH, [2e-4, 0.4 * END_S]))

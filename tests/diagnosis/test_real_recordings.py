@@ -78,6 +78,7 @@ def test_a_pendulum_has_the_circular_error_of_its_geometry() -> None:
     assert sine.max_phase_error_rad < 0.2
 
 
+@pytest.mark.slow
 def test_a_mass_on_a_spring_beats_with_a_second_mode() -> None:
     fit = fitted(SPRING, presliding_friction=(0.0, 0.02), tone_pickup=(0.0, 0.0, 1.005))
     beat = beat_of(fit, by_identifier("tone-pickup"))
@@ -96,6 +97,7 @@ def test_a_bearing_stiffens_where_it_no_longer_slides() -> None:
     assert "stiffer" in small.sentence("rad")
 
 
+@pytest.mark.slow
 def test_bearing_and_air_share_the_loss_of_a_rig() -> None:
     value = beginning_of(RIG).value
     # Known: quadratic drag and Coulomb friction in near equal measure, at 1.2 rad and below.
