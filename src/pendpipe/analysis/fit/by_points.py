@@ -7,7 +7,6 @@ amplitude: they also tell which torque the half swings favour, and where fits of
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Final
 
 import numpy as np
@@ -29,6 +28,7 @@ from pendpipe.solve import (
     Bounds,
     Priors,
     Quadratic,
+    bounded_step,
     covariance,
     intervals95,
     minimise,
@@ -147,23 +147,15 @@ def fit_energies(
         losses = _half_swing_losses(y, share, sine=sine) * swings
         lost = np.cumsum(np.pad(losses, ((0, 0), (1, 0))), axis=1)
         jacobian = np.stack([*(-lost / slope), slope[0] / slope, shared], axis=1)
-        change, rows = (energy - energy[0]) / slope, jacobian / sd[:, None]
-        problem = squares(
-            partial(_of_line, change / sd, rows, base), partial(_rows_of_line, rows), BOUNDS, prior
-        )
-        found = minimise(problem, start, held=held)
-        residual = change - jacobian @ (found.value - base)
-        model = measured - residual - shared * found.value[4]
+        rows = np.vstack([jacobian / sd[:, None], prior.rows(5)])
+        residual = (energy - energy[0]) / slope - jacobian @ (start - base)
+        left = np.append(residual / sd, prior.residual(start))
+        step = bounded_step(rows.T @ rows, rows.T @ left, BOUNDS.about(start), held)
+        value, residual, left = start + step, residual - jacobian @ step, left - rows @ step
+        model = measured - residual - shared * value[4]
         y = np.clip(model, 0.0, most)
-    return EnvelopeFit(found.value, found.point.quadratic, held, model, residual, converged=True)
-
-
-def _rows_of_line(rows: FloatArray, _: FloatArray) -> FloatArray:
-    return rows
-
-
-def _of_line(data: FloatArray, rows: FloatArray, base: FloatArray, value: FloatArray) -> FloatArray:
-    return np.asarray(data - rows @ (value - base))
+    quadratic = Quadratic(float(left @ left), rows.T @ left, rows.T @ rows)
+    return EnvelopeFit(BOUNDS.clip(value), quadratic, held, model, residual, converged=True)
 
 
 def _half_swing_losses(y: FloatArray, share: float, *, sine: bool) -> FloatArray:
