@@ -14,6 +14,8 @@ from pendpipe.files import fields_of
 
 COLOURED_NOISE: Final = "coloured-noise"
 """What is reported of the noise, and is nothing that a model lacks."""
+CANDIDATE: Final = 0.2
+"""Probability from which an effect is a candidate."""
 WANDERING_ZERO: Final = "wandering-zero"
 """What is noted of noise that is slower than the motion."""
 Verdict = Literal["consistent", "missing-physics", "not-analysable"]

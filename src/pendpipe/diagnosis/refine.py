@@ -345,6 +345,9 @@ def fit_in_growing_window(
         return None
 
 
+CLEAN: Final = 1.3
+"""chi^2 per reading up to which hardly more than noise is left: the noise itself is known much
+better, from between the harmonics."""
 GROSS: Final = 2.0
 """chi^2 per degree of freedom above which first-order scores are meaningless."""
 LARGE_PHASE_ERROR: Final = 0.1

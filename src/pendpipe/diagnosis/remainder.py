@@ -19,12 +19,9 @@ from pendpipe.analysis.demodulation import by_cycle
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.refine import CLEAN, Fit
 from pendpipe.files import fields_of
 
-CLEAN: Final = 1.3
-"""chi^2 per reading up to which hardly more than noise is left: the noise itself is known much
-better, from between the harmonics."""
 INCOMPLETE: Final = math.sqrt(CLEAN)
 """Residual over noise above which a model is incomplete."""
 _HARMONICS: Final = 4

@@ -14,7 +14,7 @@ from typing import Any, Final
 from pendpipe.analysis.fit.printed import short_size
 from pendpipe.analysis.fit.quality import period_of_frequency
 from pendpipe.answer import Answer, Table, factor, percent, printed
-from pendpipe.diagnosis.found import COLOURED_NOISE, FoundEffect
+from pendpipe.diagnosis.found import CANDIDATE, COLOURED_NOISE, FoundEffect
 from pendpipe.diagnosis.outcome import Outcome
 from pendpipe.diagnosis.remainder import Remainder
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier, declared
@@ -30,8 +30,6 @@ NAMED: Final = 0.5
 """Probability from which a cause is named, its class counted together."""
 DOUBTFUL: Final = 0.05
 """Probability up to which a name only describes and is not to be quoted."""
-CANDIDATE: Final = 0.2
-"""Probability from which it is a candidate."""
 _SURE: Final = 0.95
 """Probability from which a name without rivals needs no further measurement."""
 _SHOWN: Final = 4

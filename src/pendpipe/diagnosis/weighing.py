@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.found import Finding, FoundEffect, Mate
+from pendpipe.diagnosis.found import CANDIDATE, Finding, FoundEffect, Mate
 from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Step, is_further, is_gross
 from pendpipe.diagnosis.instants import with_instants
 from pendpipe.diagnosis.location import curve_told, locate
@@ -27,7 +27,6 @@ from pendpipe.diagnosis.rivals import (
     probabilities,
     useful_chi2,
 )
-from pendpipe.diagnosis.summary import CANDIDATE
 from pendpipe.diagnosis.values import effect_parameters
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect

@@ -19,8 +19,7 @@ from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.tails import tail_of_squares
 from pendpipe.diagnosis.found import COLOURED_NOISE, WANDERING_ZERO, Finding, Location
 from pendpipe.diagnosis.projection import tangent_basis
-from pendpipe.diagnosis.refine import LARGE_PHASE_ERROR
-from pendpipe.diagnosis.remainder import CLEAN
+from pendpipe.diagnosis.refine import CLEAN, LARGE_PHASE_ERROR
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, compact
 

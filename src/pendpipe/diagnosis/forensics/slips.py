@@ -19,8 +19,7 @@ from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray, scaled_qr
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.found import Confirmation, Finding, Location
-from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.remainder import CLEAN
+from pendpipe.diagnosis.refine import CLEAN, Fit
 from pendpipe.effects.model import jacobian
 from pendpipe.estimate import Estimate
 
