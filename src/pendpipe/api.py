@@ -195,7 +195,8 @@ def fit(
         "drawn_by": _FIGURES_OF_A_FIT,
     }
     from pendpipe.analysis.fit import fit_recording, fit_turning_points
-    from pendpipe.analysis.fit.by_amplitudes import fit_amplitudes
+    from pendpipe.analysis.fit.by_amplitudes import fit_amplitudes, in_seconds
+    from pendpipe.analysis.fit.doubts import doubted
     from pendpipe.analysis.fit.result import with_clock, with_scale
     from pendpipe.analysis.free_decay import measure_recording
     from pendpipe.analysis.turning_points import (
@@ -215,6 +216,7 @@ def fit(
     place, motion = name or _place(recording), _motion(recording, volts_per_radian)
     own = "" if isinstance(recording, Recording) else Path(recording).name
     if motion.holds_amplitudes and points is None:
+        motion = in_seconds(motion, given, place)
         found = fit_amplitudes(
             motion,
             period=given,
@@ -224,7 +226,7 @@ def fit(
             fixed=fixed,
             place=place,
         )
-        return replace(found, name=own, **kept)
+        return doubted(replace(found, name=own, **kept), motion.facts, motion.time_s)
     refuse_if(
         given is not None,
         "period",
@@ -251,13 +253,9 @@ def fit(
     )
     result = result if clock_ppm is None else with_clock(result, clock_ppm)
     result = result if scale_percent is None else with_scale(result, scale_percent)
-    return replace(
-        result,
-        cuts=(*(cut._asdict() for cut in points.cuts), *result.cuts),
-        name=own,
-        decay=decay,
-        **kept,
-    )
+    cuts = (*(cut._asdict() for cut in points.cuts), *result.cuts)
+    result = replace(result, cuts=cuts, name=own, decay=decay, **kept)
+    return doubted(result, motion.facts, decay.time_s)
 
 
 def _measured(name: str, size: "float | Estimate | None", unit: str) -> "Estimate | None":

@@ -39,6 +39,10 @@ KINDS: Final[Mapping[str, Kind]] = {
 """Every kind, in the order in which a file is understood."""
 
 
+SWINGS: Final = "swings"
+"""The unit of time of a list that counts them: each lasts a period."""
+
+
 @dataclass(frozen=True)
 class Fact:
     """One fact of a file.

@@ -17,7 +17,7 @@ from pendpipe.facts import Fact, How
 from pendpipe.formats.circle import on_a_circle, pivot_of
 from pendpipe.formats.lists import Listed, counts_samples, list_in, one_way
 from pendpipe.formats.table import Column, ReadOptions, Table, derivative_slope, evenness
-from pendpipe.formats.words import Role, Unit, plain, role_of, unit_of
+from pendpipe.formats.words import Role, Unit, counts_swings, plain, role_of, unit_of
 from pendpipe.recording import sizes_of
 
 _WORTH: Final[Mapping[Role, float]] = {
@@ -284,7 +284,7 @@ def _time(table: Table, options: ReadOptions) -> tuple[Column | None, bool]:
         score -= 4.0 * (role == "angle" or (role == "length" and place > 0))
         best = max(best, (score, column), key=lambda each: each[0])
     found = best[1]
-    return found, found is not None and counts_samples(found)
+    return found, found is not None and counts_samples(found) and not counts_swings(found.name)
 
 
 def _of_one_run(

@@ -9,12 +9,12 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.facts import Fact, How
+from pendpipe.facts import SWINGS, Fact, How
 from pendpipe.formats.columns import Choice
 from pendpipe.formats.grammar import MOST_DAMAGED
 from pendpipe.formats.lists import counts_samples, one_way
 from pendpipe.formats.table import Column, ReadOptions, Table, periods
-from pendpipe.formats.words import Unit, plain, unit_of
+from pendpipe.formats.words import Unit, counts_swings, plain, unit_of
 from pendpipe.recording import is_uniform
 
 _EPOCH: Final = 3e8
@@ -40,6 +40,8 @@ _TICKS: Final = (
     (1e-6, "microseconds"),
     (1e-9, "nanoseconds"),
 )
+_RATES: Final = 0.02
+"""By which a rate that is given may differ from that of the stamps: pauses are in these."""
 _OTHER_PERIODS: Final = 0.01
 """How often a swing lies outside: two of 190 files of others do, one a balance of 211 s."""
 
@@ -97,12 +99,17 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     reading = choice.readings[0] if choice.readings else table.columns[0]
     every = np.arange(len(reading.values))
     if options.sample_rate is not None:
-        rate = f"{options.sample_rate:g} Hz"
-        base = TimeBase(every.astype(np.float64) / options.sample_rate, every)
-        base.say(
-            "clock", rate, f"times are counted at the given {rate} from the first row", "stated"
+        given = f"{options.sample_rate:g} Hz"
+        said = f"times are counted at the given {given} from the first row"
+        stamped = _stamped_rate(choice, options.sample_rate)
+        odd = abs(stamped / options.sample_rate - 1.0) > _RATES
+        said += (
+            f", but the stamps of '{choice.time.label}' say {stamped:.4g} Hz"
+            if choice.time and odd
+            else ""
         )
-        return base
+        fact = Fact("clock", given, "guessed" if odd else "stated", said)
+        return TimeBase(every.astype(np.float64) / options.sample_rate, every, facts=[fact])
     if reading.time_s is not None:
         return TimeBase(reading.time_s, every, facts=[Fact("clock", "the instrument's", "stated")])
     column = choice.time
@@ -123,6 +130,19 @@ def time_base(table: Table, choice: Choice, options: ReadOptions) -> TimeBase:
     base = TimeBase(number * interval_s, every)
     base.say("clock", rate, f"no time column: times from the header's {rate}{also}", "stated")
     return _in_order(table, choice, base, interval_s, options)
+
+
+def _stamped_rate(choice: Choice, given: float) -> float:
+    """Rows a second by the column of times, whatever its unit; NaN without one.
+
+    Units of time lie a thousand apart: that one is taken which comes nearest to the `given` rate.
+    """
+    column = choice.time
+    if column is None or choice.counts or not one_way(column.values) > 0.95:
+        return np.nan
+    values = column.values[np.isfinite(column.values)]
+    rate = (len(values) - 1) / abs(float(values[-1] - values[0]))
+    return float(rate * 1000.0 ** np.rint(np.log10(given / rate) / 3.0))
 
 
 def _from_column(
@@ -179,6 +199,9 @@ def _time_unit(
             given.kind != "time", "--unit", f"'{asked}' is not a unit of time", "give s, ms, us"
         )
         return given.factor, Fact("unit of time", asked, "stated")
+    listed = choice.listed is not None and choice.listed.kind == "amplitudes"
+    if listed and counts_swings(column.name):
+        return 1.0, Fact("unit of time", SWINGS, "stated", f"'{column.label}' counts swings")
     values = column.values[np.isfinite(column.values)]
     largest = float(np.abs(values).max(initial=0.0))
     for word in filter(unit_of, (column.unit, column.name)):
@@ -186,7 +209,6 @@ def _time_unit(
         fits = unit is not None and unit.kind == "time" and largest * unit.factor <= _LATEST
         if unit and fits and (word == column.unit or plain(word) not in ("t", "h", "min")):
             return unit.factor, Fact("unit of time", word, "stated")
-    listed = choice.listed is not None and choice.listed.kind == "amplitudes"
     period = 0.0 if listed else _period(reading, values)
     for least, factor, name in _EPOCHS:
         ticks = factor < 1.0 and float(np.ptp(values)) > 0.1 * largest

@@ -268,3 +268,23 @@ def role_of(name: str) -> Role:
     unit = unit_of(name)
     named: Role = "time" if unit is not None and unit.kind == "time" else "unknown"
     return next(chain(is_it, holds_it, symbol), named)
+
+
+_SWINGS: Final = (
+    r"swings?|oscillations?|cycles?|periods|schwingung(en)?|perioden|oscilaciones|oscillazioni|ciclos"
+    r"|périodes|svingninger|колебани\w*"
+)
+_NUMBER_OF: Final = r"(?i)\b(number|no|nr|n|num|count|anzahl|número|numero|nombre|#|число)\b|#|№"
+
+
+def counts_swings(name: str) -> bool:
+    """Say whether a column counts swings: ``Number of swings``, ``n (cycles)``, ``Schwingung Nr.``.
+
+    Examples
+    --------
+    >>> counts_swings("Number of oscillations"), counts_swings("Swing angle (deg)")
+    (True, False)
+    """
+    whole = plain(name)
+    word = re.search(_SWINGS, whole)
+    return word is not None and (word[0] == whole or re.search(_NUMBER_OF, whole) is not None)

@@ -29,6 +29,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import Drag, Restoring
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
+from pendpipe.facts import SWINGS
 from pendpipe.physics.decay import amplitude_and_gradient
 from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 from pendpipe.quantities import after_number
@@ -43,6 +44,22 @@ _SLIGHT: Final = 0.05
 """Probability below which a description does not widen an interval."""
 PLACES: Final = [0, 1, 2, 4]
 """Of a, b, c and the amplitude among `PARAMETERS`."""
+
+
+def in_seconds(recording: Recording, period: Estimate | None, place: str | Path) -> Recording:
+    """Amplitudes against time, from those against a number of swings, which last a period each.
+
+    Raises
+    ------
+    InputError
+        If the swings are counted, and no period is given.
+    """
+    unit = recording.fact("unit of time")
+    if unit is None or unit.value != SWINGS:
+        return recording
+    refuse_if(period is None, place, f"{unit.said}, not seconds", "give --period")
+    assert period is not None
+    return replace(recording, time_s=period.value * recording.time_s)
 
 
 def fit_amplitudes(
