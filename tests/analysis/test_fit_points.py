@@ -19,7 +19,7 @@ from pendpipe.cli import main
 from pendpipe.dynamics import Eq8, Release, sample, turning_points
 from pendpipe.estimate import Estimate
 from pendpipe.physics.decay import amplitude
-from pendpipe.recording import only_falls
+from pendpipe.readings import only_falls
 
 # The paper's route: Eq. 14 and Eq. 8's frequency from turning points.
 

@@ -19,7 +19,7 @@ from pendpipe.diagnosis.noise_estimate import estimate_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.model import Model
-from pendpipe.recording import find_step
+from pendpipe.readings import find_step
 
 from .records import FREQUENCY_HZ
 

@@ -15,7 +15,8 @@ from pendpipe.cli import main
 from pendpipe.errors import InputError
 from pendpipe.formats import ReadOptions, inspect, read
 from pendpipe.formats.table import clipped_samples, swing_of
-from pendpipe.recording import find_step, read_plain
+from pendpipe.readings import find_step
+from pendpipe.recording import read_plain
 
 from .cases import WindaqFile, swing
 

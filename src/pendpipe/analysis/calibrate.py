@@ -20,7 +20,7 @@ from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Z95, Estimate, chi_square_p_value
 from pendpipe.files import fields_of, plain, read_text
 from pendpipe.levels import FALSE_ALARM
-from pendpipe.recording import decimal_step
+from pendpipe.readings import decimal_step
 
 ANGLES: Final = ("angle_rad", "angle_deg", "displacement_m")
 _LARGEST: Final = 1e6

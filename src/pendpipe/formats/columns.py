@@ -18,7 +18,7 @@ from pendpipe.formats.circle import on_a_circle, pivot_of
 from pendpipe.formats.lists import Listed, counts_samples, list_in, one_way
 from pendpipe.formats.table import Column, ReadOptions, Table, derivative_slope, evenness
 from pendpipe.formats.words import Role, Unit, counts_swings, plain, role_of, unit_of
-from pendpipe.recording import sizes_of
+from pendpipe.readings import amplitudes_in, sizes_of
 
 _WORTH: Final[Mapping[Role, float]] = {
     "angle": 6.0,
@@ -143,11 +143,8 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         refuse_if(reading and not picked, table.place, found.problem, found.remedy)
     elif found is not None:
         sizes = replace(found.column, values=sizes_of(found.column.values), role="unknown")
-        said = f"{found.problem}: analysed as amplitudes against time"
-        readings, facts = (
-            (sizes,),
-            [Fact("amplitudes", sizes.label, "shown", said, found.error_rate)],
-        )
+        fact = amplitudes_in(sizes.label, time and time.values, found.column.values)
+        readings, facts = (sizes,), [fact]
     refuse_if(
         reading and not readings,
         table.place,

@@ -10,7 +10,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.formats.table import Column, periods
 from pendpipe.formats.words import plain
-from pendpipe.recording import only_falls
+from pendpipe.readings import only_falls
 
 _STEADY: Final = 0.02
 """Share by which the size of a steady signal may change from beginning to end."""
@@ -30,15 +30,12 @@ class Listed:
         What is said of it, and what to give.
     column
         The column that shows it.
-    error_rate
-        How often a swing would look like it.
     """
 
     kind: str
     problem: str
     remedy: str
     column: Column
-    error_rate: float | None = None
 
 
 def list_in(
@@ -72,12 +69,11 @@ def list_in(
         )
     # What an instrument sampled by a clock of its own is no list.
     sizes = [c for c in readings or columns if c.role not in ("index", "time")]
-    falling = [c for c in sizes if c is not time and c.time_s is None and only_falls(c.values)]
+    falling = [c for c in sizes if c is not time and c.time_s is None and only_falls(c.clean)]
     if falling and len(falling) == len(readings or falling):
         spoken = [c for c in falling if plain(c.name).startswith("ampl")]
         column = [*spoken, *falling][0]
-        said = f"'{column.label}' only falls: amplitudes, not a recording of the swing"
-        return Listed("amplitudes", said, "", column)
+        return Listed("amplitudes", f"'{column.label}' only falls: amplitudes", "", column)
     for column in readings:
         if counts_samples(column) and one_way(column.values) == 1.0:
             return Listed(

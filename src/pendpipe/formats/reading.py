@@ -37,6 +37,7 @@ from pendpipe.formats.table import (
 from pendpipe.formats.times import TimeBase, refuse_text, time_base
 from pendpipe.formats.units import readings
 from pendpipe.formats.words import role_of, split_header, unit_of
+from pendpipe.readings import find_step, pulls, sizes_of, with_amplitudes
 from pendpipe.recording import (
     GOOD,
     MISSING,
@@ -44,12 +45,9 @@ from pendpipe.recording import (
     Recording,
     check,
     converter_step,
-    find_step,
     is_uniform,
-    pulls,
     read_plain,
     sample_rate,
-    sizes_of,
 )
 
 _ANYTHING: Final = ReadOptions()
@@ -338,14 +336,12 @@ def read_if_plain(place: Path, data: bytes, options: ReadOptions) -> Recording |
     for kind, value in _IN_PLAIN.items():
         if recording.fact(kind) is None:
             recording = recording.knowing(Fact(kind, value or recording.unit, "stated"))
+    stated = recording.holds_amplitudes
+    recording = with_amplitudes(recording)
     if recording.holds_amplitudes:  # as our own table of turning points
-        values, said = sizes_of(recording.values), "it only falls: amplitudes against time"
-        metadata = {**recording.metadata, "holds": "amplitudes"}
-        stated = "holds" in recording.metadata
-        fact = Fact(
-            "amplitudes", recording.quantity, "stated" if stated else "shown", said * (not stated)
-        )
-        recording = replace(recording.knowing(fact), values=values, metadata=metadata)
+        recording = replace(recording, values=sizes_of(recording.values))
+    if stated:
+        recording = recording.knowing(Fact("amplitudes", recording.quantity, "stated"))
     return replace(recording, resolution=recording.resolution or find_step(recording.values))
 
 

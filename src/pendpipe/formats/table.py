@@ -109,7 +109,11 @@ def without_marks(values: FloatArray) -> FloatArray:
     Such a reading leaves the range of its neighbours, and comes back, by more than that range. It
     is lost where the same number (``0``, ``-999``) does so three times, or where it is also beyond
     all others by more than they span. What jumps over the whole span of the others has wrapped.
+    SCPI writes an overload as 9.9E+37. A few rows off a smooth swing are lost echoes.
     """
+    with_codes, values = values, np.where(np.abs(values) >= _OVERLOAD, np.nan, values)
+    values = values if np.isnan(values).sum() > np.isnan(with_codes).sum() else with_codes
+    values = _without_spikes(values)
     good = np.flatnonzero(np.isfinite(values))
     # Numbers that stand in several rows on end are one.
     starts = np.flatnonzero(np.diff(values[good], prepend=np.nan) != 0.0)
@@ -143,6 +147,70 @@ def without_marks(values: FloatArray) -> FloatArray:
         return values
     # One beside another is seen when that is gone.
     return without_marks(np.where(gone, np.nan, values))
+
+
+_OVERLOAD: Final = 9.89e37
+"""What instruments that speak SCPI write for infinity is 9.9E+37, for no number 9.91E+37."""
+_LONGEST_SPIKE: Final = 8
+_SPIKE: Final = 0.02
+"""Of the span, by which a spike is off at least: less costs a fit no more than its noise."""
+_SPIKE_SD: Final = 8.0
+"""Of what a cubic between the neighbours misses, by which the rows of a spike are all off: of
+10^6 readings with noise none is by chance."""
+
+
+def _without_spikes(values: FloatArray) -> FloatArray:
+    """Make NaN of up to eight rows on end that leave a smooth swing and come back to it.
+
+    They all lie on one side of the cubic through two rows before and two behind, by more than
+    `_SPIKE` of the span and `_SPIKE_SD` of what such a cubic usually misses; and they come back
+    by as much as they left.
+    """
+    good = np.flatnonzero(np.isfinite(values))
+    x = values[good]
+    if len(x) < 8 * _LONGEST_SPIKE:
+        return values
+    low, high = np.percentile(x, (0.5, 99.5))
+    steps = np.abs(np.diff(x))
+    # Held readings do not step; a converter's step is no spike.
+    least = max(
+        _SPIKE * float(high - low), 4.0 * float(steps.min(where=steps > 0.0, initial=np.inf))
+    )
+    begin = np.flatnonzero(steps > least) + 1
+    usual = np.linspace(2, len(x) - _LONGEST_SPIKE - 3, 4000).astype(int)
+    found: list[tuple[float, int, int]] = []
+    for rows in range(1, _LONGEST_SPIKE + 1) if begin.size else ():
+        at = begin[(begin > 1) & (begin + rows + 1 < len(x))]
+        off = _off_cubic(x, at, rows)
+        noise = float(np.median(np.abs(_off_cubic(x, usual, rows)))) / 0.6745
+        side = np.abs(np.sign(off).sum(axis=0)) == rows
+        size = np.abs(off).min(axis=0)
+        away, back = x[at] - x[at - 1], x[at + rows] - x[at + rows - 1]
+        returns = (away * back < 0.0) & (np.minimum(np.abs(away), np.abs(back)) > 0.5 * size)
+        # What lies between two spikes has a step before it, or behind.
+        beside = np.maximum(steps[at - 2], steps[at + rows]) < 0.5 * size
+        odd = side & returns & beside & (size > max(least, _SPIKE_SD * noise))
+        found += [(big, first, rows) for big, first in zip(size[odd], at[odd], strict=True)]
+    lost = np.zeros(len(x), dtype=bool)
+    for _, first, rows in sorted(found, reverse=True):
+        if not lost[first - 2 : first + rows + 2].any():
+            lost[first : first + rows] = True
+    if not 0.0 < lost.mean() < _MOST_SPIKES:
+        return values
+    out = values.copy()
+    out[good[lost]] = np.nan
+    return _without_spikes(out)  # one beside another is seen when that is gone
+
+
+_MOST_SPIKES: Final = 0.05
+"""Share of lost echoes beyond which nobody knows which of the readings are the swing."""
+
+
+def _off_cubic(x: FloatArray, at: IntArray, rows: int) -> FloatArray:
+    """How far some rows from each place on lie off the cubic about them, shape (rows, n)."""
+    nodes, inside = np.array([-2, -1, rows, rows + 1]), np.arange(rows)
+    weights = np.vander(inside, 4) @ np.linalg.inv(np.vander(nodes, 4))
+    return np.asarray(x[at + inside[:, None]] - weights @ x[at + nodes[:, None]])
 
 
 def _graded(rest: FloatArray, cycle: float) -> float:
@@ -407,9 +475,14 @@ class Column:
     of: str = ""
 
     @cached_property
+    def clean(self) -> FloatArray:
+        """Its values without those that stand for lost ones."""
+        return without_marks(self.values)
+
+    @cached_property
     def swing(self) -> Swing:
         """Its strongest oscillation."""
-        return swing_of(without_marks(self.values))
+        return swing_of(self.clean)
 
     @property
     def label(self) -> str:

@@ -21,7 +21,8 @@ from pendpipe.formats.table import (
 )
 from pendpipe.formats.times import TimeBase
 from pendpipe.formats.words import Unit, unit_of
-from pendpipe.recording import Quantity, from_below, jumps_of_a_turn
+from pendpipe.readings import from_below, jumps_of_a_turn
+from pendpipe.recording import Quantity
 
 _RADIAN = Unit("angle", 1.0, "rad")
 _DEGREE = Unit("angle", np.pi / 180, "rad")

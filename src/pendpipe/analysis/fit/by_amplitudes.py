@@ -33,7 +33,8 @@ from pendpipe.facts import SWINGS
 from pendpipe.physics.decay import amplitude_and_gradient
 from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 from pendpipe.quantities import after_number
-from pendpipe.recording import Quantity, Recording, sizes_of
+from pendpipe.readings import sizes_of
+from pendpipe.recording import Quantity, Recording
 
 _FEWEST: Final = 5
 """Amplitudes: a, b, c and the first are four numbers."""

@@ -30,7 +30,8 @@ from pendpipe.analysis.noise import noise_rms
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.dynamics.kernel import IntMatrix, Matrix, Stack, kernel
 from pendpipe.errors import NotAnalysableError, refuse_if
-from pendpipe.recording import Recording, decimal_step, find_step
+from pendpipe.readings import decimal_step, find_step
+from pendpipe.recording import Recording
 
 FITTED: Final = 4
 """Readings of a half cycle from which its amplitude, phase and level are told, and one is left."""
