@@ -15,7 +15,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.special import ellipk
 
-from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.errors import refuse_if
 from pendpipe.facts import Fact
 from pendpipe.formats.words import Role
@@ -106,18 +106,22 @@ def swing_of(values: FloatArray) -> Swing:
 def without_marks(values: FloatArray) -> FloatArray:
     """Make NaN of readings that a sensor, or a program, gives in place of a lost one.
 
+    What instruments that speak SCPI write for an overload (9.9E+37); sentinels; lost echoes.
+    """
+    overload = (np.abs(values) >= _OVERLOAD) & (np.abs(values) < 1.1 * _OVERLOAD)
+    return _without_spikes(
+        _without_codes(np.where(overload, np.nan, values) if overload.any() else values)
+    )
+
+
+def _without_codes(values: FloatArray) -> FloatArray:
+    """Make NaN of readings far from the others.
+
     Such a reading leaves the range of its neighbours, and comes back, by more than that range. It
     is lost where the same number (``0``, ``-999``) does so three times, or where it is also beyond
     all others by more than they span. What jumps over the whole span of the others has wrapped.
-    SCPI writes an overload as 9.9E+37. A few rows off a smooth swing are lost echoes.
     """
-    with_codes, values = values, np.where(np.abs(values) >= _OVERLOAD, np.nan, values)
-    values = values if np.isnan(values).sum() > np.isnan(with_codes).sum() else with_codes
-    values = _without_spikes(values)
-    good = np.flatnonzero(np.isfinite(values))
-    # Numbers that stand in several rows on end are one.
-    starts = np.flatnonzero(np.diff(values[good], prepend=np.nan) != 0.0)
-    level = values[good[starts]]
+    good, starts, level = _levels(values)
     if len(level) < 2 * _BESIDE:
         return values
     step = np.diff(level)
@@ -140,13 +144,25 @@ def without_marks(values: FloatArray) -> FloatArray:
     number, often = np.unique(own[odd], return_counts=True)
     lost = np.zeros(len(level), dtype=bool)
     lost[at[np.isin(own, number[often > 2]) | (odd & (off > 1.5 * span))]] = True
-    rows = np.diff(np.append(starts, len(good)))
-    gone = np.zeros(len(values), dtype=bool)
-    gone[good[np.repeat(lost, rows)]] = True
-    if not 0.0 < gone.mean() < 0.2:
+    left = _left(values, good, starts, lost)
+    if not 0 < np.isnan(left).sum() - np.isnan(values).sum() < 0.2 * len(values):
         return values
     # One beside another is seen when that is gone.
-    return without_marks(np.where(gone, np.nan, values))
+    return _without_codes(left)
+
+
+def _levels(values: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+    """Give the finite rows; of these the first of each number that stands on end; the numbers."""
+    good = np.flatnonzero(np.isfinite(values))
+    starts = np.flatnonzero(np.diff(values[good], prepend=np.nan) != 0.0)
+    return good, starts, values[good[starts]]
+
+
+def _left(values: FloatArray, good: IntArray, starts: IntArray, lost: BoolArray) -> FloatArray:
+    """Make NaN of all rows of the numbers that are lost."""
+    left = values.copy()
+    left[good[np.repeat(lost, np.diff(np.append(starts, len(good))))]] = np.nan
+    return left
 
 
 _OVERLOAD: Final = 9.89e37
@@ -154,6 +170,9 @@ _OVERLOAD: Final = 9.89e37
 _LONGEST_SPIKE: Final = 8
 _SPIKE: Final = 0.02
 """Of the span, by which a spike is off at least: less costs a fit no more than its noise."""
+_NEAR: Final = 10
+_FASTER: Final = 2.0
+"""Times the steps of the ten readings before and behind, by which a spike steps at least."""
 _SPIKE_SD: Final = 8.0
 """Of what a cubic between the neighbours misses, by which the rows of a spike are all off: of
 10^6 readings with noise none is by chance."""
@@ -166,18 +185,16 @@ def _without_spikes(values: FloatArray) -> FloatArray:
     `_SPIKE` of the span and `_SPIKE_SD` of what such a cubic usually misses; and they come back
     by as much as they left.
     """
-    good = np.flatnonzero(np.isfinite(values))
-    x = values[good]
+    good, starts, x = _levels(values)
     if len(x) < 8 * _LONGEST_SPIKE:
         return values
     low, high = np.percentile(x, (0.5, 99.5))
     steps = np.abs(np.diff(x))
-    # Held readings do not step; a converter's step is no spike.
-    least = max(
-        _SPIKE * float(high - low), 4.0 * float(steps.min(where=steps > 0.0, initial=np.inf))
-    )
+    # A converter's step is no spike.
+    least = max(_SPIKE * float(high - low), 4.0 * float(steps.min()))
     begin = np.flatnonzero(steps > least) + 1
     usual = np.linspace(2, len(x) - _LONGEST_SPIKE - 3, 4000).astype(int)
+    beyond = np.pad(steps, _NEAR, mode="reflect")
     found: list[tuple[float, int, int]] = []
     for rows in range(1, _LONGEST_SPIKE + 1) if begin.size else ():
         at = begin[(begin > 1) & (begin + rows + 1 < len(x))]
@@ -186,10 +203,16 @@ def _without_spikes(values: FloatArray) -> FloatArray:
         side = np.abs(np.sign(off).sum(axis=0)) == rows
         size = np.abs(off).min(axis=0)
         away, back = x[at] - x[at - 1], x[at + rows] - x[at + rows - 1]
-        returns = (away * back < 0.0) & (np.minimum(np.abs(away), np.abs(back)) > 0.5 * size)
+        least_step, most_step = np.sort(np.abs([away, back]), axis=0)
+        returns = (away * back < 0.0) & (least_step > np.maximum(0.5 * size, 0.25 * most_step))
         # What lies between two spikes has a step before it, or behind.
         beside = np.maximum(steps[at - 2], steps[at + rows]) < 0.5 * size
         odd = side & returns & beside & (size > max(least, _SPIKE_SD * noise))
+        odd &= np.abs(off).max(axis=0) < 0.75 * float(high - low)
+        # Where the swing itself steps as far, few readings make a cycle.
+        at, size, sides = at[odd], size[odd], np.arange(_NEAR)[:, None]
+        near = [beyond[at[None] - 1 + sides], beyond[at[None] + rows + _NEAR + sides]]
+        odd = least_step[odd] > _FASTER * np.percentile(near, 80, axis=1).max(axis=0)
         found += [(big, first, rows) for big, first in zip(size[odd], at[odd], strict=True)]
     lost = np.zeros(len(x), dtype=bool)
     for _, first, rows in sorted(found, reverse=True):
@@ -197,9 +220,8 @@ def _without_spikes(values: FloatArray) -> FloatArray:
             lost[first : first + rows] = True
     if not 0.0 < lost.mean() < _MOST_SPIKES:
         return values
-    out = values.copy()
-    out[good[lost]] = np.nan
-    return _without_spikes(out)  # one beside another is seen when that is gone
+    # One beside another is seen when that is gone.
+    return _without_spikes(_left(values, good, starts, lost))
 
 
 _MOST_SPIKES: Final = 0.05
