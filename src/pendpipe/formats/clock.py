@@ -20,9 +20,13 @@ _CLOCK: Final = re.compile(
     r"(?!\d+\.\d+\s*(?:[a-z+-]|$))"  # 12.50 is a number
     # Points part hours from minutes where they part these from seconds: 38:05.6 has no hours.
     r"(?:(\d{1,3})(?::(?=\d+:)|\.(?=\d+\.)))?(\d{1,2})[:.](\d{1,2}(?:[.,:]\d+)?)"
-    r"\s*(am|pm)?\s*(?:z|utc|[+-]\d{2}:?\d{2})?",
+    r"\s*(am|pm)?\s*(?:z|utc|([+-]\d{2}):?(\d{2}))?",
     re.I,
 )
+
+
+_FIRST_DAY: Final = -24107
+"""1 January 1904, counted from 1970: earlier days are the zeros of spreadsheets."""
 
 
 def is_clock(cell: str) -> bool:
@@ -58,19 +62,23 @@ def column_of_clock_times(cells: Sequence[str]) -> FloatArray | None:
         days = {date: _days(date, slashes) for date, slashes in slashed.items()}
     except ValueError:  # there is no such day
         return None
-    if not days or min(days.values()) < 0 or matches.count(None) > 0.1 * len(matches):
+    if not days or min(days.values()) < _FIRST_DAY or matches.count(None) > 0.1 * len(matches):
         return None
-    seconds = np.full(len(cells), np.nan)
+    seconds, ahead = np.full(len(cells), np.nan), np.zeros(len(cells))
     for row, match in enumerate(matches):
         if match is None:
             continue
-        date, (hour, minute, second, half) = match.groups()[:6], match.groups()[6:]
+        date, (hour, minute, second, half, *zone) = match.groups()[:6], match.groups()[6:]
         hours = int(hour or 0)
         hours = hours % 12 + 12 * (half.lower() == "pm") if half else hours
         of_day = 3600 * hours + 60 * int(minute) + float(re.sub("[,:]", ".", second))
+        east, west = (int(part or 0) for part in zone)
+        ahead[row] = 60 * (60 * east + (west if east >= 0 else -west))
         seconds[row] = 86400.0 * days[date] + of_day
     known = np.flatnonzero(np.isfinite(seconds))
-    if seconds[known].max() < 86400:
+    # Where summer time ends the clock is set back, and is less ahead of Greenwich.
+    seconds -= ahead - ahead[known[0]]
+    if not any(map(any, days)):
         some, hour = seconds[known], any(match and match[7] for match in matches)
         turn = 86400.0 if hour else 3600.0
         seconds[known] -= turn * np.cumsum(np.rint(np.diff(some, prepend=some[0]) / turn))

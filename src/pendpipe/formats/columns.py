@@ -226,10 +226,14 @@ def _seconds(column: Column, usual: str) -> float:
     return (named or silent or Unit("time", np.inf)).factor
 
 
+_TURNS: Final = (2.0**16, 2.0**32, *(size * days for size in (86400.0, 864e5) for days in (1, 7)))
+"""Ticks of a clock's turn: ``micros()`` takes 71 minutes, a day and a week are in s and ms."""
+
+
 def _counted_on(values: FloatArray) -> FloatArray:
-    """Count on where a clock of 16 or 32 bits begins again at 0 (``micros()`` after 71 minutes)."""
+    """Count on where a clock begins again at 0: of 16 or 32 bits, of the day, of the GPS week."""
     steps = np.diff(values)
-    for turn in (2.0**16, 2.0**32):
+    for turn in _TURNS:
         over = steps < -0.5 * turn
         across = np.abs(steps[over] + turn).max(initial=0.0)
         on = over.any() and values.max() < turn and steps[~over].min(initial=1.0) >= 0.0

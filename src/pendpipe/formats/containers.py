@@ -68,7 +68,7 @@ def _tables(place: Path, archive: zipfile.ZipFile, names: list[str]) -> dict[str
         "this is a project of PASCO Capstone",
         "export its data as CSV or text",
     )
-    wanted = (".csv", ".tsv", ".txt", ".dat", ".trk", *STATES)
+    wanted = (".csv", ".tsv", ".txt", ".dat", ".trk", "data.xml", *STATES)
     tables = [
         name
         for name in names
@@ -90,7 +90,7 @@ def _of_members(place: Path, members: dict[str, bytes], options: ReadOptions) ->
     tables: dict[str, Table] = {}
     reason = "it holds no CSV"
     for name, content in members.items():
-        reader = read_project if name.lower().endswith(".trk") else read_text
+        reader = read_project if name.lower().endswith((".trk", ".xml")) else read_text
         try:
             tables[name] = reader(place, content, options)
         except (NotThisFormatError, InputError) as fault:

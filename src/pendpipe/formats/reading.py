@@ -325,7 +325,7 @@ def read_if_plain(place: Path, data: bytes, options: ReadOptions) -> Recording |
     if "time_s" not in names or any(getattr(options, name) is not None for name in _STEERING):
         return None
     if sum(name in names for name in QUANTITIES) != 1:
-        if any(role_of(split_header(name)[0]) in _READINGS for name in names):
+        if any(_may_be_read(*split_header(name)) for name in names):
             return None
         raise InputError(
             place,
@@ -343,6 +343,12 @@ def read_if_plain(place: Path, data: bytes, options: ReadOptions) -> Recording |
     if stated:
         recording = recording.knowing(Fact("amplitudes", recording.quantity, "stated"))
     return replace(recording, resolution=recording.resolution or find_step(recording.values))
+
+
+def _may_be_read(name: str, unit: str) -> bool:
+    """Whether a column's name, or its unit, is that of a reading."""
+    known = unit_of(unit) if unit else None
+    return role_of(name) in _READINGS or (known is not None and known.kind in ("volts", "own"))
 
 
 def _header(data: bytes) -> list[str]:

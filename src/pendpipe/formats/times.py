@@ -40,6 +40,8 @@ _TICKS: Final = (
     (1e-6, "microseconds"),
     (1e-9, "nanoseconds"),
 )
+_LATE: Final = 3.0
+"""Packets by which a stamp may be off the line: more is a pause."""
 _RATES: Final = 0.02
 """By which a rate that is given may differ from that of the stamps: pauses are in these."""
 _OTHER_PERIODS: Final = 0.01
@@ -276,7 +278,7 @@ def _in_order(
         base.keep(slice(late.min(initial=len(base.time_s)) + 1))
         early = np.flatnonzero(base.time_s <= (-np.inf if start_s is None else start_s))
         base.keep(slice(early.max(initial=0), None))
-    repairs = [_count_rows, _keep_last, _drop_repeats, _first_of_stacked]
+    repairs = [_count_rows, _keep_last, _drop_repeats, _first_of_stacked, _through_packets]
     # Where stamps are rounded, rows of one time are no copies.
     rounded = len(base.time_s) > 1 and np.mean(np.diff(base.time_s) == 0.0) > 0.02
     repairs.insert(0 if rounded else 3, _interpolate_torn)
@@ -411,6 +413,33 @@ def _first_of_stacked(_choice: Choice, base: TimeBase) -> None:
         "guessed",
     )
     base.keep(slice(starts[0]))
+
+
+def _through_packets(_choice: Choice, base: TimeBase) -> None:
+    """Put even times through the stamps of packets, which arrive late and not evenly, by a line.
+
+    Most rows have the stamp of the row above; no stamp lies more than a few packets off the line,
+    beyond which rows are missing.
+    """
+    steps, index = np.diff(base.time_s), np.arange(len(base.time_s))
+    if steps.min() < 0.0 or np.mean(steps == 0.0) < 0.5:
+        return
+    line = np.polynomial.Polynomial.fit(index, base.time_s, 1)
+    even, packet = line(index), float(np.mean(steps[steps > 0.0]))
+    late = base.time_s - even
+    if not np.abs(late).max() < _LATE * packet or not even[-1] > even[0]:
+        return
+    # What arrives together is late together: each stamp is one reading of the line.
+    stamps = np.count_nonzero(steps) + 1
+    error = float(np.std(late)) * np.sqrt(12.0 / stamps) / float(np.ptp(even))
+    rate = 1.0 / float(even[1] - even[0])
+    base.say(
+        *("clock", f"{rate:.6g} Hz"),
+        f"{len(index) / stamps:.3g} rows have one stamp, as packets have: times are even, at"
+        f" {rate:.6g} Hz by a line through the stamps, known to {100.0 * error:.1g} %",
+        "guessed",
+    )
+    base.time_s = even
 
 
 def _interpolate_torn(_choice: Choice, base: TimeBase) -> None:

@@ -112,6 +112,10 @@ _REMARK: Final = re.compile(r"(?<=.)\s*\([^()]*\)$")
 _SLASHED: Final = re.compile(r"^(.+?)\s*/\s*(\S.*)$")
 _SPACED: Final = re.compile(r"^(.+?)(?:\s+in\s+|\s*[,;:]\s*|\s+(?=\S\S))(\S+)$")
 _SUFFIX: Final = re.compile(r"^(.+?)[_\-.]([A-Za-zµ°]+)$")
+_PER_SECOND: Final = re.compile(
+    r"(?i)^(.+?)[_\-.](m?rad|deg|[cm]?m)[_\-.](?:per[_\-.])?s(ec)?(?:ond)?((?:\^|\*\*)?2|²)?$"
+)
+"""``gyro_rad_s``, ``acc_m_s2``, ``v_cm_per_s``: the signs of a quotient are none of a name."""
 _LIKELY: Final = re.compile(
     r".*([^_\-.]{2}|[_\-.][sV°])|(?i:s|x|y|z|pos|position|displacement)[_\-.]m"
 )
@@ -127,8 +131,8 @@ def split_header(text: str) -> tuple[str, str]:
     --------
     >>> split_header("Weg &b_A1 / rad"), split_header("Angle (deg) Run #1")
     (('Weg &b_A1', 'rad'), ('Angle', 'deg'))
-    >>> split_header("theta_deg"), split_header("x"), split_header("Angle/rad")
-    (('theta', 'deg'), ('x', ''), ('Angle', 'rad'))
+    >>> split_header("theta_deg"), split_header("x"), split_header("gyro_rad_s")
+    (('theta', 'deg'), ('x', ''), ('gyro', 'rad/s'))
     """
     text = text.strip().strip('"').replace("$", "").replace("\\", "").strip()
     text = re.sub(r"_\{([^}]*)\}", r"_\1", text)
@@ -146,6 +150,8 @@ def split_header(text: str) -> tuple[str, str]:
         if found.start() and (known or " " not in found[1]):
             name = f"{text[: found.start()]} {text[found.end() :]}".strip()
             return re.sub(r"(?i)\s*\brun\s*#?\d+\s*$", "", name), found[1].strip()
+    if (rate := _PER_SECOND.match(text)) and role_of(rate[1]) != "time":
+        return rate[1].strip(), f"{rate[2]}/s{'^2' * bool(rate[4])}"
     for pattern in (_SLASHED, _SPACED, _SUFFIX, _CAMEL):
         split = pattern.match(_REMARK.sub("", text))
         # One letter after an underscore is as likely an axis or an index as a unit.

@@ -15,20 +15,28 @@ def _lines(lines: list[str]) -> list[str]:
 def _lines_of_lab(lines: list[str]) -> list[str]:
     """Read name, symbol and unit of each column, then the rows, whose number is said above them.
 
-    Each column is three lines of text above one of at least fifteen settings.
+    Each column is three lines of text above one of at least fifteen settings. Of columns that are
+    computed some are not kept: then those behind the time have no names.
     """
     settings = re.compile(r"[-+\d.eE]+( [-+\d.eE]+){14,}")
-    at = [row for row in range(4, min(len(lines), 500)) if settings.fullmatch(lines[row].strip())]
+    at = [
+        row
+        for row in range(4, min(len(lines), 500))
+        if settings.fullmatch(lines[row].strip()) and not lines[row - 2].strip()[:1].isdigit()
+    ]
     names = [" ".join(lines[row - 3 : row - 1]) for row in at]
     head = [
         f"{n} ({lines[row - 1]})" if lines[row - 1] else n for n, row in zip(names, at, strict=True)
     ]
     sizes = (
-        (row, int(found[2]))
+        (row, int(found[1]), int(found[2]))
         for row, line in enumerate(lines[:1000])
-        if (found := re.fullmatch(r"(\d+) (\d+) *", line)) and int(found[1]) == len(head)
+        if (found := re.fullmatch(r"(\d+) (\d+) *", line))
+        and lines[row + 1 : row + 2] != []
+        and len(lines[row + 1].rstrip("\t").split("\t")) == int(found[1]) > 1
     )
-    start, many = next(sizes, (len(lines), 0))
+    start, wide, many = next(sizes, (len(lines), len(head), 0))
+    head = head if len(head) == wide else [*head[:2], *[""] * (wide - 2)]
     return ["\t".join(head), *(line.rstrip("\t") for line in lines[start + 1 : start + 1 + many])]
 
 
