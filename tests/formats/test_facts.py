@@ -1,6 +1,7 @@
 """What is known of a file is a table: each fact stated, shown or guessed, with its option."""
 
 import json
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -80,3 +81,96 @@ def test_seconds_are_shown_where_no_other_unit_gives_a_swing(
     fact = read(path).fact("unit of time")
     assert fact is not None
     assert fact.how == ("shown" if unit_s == 1.0 else "guessed")
+
+
+@pytest.mark.parametrize(
+    ("first", "turn"),
+    [
+        ("2025-10-26T02:59:40+02:00", "2025-10-26T02:00:00+01:00"),
+        ("2025-03-30T01:59:40+0100", "2025-03-30T03:00:00+0200"),
+        ("2025-11-02 01:59:40-04:00", "2025-11-02 01:00:00-05:00"),
+        ("1969-12-31T23:59:40Z", "1970-01-01T00:00:00Z"),
+    ],
+)
+def test_a_clock_goes_on_over_the_end_of_summer_time_and_over_1970(
+    tmp_path: Path, first: str, turn: str
+) -> None:
+    """The rows are 20 ms apart, before the turn and behind it."""
+    zones = first[19:], turn[19:]
+    stamps = []
+    for n in range(2000):
+        base = datetime.fromisoformat((first if n < 1000 else turn)[:19])
+        late = timedelta(seconds=n / 50.0 if n < 1000 else n / 50.0 - 20.0)
+        stamps.append((base + late).isoformat(timespec="milliseconds") + zones[n >= 1000])
+    rows = "".join(f"{stamp},{x:.5f}\n" for stamp, x in zip(stamps, ANGLE, strict=True))
+    (tmp_path / "a.csv").write_text("time,theta (rad)\n" + rows)
+    np.testing.assert_allclose(np.diff(read(tmp_path / "a.csv").time_s), 0.02, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("turn", "unit", "tick"), [(604800, "s", 1.0), (604800000, "ms", 1e3), (86400, "s", 1.0)]
+)
+def test_a_clock_of_the_week_or_the_day_begins_again(
+    tmp_path: Path, turn: int, unit: str, tick: float
+) -> None:
+    stamps = np.mod(turn - 20.0 * tick + tick * TIME, turn)
+    rows = "".join(f"{t:.2f},{x:.5f}\n" for t, x in zip(stamps, ANGLE, strict=True))
+    (tmp_path / "a.csv").write_text(f"clock time ({unit}),theta (rad)\n{rows}")
+    np.testing.assert_allclose(np.diff(read(tmp_path / "a.csv").time_s), 0.02, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("rate", "packet", "late"), [(260, 16, 0.01), (100, 7, 0.03), (500, 16, 0.005)]
+)
+def test_packets_are_put_on_a_line_and_called_a_guess(
+    tmp_path: Path, rate: int, packet: int, late: float
+) -> None:
+    rng = np.random.default_rng(packet)
+    time = np.arange(6000) / rate
+    x = 0.3 * np.exp(-0.02 * time) * np.cos(2 * np.pi * time / 1.37)
+    block = np.arange(6000) // packet
+    arrival = (np.arange(block[-1] + 1) + 1) * packet / rate
+    arrival = np.maximum.accumulate(arrival + np.abs(rng.normal(0.0, late, len(arrival))))
+    rows = "".join(f"{t:.3f},{a:.5f}\n" for t, a in zip(arrival[block], x, strict=True))
+    (tmp_path / "a.csv").write_text("time (s),theta (rad)\n" + rows)
+    recording = read(tmp_path / "a.csv")
+    fact = recording.fact("clock")
+    assert fact is not None
+    assert fact.how == "guessed"
+    assert 1.0 / np.mean(np.diff(recording.time_s)) == pytest.approx(rate, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("header", "unit"),
+    [
+        ("time_s,angular_velocity_rad_s", "rad/s"),
+        ("t,gyro_rad_s", "rad/s"),
+        ("time_s,omega_deg_per_s", "rad/s"),
+        ("time_s,acc_m_s2", "m/s^2"),
+        ("time_s,v_cm_s", "m/s"),
+        ("time_s,reading_V", "V"),
+    ],
+)
+def test_a_name_states_a_unit(tmp_path: Path, header: str, unit: str) -> None:
+    recording = read(written(tmp_path / "a.csv", header, TIME, ANGLE))
+    assert recording.unit == unit
+    assert recording.unit_is_stated
+
+
+@pytest.mark.parametrize("noise", [0.01, 1.0])
+def test_of_columns_without_names_one_that_swings_clearly_is_read(
+    tmp_path: Path, noise: float
+) -> None:
+    """Noise before it, and half the period: the pull along the string."""
+    rng = np.random.default_rng(5)
+    buzz = noise * (0.3 * np.sin(40.0 * TIME) + rng.standard_normal(len(TIME)))
+    pull = 1e-3 * ANGLE**2 + 1e-5 * rng.standard_normal(len(TIME))
+    rows = np.column_stack([TIME, buzz, pull, 20.0 * ANGLE, buzz[::-1]])
+    np.savetxt(tmp_path / "a.csv", rows, fmt="%.6f", delimiter=",")
+    assert inspect(tmp_path / "a.csv").chosen == "column 4"
+
+
+def test_a_rate_that_the_stamps_contradict_is_a_guess(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.csv", "t (s),theta (rad)", TIME, ANGLE)
+    told = [read(path, ReadOptions(sample_rate=rate)).fact("clock") for rate in (50.0, 96.0)]
+    assert [fact.how for fact in told if fact] == ["stated", "guessed"]

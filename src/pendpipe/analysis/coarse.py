@@ -43,7 +43,7 @@ class Between(NamedTuple):
 
 
 def between(time_s: FloatArray, values: FloatArray, dense: float = DENSE) -> Between | None:
-    """Read a coarse record, evenly sampled, between its readings; None where it is not coarse.
+    """Read a coarse record between its readings; None where it is not coarse.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def between(time_s: FloatArray, values: FloatArray, dense: float = DENSE) -> Bet
     intervals = np.diff(time_s)
     step = float(np.mean(intervals))
     if np.max(np.abs(intervals - step)) > _EVEN * step:
-        return None
+        return _between_uneven(time_s, values, dense) if count < _MOST_UNEVEN else None
     per_cycle = 1.0 / max(_frequency(values[:_MOST]), 1e-9)
     if not _SPARSE < per_cycle < dense:
         return None
@@ -97,10 +97,37 @@ def between(time_s: FloatArray, values: FloatArray, dense: float = DENSE) -> Bet
     return Between(np.interp(place, np.arange(count), time_s), found, noise, window)
 
 
+_MOST_UNEVEN: Final = 1 << 12
+"""Readings at uneven times, as people click them in a video: their spectrum takes n^2."""
+
+
+def _between_uneven(time_s: FloatArray, values: FloatArray, dense: float) -> Between | None:
+    """Read a coarse record at uneven times: the waves of each moment by least squares."""
+    from scipy.signal import lombscargle
+
+    count, span = len(values), float(np.ptp(time_s))
+    rest = values - np.polynomial.Polynomial.fit(time_s, values, 1)(time_s)
+    omegas = 2.0 * math.pi / span * np.arange(2.0, 0.5 * count / _SPARSE * 2.0, 0.1)
+    power = lombscargle(time_s - time_s[0], rest, omegas)
+    omega = float(omegas[np.argmax(power)])
+    per_cycle = 2.0 * math.pi * count / (omega * span)
+    if not _SPARSE < per_cycle < dense:
+        return None
+    window = min(max(round(_WINDOW * per_cycle), 8), count)
+    place = np.linspace(time_s[0], time_s[-1], math.ceil(_WANTED * count / per_cycle))
+    first = np.clip(np.searchsorted(time_s, place) - window // 2, 0, count - window)
+    rows = first[:, None] + np.arange(window)
+    design = _wave(time_s[rows] - place[:, None], omega)
+    sizes = np.einsum("npw,nw->np", np.linalg.pinv(design, rcond=1e-6), values[rows])
+    left = values[rows] - np.einsum("nwp,np->nw", design, sizes)
+    noise = math.sqrt(float(np.mean(left**2)) * window / max(window - design.shape[2], 1))
+    return Between(place, sizes[:, 0] + sizes[:, 1], noise, window)
+
+
 def _wave(at: FloatArray, omega: float) -> FloatArray:
-    """A level, and a wave whose cosine and sine grow evenly, shape (n, 5)."""
+    """A level, and a wave whose cosine and sine grow evenly, shape (..., 5)."""
     cosine, sine = np.cos(omega * at), np.sin(omega * at)
-    return np.stack([np.ones_like(at), cosine, sine, at * cosine, at * sine], axis=1)
+    return np.stack([np.ones_like(at), cosine, sine, at * cosine, at * sine], axis=-1)
 
 
 def _frequency(values: FloatArray) -> float:

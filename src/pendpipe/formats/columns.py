@@ -284,8 +284,21 @@ def _time(table: Table, options: ReadOptions) -> tuple[Column | None, bool]:
         score -= 5.0 * (role == "index") or 3.0 * (not named and counts_samples(column))
         score -= 4.0 * (role == "angle" or (role == "length" and place > 0))
         best = max(best, (score, column), key=lambda each: each[0])
-    found = best[1]
-    return found, found is not None and counts_samples(found) and not counts_swings(found.name)
+    found = best[1] or next(filter(_only_rises, table.columns[1:]), None)
+    return found, found is not None and counts_samples(found) and not counts_swings(
+        f"{found.name} {found.unit}"
+    )
+
+
+def _only_rises(column: Column) -> bool:
+    """Say whether a column goes one way from row to row, as times do that are printed short."""
+    rises = one_way(column.values) == 1.0 and len(np.unique(column.values)) > _FEWEST_TIMES
+    return rises and column.role in ("length", "unknown") and not column.garbled
+
+
+_FEWEST_TIMES: Final = 100
+"""Different times by which a column without a name is known as their column: a reading that
+swings, however slowly, turns before."""
 
 
 def _of_one_run(
@@ -309,7 +322,8 @@ def _of_one_run(
         [c for c in channels if first < c.number < end]
         for first, end in zip(starts, ends, strict=True)
     ]
-    if len(starts) == 1 or not any(_WORTH[c.role] > 0.5 and _moves(c) for c in runs[0]):
+    filled = [any(_WORTH[c.role] > 0.5 and _moves(c) for c in run) for run in runs]
+    if len(starts) == 1 or not (filled[0] or sum(filled) > 1):
         return time, channels, ""
     one = next((k for k, run in enumerate(runs) if any(c.swing.clear for c in run)), 0)
     wanted = [c.number - starts[one] for c in runs[one]]

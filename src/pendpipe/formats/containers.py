@@ -263,7 +263,7 @@ def read_project(place: Path, data: bytes, options: ReadOptions) -> Table:  # no
             place, f"the XML is damaged ({fault})", "save it again, or export CSV"
         ) from None
     if root.tag == "cassylab":
-        name, found = "cassy-labx", list(_of_cassy(root))
+        name, found = "cassy-labx", _of_cassy(root)
     elif root.find(".//ColumnCells") is not None:
         name, found = "logger-pro", list(_of_logger_pro(root))
     elif "TrackerPanel" in root.get("class", ""):
@@ -296,12 +296,19 @@ def _number(text: str | None) -> float:
 _Named = tuple[str, str, Sequence[float]]
 
 
-def _of_cassy(root: ET.Element) -> Iterator[_Named]:
-    """Give each channel of a .labx file: quantity and symbol, unit, values."""
+def _of_cassy(root: ET.Element) -> list[_Named]:
+    """Give each channel of a .labx file: quantity and symbol, unit, values; run after run.
+
+    A file of several runs has those of one channel together, and empty ones where it was off.
+    """
+    found, before = list[tuple[int, _Named]](), Counter[str]()
     for channel in root.iter("channel"):
         title = f"{channel.findtext('quantity') or ''} {channel.findtext('symbol') or ''}"
         cells = [_number(cell.text) for cell in channel.find("values") or ()]
-        yield title.replace("&", ""), channel.findtext("unit") or "", cells
+        named = (title.replace("&", ""), channel.findtext("unit") or "", cells)
+        found.append((before[title], named))
+        before[title] += 1
+    return [named for _, named in sorted(found, key=lambda each: each[0])]
 
 
 def _of_logger_pro(root: ET.Element) -> Iterator[_Named]:

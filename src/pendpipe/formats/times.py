@@ -202,7 +202,7 @@ def _time_unit(
         )
         return given.factor, Fact("unit of time", asked, "stated")
     listed = choice.listed is not None and choice.listed.kind == "amplitudes"
-    if listed and counts_swings(column.name):
+    if listed and counts_swings(f"{column.name} {column.unit}"):
         return 1.0, Fact("unit of time", SWINGS, "stated", f"'{column.label}' counts swings")
     values = column.values[np.isfinite(column.values)]
     largest = float(np.abs(values).max(initial=0.0))
@@ -278,7 +278,13 @@ def _in_order(
         base.keep(slice(late.min(initial=len(base.time_s)) + 1))
         early = np.flatnonzero(base.time_s <= (-np.inf if start_s is None else start_s))
         base.keep(slice(early.max(initial=0), None))
-    repairs = [_count_rows, _keep_last, _drop_repeats, _first_of_stacked, _through_packets]
+    repairs = [
+        _count_rows,
+        _keep_last,
+        _drop_repeats,
+        _first_of_stacked,
+        _through_packets,
+    ]
     # Where stamps are rounded, rows of one time are no copies.
     rounded = len(base.time_s) > 1 and np.mean(np.diff(base.time_s) == 0.0) > 0.02
     repairs.insert(0 if rounded else 3, _interpolate_torn)
