@@ -143,7 +143,9 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         refuse_if(reading and not picked, table.place, found.problem, found.remedy)
     elif found is not None:
         sizes = replace(found.column, values=sizes_of(found.column.values), role="unknown")
-        fact = amplitudes_in(sizes.label, time and time.values, found.column.values)
+        fact = amplitudes_in(
+            sizes.label, None if time is None else time.values, found.column.values
+        )
         readings, facts = (sizes,), [fact]
     refuse_if(
         reading and not readings,

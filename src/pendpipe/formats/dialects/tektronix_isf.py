@@ -36,7 +36,7 @@ def _read(place: Path, data: bytes, _options: ReadOptions) -> Table:
     counts = np.frombuffer(data[start : start + size], f"{order}{sign}{said('BYT_N')}")
     step = float(said("YMU"))
     values = float(said("YZE", "0")) + step * (counts - float(said("YOF", "0")))
-    time_s = float(said("XZE", "0")) + float(said("XIN")) * np.arange(len(counts))
+    time_s = float(said("XZE", "0")) + float(said("XIN")) * np.arange(len(counts), dtype=np.float64)
     name = said("WFI", "curve").partition(",")[0]
     column = Column(name, said("YUN", "V"), values, 1, time_s=time_s, resolution=abs(step))
     return Table(place, "tektronix-isf", (column,))
