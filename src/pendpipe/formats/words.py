@@ -192,7 +192,7 @@ _WORDS: Final[tuple[tuple[Role, str], ...]] = (
     ),
     (
         "acceleration",
-        r"acc(el\w*)?|g ?f[xyz]|g-?force|\w*acceleration|a(x|y|z)?"
+        r"dd ?(theta|phi|alpha|angle|x|y)\d?|acc(el\w*)?|g ?f[xyz]|g-?force|\w*acceleration|a(x|y|z)?"
         r"|\w*beschleunigung|accelerazione"
         r"|aceleraci[oó]n|accélération|\w*_?ddot|ускорение|加速度|alpha_?dd",
     ),
