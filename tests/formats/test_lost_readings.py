@@ -8,7 +8,7 @@ import pytest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.formats import read
-from pendpipe.formats.table import without_marks
+from pendpipe.formats.table import without_marks, without_spikes
 
 from .cases import SHARED
 
@@ -54,7 +54,9 @@ def test_what_stands_for_a_lost_reading_is_left_out(
     values = swing(rng, 1.5, 1e-3)
     at = put(rng, number, rows)
     values[at] = lost(values[at])
-    assert np.flatnonzero(np.isnan(without_marks(values))).tolist() == sorted(at.tolist())
+    assert np.flatnonzero(np.isnan(without_spikes(without_marks(values)))).tolist() == sorted(
+        at.tolist()
+    )
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-4, 2e-3, 2e-2])
@@ -67,7 +69,7 @@ def test_a_clean_swing_loses_no_reading(noise: float, digits: int, step: int) ->
     late = values + 0.3 * (np.arange(len(values)) > 500)
     wrapped = np.mod(np.degrees(values), 360.0)
     for each in (values, np.repeat(values, 3), late, wrapped):
-        assert not np.flatnonzero(np.isnan(without_marks(each))).tolist()
+        assert not np.flatnonzero(np.isnan(without_spikes(without_marks(each)))).tolist()
 
 
 @pytest.mark.skipif(not KINDS.is_dir(), reason="no ../shared/inputs4 here")

@@ -33,6 +33,7 @@ from pendpipe.formats.table import (
     find_gaps,
     most_unpacked,
     without_marks,
+    without_spikes,
 )
 from pendpipe.formats.times import TimeBase, refuse_text, time_base
 from pendpipe.formats.units import readings
@@ -231,7 +232,9 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     found = readings(table, choice, options, base)
     facts = [*table.facts, *choice.facts, *base.facts, *found.facts]
     given = found.values[base.rows]
-    values = without_marks(given)
+    values, column = without_marks(given), choice.readings[0]
+    # A converter of an instrument loses no echo, nor does what is no swing.
+    values = without_spikes(values) if column.time_s is None and column.swing.clear else values
     _refuse_absurd(table, base, values)
     missing = np.isnan(values)
     lost = given[missing & ~np.isnan(given)] / found.factor

@@ -106,12 +106,10 @@ def swing_of(values: FloatArray) -> Swing:
 def without_marks(values: FloatArray) -> FloatArray:
     """Make NaN of readings that a sensor, or a program, gives in place of a lost one.
 
-    What instruments that speak SCPI write for an overload (9.9E+37); sentinels; lost echoes.
+    What instruments that speak SCPI write for an overload (9.9E+37), and sentinels.
     """
     overload = (np.abs(values) >= _OVERLOAD) & (np.abs(values) < 1.1 * _OVERLOAD)
-    return _without_spikes(
-        _without_codes(np.where(overload, np.nan, values) if overload.any() else values)
-    )
+    return _without_codes(np.where(overload, np.nan, values) if overload.any() else values)
 
 
 def _without_codes(values: FloatArray) -> FloatArray:
@@ -171,14 +169,14 @@ _LONGEST_SPIKE: Final = 8
 _SPIKE: Final = 0.02
 """Of the span, by which a spike is off at least: less costs a fit no more than its noise."""
 _NEAR: Final = 10
-_FASTER: Final = 2.0
-"""Times the steps of the ten readings before and behind, by which a spike steps at least."""
+_FASTER: Final = 6.0
+"""Times what a cubic misses of the ten readings before and behind, by which a spike is off."""
 _SPIKE_SD: Final = 8.0
 """Of what a cubic between the neighbours misses, by which the rows of a spike are all off: of
 10^6 readings with noise none is by chance."""
 
 
-def _without_spikes(values: FloatArray) -> FloatArray:
+def without_spikes(values: FloatArray) -> FloatArray:
     """Make NaN of up to eight rows on end that leave a smooth swing and come back to it.
 
     They all lie on one side of the cubic through two rows before and two behind, by more than
@@ -194,7 +192,8 @@ def _without_spikes(values: FloatArray) -> FloatArray:
     least = max(_SPIKE * float(high - low), 4.0 * float(steps.min()))
     begin = np.flatnonzero(steps > least) + 1
     usual = np.linspace(2, len(x) - _LONGEST_SPIKE - 3, 4000).astype(int)
-    beyond = np.pad(steps, _NEAR, mode="reflect")
+    missed = np.abs(_off_cubic(x, np.arange(2, len(x) - 2), 1)[0]) if begin.size else steps
+    beyond = np.pad(missed, _NEAR, mode="reflect")
     found: list[tuple[float, int, int]] = []
     for rows in range(1, _LONGEST_SPIKE + 1) if begin.size else ():
         at = begin[(begin > 1) & (begin + rows + 1 < len(x))]
@@ -209,10 +208,10 @@ def _without_spikes(values: FloatArray) -> FloatArray:
         beside = np.maximum(steps[at - 2], steps[at + rows]) < 0.5 * size
         odd = side & returns & beside & (size > max(least, _SPIKE_SD * noise))
         odd &= np.abs(off).max(axis=0) < 0.75 * float(high - low)
-        # Where the swing itself steps as far, few readings make a cycle.
+        # Where few readings make a cycle, or noise comes in bursts, a cubic misses all of them.
         at, size, sides = at[odd], size[odd], np.arange(_NEAR)[:, None]
-        near = [beyond[at[None] - 1 + sides], beyond[at[None] + rows + _NEAR + sides]]
-        odd = least_step[odd] > _FASTER * np.percentile(near, 80, axis=1).max(axis=0)
+        near = [beyond[np.clip(at + k + sides, 0, len(beyond) - 1)] for k in (-4, rows + 1 + _NEAR)]
+        odd = size > _FASTER * np.percentile(near, 80, axis=1).max(axis=0)
         found += [(big, first, rows) for big, first in zip(size[odd], at[odd], strict=True)]
     lost = np.zeros(len(x), dtype=bool)
     for _, first, rows in sorted(found, reverse=True):
@@ -221,10 +220,10 @@ def _without_spikes(values: FloatArray) -> FloatArray:
     if not 0.0 < lost.mean() < _MOST_SPIKES:
         return values
     # One beside another is seen when that is gone.
-    return _without_spikes(_left(values, good, starts, lost))
+    return without_spikes(_left(values, good, starts, lost))
 
 
-_MOST_SPIKES: Final = 0.05
+_MOST_SPIKES: Final = 0.02
 """Share of lost echoes beyond which nobody knows which of the readings are the swing."""
 
 

@@ -134,7 +134,7 @@ def split_header(text: str) -> tuple[str, str]:
     >>> split_header("theta_deg"), split_header("x"), split_header("gyro_rad_s")
     (('theta', 'deg'), ('x', ''), ('gyro', 'rad/s'))
     """
-    text = text.strip().strip('"').replace("$", "").replace("\\", "").strip()
+    text = " ".join(text.replace("$", "").replace("\\", "").split()).strip(' "')
     text = re.sub(r"_\{([^}]*)\}", r"_\1", text)
     text = text[1:-1] if len(text) > 2 and text[0] == text[-1] == "'" else text
     text = re.sub(r"(?i)^(latest|run\s*\d+|data ?set\s*\d*|set\s*\d+)\s*:\s*", "", text)
@@ -192,7 +192,8 @@ _WORDS: Final[tuple[tuple[Role, str], ...]] = (
     ),
     (
         "acceleration",
-        r"dd ?(theta|phi|alpha|angle|x|y)\d?|acc(el\w*)?|g ?f[xyz]|g-?force|\w*acceleration|a(x|y|z)?"
+        r"dd ?(theta|phi|alpha|angle|x|y)\d?"
+        r"|acc(el\w*)?|g ?f[xyz]|g-?force|\w*acceleration|a(x|y|z)?"
         r"|\w*beschleunigung|accelerazione"
         r"|aceleraci[oó]n|accélération|\w*_?ddot|ускорение|加速度|alpha_?dd",
     ),
