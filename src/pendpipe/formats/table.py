@@ -183,6 +183,17 @@ def without_spikes(values: FloatArray) -> FloatArray:
     `_SPIKE` of the span and `_SPIKE_SD` of what such a cubic usually misses; and they come back
     by as much as they left.
     """
+    left, before = values, None
+    while left is not before:  # one beside another is seen when that is gone
+        left, before = _without_clear_spikes(left), left
+    return (
+        left
+        if np.isnan(left).sum() - np.isnan(values).sum() < _MOST_SPIKES * len(values)
+        else values
+    )
+
+
+def _without_clear_spikes(values: FloatArray) -> FloatArray:
     good, starts, x = _levels(values)
     if len(x) < 8 * _LONGEST_SPIKE:
         return values
@@ -217,10 +228,7 @@ def without_spikes(values: FloatArray) -> FloatArray:
     for _, first, rows in sorted(found, reverse=True):
         if not lost[first - 2 : first + rows + 2].any():
             lost[first : first + rows] = True
-    if not 0.0 < lost.mean() < _MOST_SPIKES:
-        return values
-    # One beside another is seen when that is gone.
-    return without_spikes(_left(values, good, starts, lost))
+    return _left(values, good, starts, lost) if lost.any() else values
 
 
 _MOST_SPIKES: Final = 0.02
