@@ -258,7 +258,7 @@ def test_the_commands_write_what_the_contract_asks(tmp_path: Path, answer_of: An
     write_plain(recording, Recording(TIME, volts, "volts", metadata={"volts_per_radian": "3.85"}))
     assert cli.main(["turning-points", str(recording), "--out", str(points)]) == 0
     call = ["fit", str(recording), "--turning-points", str(points), "--out", str(out)]
-    assert "πf/b" in answer_of([*call, "--seed", "5"]).out
+    assert "πf/b" in answer_of([*call, "--seed", "5", "-v"]).out
     content = json.loads(out.read_text())
     assert content["provenance"]["volts_per_radian"] == 3.85
     assert content["provenance"]["seed"] == 5

@@ -14,7 +14,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray, scaled_qr
 from pendpipe.diagnosis.unwrapped import unwrapped
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.baseline import OMEGA, SHARE, B, share_by_b
+from pendpipe.effects.baseline import OMEGA, SHARE, SHARE_MEAN, SHARE_SD, B, share_by_b
 from pendpipe.effects.model import Evaluated, Model, jacobian
 from pendpipe.solve import Bounds, NoStartError, Priors, Problem, Search, Squares
 
@@ -28,8 +28,8 @@ _LARGEST_RATIO: Final = 1.5
 """By which a scale (a time, a speed, a length) may change in one step."""
 _LARGEST_CHANGE: Final = 0.05
 """Of the frequency in one step."""
-_SHARES: Final = Priors(np.array([SHARE]), np.array([0.5]), np.array([8.0**-0.5]))
-"""Prior of the hysteretic share of b about 0.5: of the fit's, flat in the roots of both parts."""
+_SHARES: Final = Priors(np.array([SHARE]), np.array([SHARE_MEAN]), np.array([SHARE_SD]))
+"""The hysteretic share of b, as normal about its mean."""
 
 
 @dataclass(frozen=True)

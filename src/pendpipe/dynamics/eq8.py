@@ -31,6 +31,11 @@ BASELINE: Final = ("a", "b", "c", "share", "omega", "start_rad", "start_s", "off
 turning point from which the motion starts (about the equilibrium) and when; and the reading of the
 equilibrium."""
 A, B, C, SHARE, OMEGA, START, TIME, OFFSET = range(8)
+SHARE_MEAN: Final = 0.5
+"""Of b's hysteretic share before any reading. Any roots of both parts are as likely (Jeffreys'
+prior of rates), so that the share is sin^2 of an arc that lies anywhere from 0 to pi/2."""
+SHARE_SD: Final = 8.0**-0.5
+"""Its standard deviation: that of such a sin^2."""
 PLACES: Final = {"a": A, "b": B, "c": C, "frequency": OMEGA, "amplitude": START, "offset": OFFSET}
 """Where what a user may hold stands in it."""
 
@@ -145,6 +150,12 @@ class Eq8:
     def rates(self) -> tuple[float, float, float, float]:
         """Return the losses in the order of `RATES`."""
         return self.quadratic, self.hysteretic, self.viscous, self.coulomb
+
+    @property
+    def share(self) -> float:
+        """The hysteretic share of b; of no b, what it is beforehand."""
+        b = self.hysteretic + self.viscous
+        return self.hysteretic / b if b > 0.0 else SHARE_MEAN
 
     def torque(self, angle: FloatArray) -> FloatArray:
         """Return omega^2 x, or omega^2 sin x, at any angles, rad/s^2."""

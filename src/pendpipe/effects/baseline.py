@@ -12,7 +12,20 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release
 from pendpipe.dynamics.any_law import Clock, Motion
-from pendpipe.dynamics.eq8 import BASELINE, OFFSET, OMEGA, SHARE, START, TIME, A, B, C, share_of
+from pendpipe.dynamics.eq8 import (
+    BASELINE,
+    OFFSET,
+    OMEGA,
+    SHARE,
+    SHARE_MEAN,
+    SHARE_SD,
+    START,
+    TIME,
+    A,
+    B,
+    C,
+    share_of,
+)
 from pendpipe.effects.effect import Pendulum
 
 __all__ = [
@@ -23,6 +36,8 @@ __all__ = [
     "OFFSET",
     "OMEGA",
     "SHARE",
+    "SHARE_MEAN",
+    "SHARE_SD",
     "START",
     "TIME",
     "VISCOUS",
@@ -56,9 +71,7 @@ def pendulum_of(value: FloatArray) -> Pendulum:
 
 def values_of(law: Eq8, release: Release, offset: float = 0.0) -> FloatArray:
     """The baseline's values of a law that moves from a turning point."""
-    b = law.hysteretic + law.viscous
-    share = law.hysteretic / b if b > 0.0 else 0.5
-    losses = law.quadratic, b, law.coulomb, share
+    losses = law.quadratic, law.hysteretic + law.viscous, law.coulomb, law.share
     return np.array([*losses, law.angular_frequency, release.angle_rad, release.time_s, offset])
 
 

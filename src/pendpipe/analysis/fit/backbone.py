@@ -237,8 +237,7 @@ def _half_swing(amplitude: FloatArray, law: Eq8) -> FloatArray:
 
 def _losses(law: Eq8) -> tuple[float, float, float, float]:
     """a, b, c, and the hysteretic share of b."""
-    b = law.hysteretic + law.viscous
-    return law.quadratic, b, law.coulomb, law.hysteretic / b if b > 0.0 else 0.5
+    return law.quadratic, law.hysteretic + law.viscous, law.coulomb, law.share
 
 
 def _loss(points: TurningPoints, rows: FloatArray) -> tuple[_Shape, FloatArray]:

@@ -21,7 +21,7 @@ from pendpipe.analysis.torque import TOP, clear, elliptic
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.eq8 import Restoring
+from pendpipe.dynamics.eq8 import SHARE_MEAN, Restoring
 from pendpipe.levels import REFUTED
 from pendpipe.physics.decay import amplitude_and_gradient
 from pendpipe.solve import (
@@ -111,7 +111,7 @@ def fit_energies(
     fixed: Mapping[str, float] | None = None,
     *,
     restoring: Restoring = "sine",
-    share: float = 0.5,
+    share: float = SHARE_MEAN,
 ) -> EnvelopeFit:
     """Fit a, b, c >= 0 and y0 to the energies of turning points.
 
@@ -208,16 +208,14 @@ def envelope_and_period(
     if restoring == "linear" and not start:
         envelope = fit_envelope(points, held.envelope)
     else:
-        middle = held.share(held.envelope.get("b", 0.0))
-        middle = 0.5 if middle is None else middle
+        middle = held.likely_share(held.envelope.get("b", 0.0))
         envelope = fit_energies(points, held.envelope, restoring=restoring, share=middle)
     rates = envelope.value[:3].tolist()
-    share = held.share(rates[1])
     period = fit_period(
         points,
         envelope.amplitude,
         rates,
-        share=0.5 if start and share is None else share,
+        share=(held.likely_share if start else held.share)(rates[1]),
         held=held.angular_frequency,
         restoring=restoring,
     )

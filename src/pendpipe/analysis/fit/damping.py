@@ -72,7 +72,7 @@ def fall_time(law: Eq8, amplitude: float, part: float) -> tuple[float, FloatArra
     b = law.hysteretic + law.viscous
     fast = fast_beside(law.quadratic, b, law.coulomb, amplitude)
     law = replace(law, angular_frequency=min(law.angular_frequency, fast))
-    share, none = law.hysteretic / b if b > 0.0 else 0.5, np.zeros(3)
+    share, none = law.share, np.zeros(3)
     if not law.quadratic * amplitude + b + law.coulomb > 0.0:
         return math.inf, none
     aim, count = math.log(part * amplitude), 64

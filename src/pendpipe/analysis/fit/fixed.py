@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Final
 
 from pendpipe.analysis.fit.fitted import PARTS, Baseline
-from pendpipe.dynamics.eq8 import OMEGA, PLACES, SHARE, Eq8, Restoring, share_of
+from pendpipe.dynamics.eq8 import OMEGA, PLACES, SHARE, SHARE_MEAN, Eq8, Restoring, share_of
 from pendpipe.errors import InputError, refuse_if
 
 _ENVELOPE: Final = ("a", "b", "c", "amplitude", "offset")
@@ -132,9 +132,13 @@ class Held:
         """The hysteretic share of b where the user, or the baseline, tells it."""
         return 0.0 if self.baseline == "viscous" else share_of(self.parts, b)
 
+    def likely_share(self, b: float) -> float:
+        """The same, or what it is beforehand."""
+        share = self.share(b)
+        return SHARE_MEAN if share is None else share
+
     def law(self, omega: float, rates: Sequence[float], restoring: Restoring = "linear") -> Eq8:
         """Eq. 8 with a, b and c; half of b is hysteretic where nothing tells how much."""
         a, b, c = rates
-        share = self.share(b)
-        hysteretic = (0.5 if share is None else share) * b
+        hysteretic = self.likely_share(b) * b
         return Eq8(omega, a, hysteretic, b - hysteretic, c, restoring)

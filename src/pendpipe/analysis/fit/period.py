@@ -11,7 +11,7 @@ import numpy as np
 from pendpipe.analysis.torque import phases
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.eq8 import Restoring
+from pendpipe.dynamics.eq8 import SHARE_MEAN, SHARE_SD, Restoring
 
 _LOUD: Final = 2.0
 """chi^2 per degree of freedom of the times from which the error follows their scatter."""
@@ -58,7 +58,7 @@ def fit_period(
     """
     omega = 2.0 * math.pi * points.apparent_frequency_hz if held is None else held
     a, b, c = rates
-    shares = np.array([0.5, 0.0, 1.0] if share is None else [share])[:, None]
+    shares = np.array([SHARE_MEAN, 0.0, 1.0] if share is None else [share])[:, None]
     half_cycles = phases(points, amplitude, (a, b, c, shares), omega, restoring) / math.pi
     weight, first_s = points.time_sd_s**-2.0, float(points.time_s[0])
     # Straight lines t = first + half period times half cycles, one a share.
@@ -82,8 +82,9 @@ def fit_period(
     if share is None:
         ends = [(found[end] - found[0], begun[end] - begun[0]) for end in (1, 2)]
         off_by = max(ends, key=lambda change: abs(change[0]))
-        matrix += np.outer(off_by, off_by) / 2.0
+        part = (SHARE_SD / SHARE_MEAN) ** 2
+        matrix += part * np.outer(off_by, off_by)
         # All times share what the unknown division of b does to the half cycles' shape.
-        matrix[1, 1] += (b / (4.0 * float(found[0]) ** 2)) ** 2 / 2.0
+        matrix[1, 1] += (b / (4.0 * float(found[0]) ** 2)) ** 2 * part
     omega = float(found[0])
     return Period(omega, first_s + float(begun[0]), matrix, chi2, omega * late)

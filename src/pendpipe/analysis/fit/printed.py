@@ -165,8 +165,11 @@ def facts(result: Fitted, *, law: bool = False) -> Iterator[tuple[str, str]]:
         moved = with_error(float(f"{_CLOCK * period.value:.1g}"), None, "s")
         yield "clock", f"an error of 50 ppm adds {moved}, not included here (--clock-ppm)"
     if known:
+        # The largest in radians as well.
+        sizes = [size, *[short_size] * (len(known) - 1)]
         found = ", ".join(
-            f"{_number(each.quality_factor)} at {size(each.amplitude_rad, unit)}" for each in known
+            f"{_number(each.quality_factor)} at {where(each.amplitude_rad, unit)}"
+            for each, where in zip(known, sizes, strict=True)
         )
         lawless = result.light == "red" or result.lawless is not None
         without = f"; {WITHOUT_LAW}" if lawless else ""
@@ -195,7 +198,7 @@ def damping(result: Fitted) -> str:
     told = ", both extrapolated" if all(beyond) else " (extrapolated)" if any(beyond) else ""
     decrement = numbers["logarithmic_decrement"]
     swing = math.isfinite(decrement.value)
-    per = f"; log. decrement {_number(decrement)} per period" if swing else ""
+    per = f"; log. decrement {_number(decrement)} a period" if swing else ""
     return f"from {short_size(first, unit)} {', '.join(falls)}{told}{per}"
 
 

@@ -309,7 +309,6 @@ def result_of(
         interval = intervals[index] if name in "abc" else (number - half, number + half)
         at_bound = name in "abc" and index not in held and number <= 0.0
         parameters[name] = Estimate(number, sd, dress[name], interval, at_bound)
-    b = parameters["b"]
     checks = check_decrement(points, law)
     if rest["method"] == "waveform" and goodness.p_value >= REFUTED:
         # Turning points that contradict a law whose residual is white are off themselves.
@@ -323,7 +322,7 @@ def result_of(
         parameters=parameters,
         covariance=covariance,
         restoring=law.restoring,
-        hysteretic_share=law.hysteretic / b.value if b.value > 0.0 else 0.5,
+        hysteretic_share=law.share,
         drag=law.drag,
         noise_rms_rad=goodness.noise_rms,
         chi2_per_dof=goodness.chi2_per_dof,

@@ -54,12 +54,10 @@ def start_values(
     points = points if restoring == "linear" else clear(points)
     envelope, period = envelope_and_period(points, held, restoring, start=True)
     a, b, c, y0, level = envelope.value.tolist()
-    share = held.share(b)
     # Times uncertain by more than 0.2 rad show no slip.
     late = period.late_rad[period.angular_frequency * points.time_sd_s < 0.2]
     slipped = held.angular_frequency is None and np.max(np.abs(late), initial=0.0) > _SLIP
-    share = 0.5 if share is None else share
-    at_first, losses = "amplitude" in held.fixed, (a, b, c, share)
+    at_first, losses = "amplitude" in held.fixed, (a, b, c, held.likely_share(b))
     angle, time, before = _release(points, y0, losses, period, restoring, at_first=at_first)
     if restoring == "sine":
         angle = math.copysign(min(abs(angle), TOP), angle)
