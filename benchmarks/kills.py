@@ -6,9 +6,9 @@
 Each case runs three records (two of a simulated instrument, one file) in a project of its own,
 disturbs the run, does what ``pendpipe doctor`` says about a lock, runs the same command again and
 compares every file of the results, byte for byte, with an undisturbed run. One project suffers
-five kills before it may end; after each, what its manifests call sound is compared. A
+five kills before it may end; after each, what is sound by the digest in it is compared. A
 result of a finished run that is torn, emptied or altered must be named and set aside as well. Left
-out are logs and manifests, which carry dates and repairs, and temporary files that a killed process
+out are logs, which carry dates, in the archives too, and temporary files that a killed process
 left.
 """
 
@@ -34,12 +34,13 @@ from benchmarks.journal import KEPT, ROOT, answers, code, commit, judge_parser
 from benchmarks.scale import write_decay
 from benchmarks.table import head, table_row
 from pendpipe.commands.doctor import TEMPORARY
-from pendpipe.files import sha256
-from pendpipe.manifest import SET_ASIDE, manifests
+from pendpipe.files import SET_ASIDE, damage_of, sha256
+from pendpipe.stages.archive import FOLDER, hashes
 
 SOURCES: Final = (
-    *("pendpipe.manifest", "pendpipe.commands.doctor", "pendpipe.commands.stage"),
+    *("pendpipe.stages.archive", "pendpipe.stages.watch", "pendpipe.commands.doctor"),
     *("pendpipe.stages.refusal", "pendpipe.stages.chunks", "pendpipe.stages.acquire"),
+    "pendpipe.commands.stage",
     *("workflow/rules/*.smk", "workflow/Snakefile", "profiles/*/*", "./Snakefile"),
     "benchmarks/kills.py",
 )
@@ -131,13 +132,18 @@ class Project:
         return False
 
     def sums(self) -> dict[str, str]:
-        """The hash of each result."""
-        return {
-            path.relative_to(self.results).as_posix(): sha256(path)
-            for path in sorted(self.results.rglob("*"))
-            if path.is_file() and path.parent.name not in ("logs", "manifest")
-            if not TEMPORARY.fullmatch(path.name) and SET_ASIDE not in path.name
-        }
+        """The hash of each result, those in archives as well."""
+        sums = {}
+        for path in sorted(self.results.rglob("*")):
+            name = path.relative_to(self.results).as_posix()
+            ours = path.is_file() and path.parent.name != "logs" and SET_ASIDE not in name
+            if not ours or TEMPORARY.fullmatch(path.name):
+                continue
+            inside = hashes(path) if path.parent.name == FOLDER and not damage_of(path) else {}
+            sums |= {f"{name}/{of}": each for of, each in inside.items() if "/logs/" not in of}
+            if not inside:
+                sums[name] = sha256(path)
+        return sums
 
     def jobs(self) -> list[int]:
         """The processes of pendpipe at work in this folder, without the shells around them."""
@@ -177,20 +183,12 @@ class Trial:
 
 
 def wrong(trial: Trial, project: Project) -> list[str]:
-    """Results that their manifests call sound and that are others than in the undisturbed run.
+    """Results that are sound by themselves and others than in the undisturbed run.
 
     One that is missing is none: Snakemake deletes what a job that was killed had written.
     """
-    homes = [project.results, *project.results.glob("*/")]
-    sound = [
-        (home / name).relative_to(project.results).as_posix()
-        for home in homes
-        for entry in manifests(home)
-        if not entry.damages(hash_all=True)
-        for name in entry.outputs
-    ]
     sums = project.sums()
-    return [name for name in sound if name in sums and sums[name] != trial.sums.get(name)]
+    return [name for name, found in sums.items() if found != trial.sums.get(name)]
 
 
 def kill_group(process: subprocess.Popen[bytes], *_: object) -> bool:

@@ -27,14 +27,14 @@ from benchmarks.journal import ROOT, answers, commit, judge_parser
 from benchmarks.table import head, table_row
 from pendpipe.configuration.load import load_campaign, read_configuration
 from pendpipe.files import write_json
-from pendpipe.manifest import Manifest, sum_of
-from pendpipe.stages.chunks import STAGES, chunks_of, write_chunk
+from pendpipe.stages.archive import pack
+from pendpipe.stages.chunks import STAGES, chunks_of
 
 FILES: Final = 100
 """Decays that are made; more records are of the same files."""
 SOURCES: Final = (
-    *("pendpipe.manifest", "pendpipe.commands.stage", "workflow/rules/*.smk", "workflow/Snakefile"),
-    "benchmarks/scale.py",
+    *("pendpipe.stages.archive", "pendpipe.stages.watch", "pendpipe.commands.stage"),
+    *("workflow/rules/*.smk", "workflow/Snakefile", "benchmarks/scale.py"),
 )
 """What plans and runs: other code has other costs."""
 
@@ -98,20 +98,17 @@ def cost(folder: Path, *words: str) -> Cost:
 
 
 def pretend(folder: Path) -> None:
-    """Leave what the records' stages would: results of a word, manifests, and chunks."""
+    """Leave what the records' stages would: archives of results of a word."""
     configuration = folder / "config/config.yaml"
     with contextlib.chdir(folder):
         campaign = load_campaign(read_configuration(configuration), configuration)
         chunks = chunks_of(campaign)
         for (chunk, records), stage in product(chunks.items(), STAGES.values()):
-            for record in records:
-                home = campaign.folder / record.record
-                write_json(home / stage.output, {})
-                made = {stage.output: sum_of(home / stage.output)}
-                read = [record.file] if record.file and not stage.inputs else []
-                sources = {path.name: sum_of(path) for path in read}
-                Manifest(home, stage.name, made, {}, sources, key="pretended").write()
-            write_chunk(campaign, stage, records, stage.path(campaign, chunk))
+            paths = [Path("pretended", record.record, stage.output) for record in records]
+            for path in paths:
+                write_json(path, {})
+            made = {record.record: {"read": {}} for record in records}
+            pack(stage.path(campaign, chunk), Path("pretended"), paths, made)
     cost(folder, "--", "--touch", "--until", "fit", "diagnose")
 
 

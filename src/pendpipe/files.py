@@ -215,12 +215,48 @@ def _fill_in(stream: IO[bytes]) -> None:
         stream.write(found.digest.encode() + found.check)
 
 
-def is_whole(content: bytes) -> bool | None:
-    """Whether a file of ours is as it was written; None where an earlier version made it."""
-    found = _seal(io.BytesIO(content))
-    if found is None:
-        return False
-    return found.stated == found.digest if found.stated else None
+SET_ASIDE: Final = ".damaged-"
+"""Stands in the name of a damaged file, before the first digits of its hash."""
+
+
+class Damage(NamedTuple):
+    """A result that is not as it was written."""
+
+    path: Path
+    problem: str
+    found: str
+    """First digits of the hash of what is there now."""
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.problem}; a run sets it aside and makes it again"
+
+    def set_aside(self) -> str:
+        """Give the file another name beside its own, and say which."""
+        kept = self.path.with_name(f"{self.path.name}{SET_ASIDE}{self.found}")
+        try:
+            self.path.replace(kept)
+        except FileNotFoundError:
+            return "it is made again"
+        except OSError as fault:
+            problem = f"{self.problem}, and it can't be renamed ({fault.strerror})"
+            raise InputError(self.path, problem, "make the folder writable") from None
+        return f"set aside as {kept.name}"
+
+
+def damage_of(path: Path) -> Damage | None:
+    """What is wrong with a result, by the digest in it; None where it is sound or nobody can tell.
+
+    Nobody can of a recording that an instrument has made, of a log, nor of what an earlier version
+    wrote.
+    """
+    with _named(path), path.open("rb") as stream:
+        found = _seal(stream)
+        stream.seek(0)
+        recorded = found is None and _RECORDED.match(stream.read(_ENDS))
+    if recorded or path.suffix == ".log" or (found and found.stated in ("", found.digest)):
+        return None
+    problem = "it is torn or altered" if path.stat().st_size else "it is empty"
+    return Damage(path, problem, sha256(path)[:8])
 
 
 def sealed(text: str) -> str:

@@ -8,7 +8,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
@@ -17,12 +17,12 @@ from typing import Final
 import numpy as np
 import pytest
 
-from pendpipe import manifest
 from pendpipe.acquisition.devices import DEVICES
 from pendpipe.acquisition.raw import RawWriter, read_raw
 from pendpipe.cli import main
 from pendpipe.errors import InputError
 from pendpipe.recording import read_plain
+from pendpipe.stages.archive import unpack
 
 # A campaign with a live record, and the device that it records.
 
@@ -79,6 +79,7 @@ class LiveCampaign:
         self.folder = folder
         self.results = folder / "results"
         self.recording = self.results / "live/recording.csv"
+        self.archive = self.results / f"chunks/acquire-{LIVE}.zip"
         time_s = np.arange(0.0, 10.0, 1 / 60)
         angle = 0.3 * np.exp(-time_s / 5) * np.cos(6.0 * time_s)
         rows = (f"{t!r},{y!r}\n" for t, y in zip(time_s.tolist(), angle.tolist(), strict=True))
@@ -102,21 +103,27 @@ class LiveCampaign:
 
     def words(self, chunk: str = LIVE, stage: str = "acquire") -> list[str]:
         """The command of the job that does a stage for a chunk."""
-        done = self.results / f"chunks/{stage}-{chunk}.json"
-        done.unlink(missing_ok=True)  # as Snakemake does before the job
-        campaign = str(self.folder / "config.yaml")
-        return ["stage", stage, "--campaign", campaign, "--chunk", chunk, "--out", str(done)]
+        campaign, done = (
+            str(self.folder / "config.yaml"),
+            self.results / f"chunks/{stage}-{chunk}.zip",
+        )
+        words = ["stage", stage, "--campaign", campaign, "--chunk", chunk, "--out", str(done)]
+        return words if stage == "acquire" else [*words, "--reading", str(self.archive)]
 
-    def job(self, *chunk_and_stage: str) -> int:
-        """Do a stage for a chunk, and return the job's status."""
-        return main(self.words(*chunk_and_stage))
+    def job(self, chunk: str = LIVE, stage: str = "acquire") -> int:
+        """Do a stage for a chunk, bring out its files, and return the job's status."""
+        status = main(self.words(chunk, stage))
+        if status == 0:
+            unpack(self.results / f"chunks/{stage}-{chunk}.zip", self.results)
+        return status
 
     def snakemake(self) -> list[str]:
         """The call of Snakemake that runs the live record up to its turning points."""
         return [
             *(sys.executable, "-m", "snakemake", "--cores", "2", "--nolock"),
             *("--configfile", str(self.folder / "config.yaml"), "--"),
-            f"{self.results}/chunks/turning-points-{LIVE}.json",
+            f"{self.results}/live/turning_points.csv",
+            f"{self.results}/live/recording.csv",
         ]
 
     def kill_at(self, recorded_s: float) -> None:
@@ -162,16 +169,7 @@ LONG_S = 8.0
 """Of a recording that is broken off, so that a busy machine does not end it before."""
 
 
-@pytest.fixture
-def forced(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """Force stages, as a run hands it on to its jobs."""
-    monkeypatch.setenv(manifest.RUN, "")
-    return lambda *stages: manifest.hand_on(anew=stages, repaired={})
-
-
-def test_neither_changed_code_nor_force_records_again(
-    tmp_path: Path, forced: Callable[..., None]
-) -> None:
+def test_neither_changed_code_nor_force_records_again(tmp_path: Path) -> None:
     """With the device gone, everything is made from the raw file, byte for byte."""
     with served_process(tmp_path, LINK) as (_, port):
         campaign = LiveCampaign(tmp_path, port, DURATION_S)
@@ -191,7 +189,8 @@ def test_neither_changed_code_nor_force_records_again(
     assert campaign.recording.read_bytes() == recording
     # Another length and another port in the table are no request to record either.
     campaign.connect("no-such-port", 2 * DURATION_S)
-    forced("acquire")
+    assert campaign.job() == 0
+    campaign.archive.unlink()
     assert campaign.job() == 0
     assert campaign.recording.read_bytes() == recording
     assert campaign.raw_files == raw
@@ -222,7 +221,9 @@ def test_a_killed_campaign_uses_what_was_recorded(tmp_path: Path) -> None:
     assert (campaign.results / "live/turning_points.csv").stat().st_size > 500
 
 
-def test_a_dead_line_fails_its_job_alone_and_the_next_tries_again(tmp_path: Path) -> None:
+def test_a_dead_line_fails_its_job_alone_and_the_next_tries_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     # Nobody listens there, and nobody else can: the name of a terminal, or of a socket that was
     # closed, is given to the next device of any test.
     with socket.socket() as silent:
@@ -231,7 +232,7 @@ def test_a_dead_line_fails_its_job_alone_and_the_next_tries_again(tmp_path: Path
         campaign = LiveCampaign(tmp_path, port, DURATION_S)
         assert campaign.job() != 0
         assert campaign.job("all") == 0
-    assert port in (campaign.results / "live/logs/acquire.log").read_text()
+    assert port in capsys.readouterr().err
     assert (campaign.results / "file/recording.csv").exists()
     assert not campaign.recording.exists()
     assert not (campaign.results / "live/refused.json").exists()
@@ -245,13 +246,15 @@ def test_a_line_that_is_lost_fails_its_job_and_the_next_records_anew(tmp_path: P
     with served_process(tmp_path, LINK) as (device, port):
         campaign = LiveCampaign(tmp_path, port, LONG_S)
         job = subprocess.Popen(
-            [sys.executable, "-m", "pendpipe.cli", *campaign.words()], stderr=subprocess.DEVNULL
+            [sys.executable, "-m", "pendpipe.cli", *campaign.words()],
+            stderr=subprocess.PIPE,
+            text=True,
         )
         while job.poll() is None and campaign.recorded_s() < 0.5:
             time.sleep(0.02)
         device.kill()
-        assert job.wait() == 1
-    log = (campaign.results / "live/logs/acquire.log").read_text()
+        _, log = job.communicate()
+    assert job.returncode == 1
     assert f"s of {LONG_S:g} s are kept in" in log.splitlines()[-1]
     assert "Traceback" not in log
     assert not campaign.recording.exists()
@@ -264,9 +267,7 @@ def test_a_line_that_is_lost_fails_its_job_and_the_next_records_anew(tmp_path: P
     assert len(read_plain(campaign.recording)) == 60
 
 
-def test_what_is_kept_of_a_lost_line_is_a_recording_once_it_is_accepted(
-    tmp_path: Path, forced: Callable[..., None]
-) -> None:
+def test_what_is_kept_of_a_lost_line_is_a_recording_once_it_is_accepted(tmp_path: Path) -> None:
     campaign = LiveCampaign(tmp_path, "gone", LONG_S)
     codes = np.rint(9000.0 * np.cos(0.3 * np.arange(120))).astype(np.int64)
     header = {"model": "DI-2108", "port": "gone", "channels": [1], "rate_hz": 60.0}
@@ -281,7 +282,6 @@ def test_what_is_kept_of_a_lost_line_is_a_recording_once_it_is_accepted(
     call = ["acquire", "--campaign", str(tmp_path / "config.yaml"), "--record", "live"]
     assert main([*call, "--accept-short"]) == 0
     recording = campaign.recording.read_bytes()
-    forced("acquire", "calibrate")
     assert [campaign.job(LIVE, stage) for stage in ("acquire", "calibrate")] == [0, 0]
     assert campaign.recording.read_bytes() == recording
     assert list(campaign.raw_files) == ["1.raw"]

@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 
 import pendpipe as pp
-from pendpipe import cli, manifest
+from pendpipe import cli
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import with_error
 from pendpipe.recording import write_plain
 from pendpipe.report.class_table import _together
+from pendpipe.stages.archive import pack
 
 # `pendpipe fit` answers: one recording or many, as a summary, a table, JSON or a figure.
 
@@ -308,9 +309,7 @@ def test_a_commands_answer_is_one_json_object(
     table.write_text("angle_rad,volts\n" + "\n".join(rows) + "\n", encoding="utf-8")
     results = tmp_path / "results"
     results.mkdir()
-    with manifest.job(results, "separate") as written:
-        (results / "separation.json").write_text("{}", encoding="utf-8")
-        written.append(results / "separation.json")
+    pack(results / "chunks/fit-all.zip", results, [], {})
     words = [word.format(folder=results, table=table) for word in command]
     assert key in json.loads(answer_of([*words, "--json"]).out)
 

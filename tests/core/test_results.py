@@ -2,7 +2,6 @@
 
 import errno
 import os
-import re
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -10,10 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pendpipe import __version__, manifest, provenance
+from pendpipe import provenance
 from pendpipe.errors import DamagedError, InputError, UnwritableError
 from pendpipe.files import read_json, replaced, write_json
+from pendpipe.stages import watch as watch_module
+from pendpipe.stages.archive import made_in, members, pack, unpack
 from pendpipe.stages.refusal import reason_of, run_stage
+from pendpipe.stages.watch import Watch
 
 # A result is whole and undamaged, or absent; a refusal says why, and a damage is mended.
 
@@ -59,19 +61,6 @@ def test_a_pipe_is_written_to_and_not_replaced(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [pipe]
 
 
-@pytest.fixture
-def home(tmp_path: Path) -> Path:
-    """A record whose stage `acquire` wrote a recording, and `fit` a fit made from it."""
-    recording, fit = tmp_path / "recording.csv", tmp_path / "fit.json"
-    with manifest.job(tmp_path, "acquire") as written:
-        recording.write_text("time_s,volts\n0.0,1.0\n0.1,2.0\n")
-        written.append(recording)
-    with manifest.job(tmp_path, "fit", inputs=[recording]) as written:
-        fit.write_text('{"a": 1}\n')
-        written.append(fit)
-    return tmp_path
-
-
 def with_its_old_time(path: Path, change: Callable[[bytes], bytes]) -> None:
     """Change a file and put its time of modification back."""
     before = path.stat()
@@ -79,168 +68,100 @@ def with_its_old_time(path: Path, change: Callable[[bytes], bytes]) -> None:
     os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
 
 
-def cut(content: bytes) -> bytes:
-    return content[:-5]
+CHANGES = {
+    "torn": lambda content: content[:-5],
+    "empty": lambda content: content[:0],
+    "torn or altered": lambda content: content.replace(b"1", b"7"),
+}
 
 
-def emptied(_: bytes) -> bytes:
-    return b""
+@pytest.fixture
+def fit(tmp_path: Path) -> Path:
+    path = tmp_path / "fit.json"
+    write_json(path, {"schema_version": 1, "a": 1})
+    return path
 
 
-def altered(content: bytes) -> bytes:
-    return content.replace(b"1", b"7")
+def planned(path: Path) -> Watch:
+    """A plan that looks at a file, and keeps what it saw beside it."""
+    watch = Watch(path.with_name("seen.json"))
+    watch.history(str(path))
+    watch.keep()
+    return watch
 
 
-def noticed(home: Path) -> list[str]:
-    return list(map(str, manifest.look_through(manifest.manifests(home)).damages))
-
-
-def history(home: Path) -> str:
-    return manifest.look_through([manifest.read_manifest(home, "fit")]).repaired
-
-
-def run_fit(home: Path) -> None:
-    with manifest.job(home, "fit", inputs=[home / "recording.csv"]) as written:
-        (home / "fit.json").write_text('{"a": 1}\n')
-        written.append(home / "fit.json")
-
-
-@pytest.mark.parametrize(
-    ("change", "problem"), [(cut, "torn"), (emptied, "empty"), (altered, "altered")]
-)
-def test_a_job_sets_a_damaged_input_aside_and_does_not_run(
-    home: Path, change: Callable[[bytes], bytes], problem: str
+@pytest.mark.parametrize("problem", CHANGES)
+def test_a_plan_notices_a_change_under_the_old_time_and_asks_for_one_run(
+    fit: Path, problem: str
 ) -> None:
-    recording = home / "recording.csv"
-    with_its_old_time(recording, change)
-    damaged = recording.read_bytes()
-    with (
-        pytest.raises(DamagedError, match=f"recording.csv: it .*{problem}.* snakemake") as caught,
-        manifest.job(home, "fit", inputs=[recording]),
-    ):
-        raise AssertionError
-    assert "\n" not in str(caught.value)
-    assert not recording.exists()
-    (kept,) = home.glob("recording.csv.damaged-*")
-    assert kept.read_bytes() == damaged
+    """The history of damages is a rule's parameter: it changes once, and stays when all is well."""
+    whole = fit.read_bytes()
+    assert planned(fit).damages == planned(fit).damages == []
+    with_its_old_time(fit, CHANGES[problem])
+    for _ in range(2):  # a dry run, and the run
+        watch = planned(fit)
+        (damage,) = watch.damages
+        assert problem in str(damage)
+        assert watch.history(str(fit)) == damage.found
+    assert damage.set_aside() == f"set aside as fit.json.damaged-{damage.found}"
+    assert planned(fit).damages == []  # Snakemake sees that it is missing
+    fit.write_bytes(whole)
+    after = planned(fit)
+    assert (after.damages, after.history(str(fit))) == ([], damage.found)
 
 
-def test_a_clock_that_was_set_back_hides_no_damage(
-    home: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_plan_reads_only_what_has_changed(fit: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = fit.with_name("decay.csv")
+    source.write_text("0,1\n")
+    first = planned(fit)
+    before = first.sha256(source)
+    first.keep()
+    with monkeypatch.context() as patched:
+        for name in ("sha256", "damage_of"):
+            patched.setattr(watch_module, name, breaks)
+        again = planned(fit)
+        assert (again.sha256(source), again.damages) == (before, [])
+    with_its_old_time(source, lambda content: content.replace(b"1", b"7"))
+    assert planned(fit).sha256(source) not in (before, None)
+    assert planned(fit).sha256(fit.with_name("none.csv")) is None
+
+
+def test_an_archive_gives_back_what_was_put_in_and_the_same_bytes(
+    tmp_path: Path, fit: Path
 ) -> None:
-    """Then the time of a change says nothing, and everything is hashed."""
-    (home / "fit.json").write_text('{"a": 2}\n')
-    monkeypatch.setattr(manifest, "_changed_ns", lambda _: 0)
-    assert noticed(home) == []
-    monkeypatch.setattr("pendpipe.manifest.time.time_ns", lambda: 0)
-    (line,) = noticed(home)
-    assert "fit.json" in line
+    paths = [tmp_path / f"{name}.zip" for name in "ab"]
+    record = tmp_path / "air-01/fit.json"
+    record.parent.mkdir()
+    for path in paths:
+        record.write_bytes(fit.read_bytes())
+        pack(path, tmp_path, [record], {"air-01": {"code": "1"}})
+        record.unlink()
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    assert made_in(paths[0]) == {"air-01": {"code": "1"}}
+    assert members(paths[0]) == ["air-01/fit.json"]
+    unpack(paths[0], tmp_path)
+    assert record.read_bytes() == fit.read_bytes()
 
 
-def test_a_damage_changes_the_rules_parameter_once(home: Path) -> None:
-    """It is new when the damage is noticed, and the same after the repair."""
-    assert history(home) == ""
-    with_its_old_time(home / "fit.json", emptied)
-    planned = history(home)
-    assert planned == "fit.json:e3b0c442"
-    run_fit(home)
-    assert history(home) == planned
-    assert noticed(home) == []
-    with_its_old_time(home / "fit.json", emptied)
-    assert history(home) == f"{planned} {planned}"
-
-
-def test_a_damage_that_snakemake_deletes_before_the_job_runs_it_once(
-    home: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("problem", CHANGES)
+def test_a_job_reads_no_archive_that_is_not_as_it_was_written(
+    tmp_path: Path, fit: Path, problem: str
 ) -> None:
-    """The job inherits what planning found, and no start of the same run adds to it."""
-    with_its_old_time(home / "fit.json", emptied)
-    planned = history(home)
-    path = manifest.read_manifest(home, "fit").path
-    monkeypatch.setenv(manifest.RUN, "")
-    manifest.hand_on(anew=[], repaired={str(path): planned})
-    for _ in range(2):
-        (home / "fit.json").unlink()
-        run_fit(home)
-        assert (history(home), noticed(home)) == (planned, [])
-
-
-def test_a_change_of_any_byte_of_a_manifest_is_damage_and_runs_the_stage_once(
-    home: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = home / "manifest/fit.json"
-    whole = path.read_bytes()
-    flipped = [whole[:n] + bytes([whole[n] ^ 1]) + whole[n + 1 :] for n in range(len(whole))]
-    for content in (b"", whole[:-1], *flipped):
-        path.write_bytes(content)
-        assert len(noticed(home)) == 1, content
-    planned = history(home)
-    run_fit(home)
-    assert "this list of results is torn or altered; set aside" in capsys.readouterr().err
-    assert (history(home), noticed(home)) == (planned, [])
-
-
-def test_a_manifest_of_an_earlier_version_is_none(home: Path) -> None:
-    """It had another check. The code is another, so its stage runs again; nothing is damaged."""
-    path = home / "manifest/fit.json"
-    path.write_text(re.sub(" sha256:[0-9a-f]*", "", path.read_text()))
-    assert not manifest.read_manifest(home, "fit").outputs
-    assert noticed(home) == []
-
-
-def test_a_manifest_states_its_form_its_stage_and_who_wrote_it(home: Path) -> None:
-    path = manifest.read_manifest(home, "fit").path
-    stated = {name: read_json(path)[name] for name in ("schema_version", "stage", "version")}
-    assert stated == {"schema_version": 1, "stage": "fit", "version": __version__}
-
-
-def test_a_sound_copy_of_the_results_is_sound(home: Path) -> None:
-    """A copy has new times of change: its files are hashed, and found as they were."""
-    for path in [*home.glob("*.*"), *home.glob("manifest/*")]:
-        path.write_bytes(path.read_bytes())
-    assert noticed(home) == []
-
-
-def test_a_result_made_from_another_recording_is_not_read(home: Path) -> None:
-    with manifest.job(home, "acquire") as written:
-        (home / "recording.csv").write_text("time_s,volts\n0.0,3.0\n")
-        written.append(home / "recording.csv")
-    with pytest.raises(DamagedError, match=r"made from another recording\.csv"):
-        manifest.check([home / "fit.json"])
-
-
-def test_a_result_from_before_there_were_manifests_is_read(home: Path) -> None:
-    for path in home.glob("manifest/*"):
-        path.unlink()
-    with_its_old_time(home / "recording.csv", cut)
-    assert home / "recording.csv" in manifest.check([home / "recording.csv"])
-
-
-def test_a_source_is_recorded_and_never_touched(home: Path, tmp_path: Path) -> None:
-    source = tmp_path / "run 7.csv"
-    source.write_text("mine\n")
-    with manifest.job(home, "acquire", sources=[source]):
-        pass
-    before = manifest.source_sha256(manifest.read_manifest(home, "acquire"), source)
-    with_its_old_time(source, bytes)  # written again as it was
-    assert manifest.source_sha256(manifest.read_manifest(home, "acquire"), source) == before
-    with_its_old_time(source, cut)
-    assert manifest.source_sha256(manifest.read_manifest(home, "acquire"), source) != before
-    assert noticed(home) == []
-    assert source.exists()
-
-
-def test_a_stage_that_fails_leaves_no_claim_about_its_results(home: Path) -> None:
-    with pytest.raises(ZeroDivisionError), manifest.job(home, "fit"):
-        raise ZeroDivisionError
-    assert read_json(home / "manifest/fit.json")["outputs"] == {}
+    """With its length and all its times as before, too."""
+    path = tmp_path / "fit-all.zip"
+    pack(path, tmp_path, [fit], {})
+    path.write_bytes(CHANGES[problem](path.read_bytes()))
+    with pytest.raises(DamagedError, match=r"set aside as fit-all\.zip\.damaged-.*run snakemake"):
+        unpack(path, tmp_path / "out")
+    assert not path.exists()
+    assert not (tmp_path / "out").exists()
 
 
 def fails() -> None:
     raise InputError("a.csv", "there is no decay", "record one")
 
 
-def breaks() -> None:
+def breaks(*_: object) -> None:
     raise ZeroDivisionError
 
 
@@ -301,13 +222,14 @@ def test_what_is_no_refusal_ends_the_program(
 
 def test_a_damaged_result_refuses_no_record(tmp_path: Path) -> None:
     recording, fit = tmp_path / "recording.csv", tmp_path / "fit.json"
+    recording.write_text("torn")
+
+    def reads() -> None:
+        raise DamagedError(recording, "it is torn", "run again")
+
     refused = tmp_path / "refused.json"
-    run_stage(
-        "acquire", "x", lambda: write(recording, "whole"), outputs=[recording], refused=refused
-    )
-    write(recording, "torn")
     with pytest.raises(DamagedError):
-        run_stage("fit", "x", fails, outputs=[fit], refused=refused, inputs=[recording])
+        run_stage("fit", "x", reads, outputs=[fit], refused=refused, inputs=[recording])
     assert not refused.exists()
     assert not fit.exists()
 

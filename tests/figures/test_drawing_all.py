@@ -115,8 +115,10 @@ def test_recordings_of_others_have_their_decays_only(small: tuple[dict[str, Any]
     }
     drawn = draw_all(bare, folder, folder / "figures")
     assert not (folder / "figures").exists()
-    assert len(drawn.files) == len(content["records"])
+    assert len(drawn.files) == len(bare["records"])
     assert "refused" in drawn.left_out["gone, decay"]
+    in_its_place = ET.parse(folder / "gone/figures/decay.svg").getroot()
+    assert "refused" in "".join(in_its_place.itertext())
 
 
 @pytest.mark.parametrize(

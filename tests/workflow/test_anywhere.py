@@ -14,13 +14,14 @@ from pendpipe.cli import main
 from pendpipe.configuration.jobs import prepare_environment
 from pendpipe.configuration.load import load_campaign, read_configuration, read_records
 from pendpipe.project import SNAKEFILE
-from pendpipe.stages.chunks import STAGES, batch_for, chunks_of, plan, split
+from pendpipe.stages.chunks import SMALL, STAGES, batch_for, split
 
 # The workflow runs in any folder: begun by `init`, run by `campaign`, or used as a module.
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 RECORDS_STAGES = ("acquire", "calibrate", "turning_points", "fit")
+ORDER = [name.replace("_", "-") for name in RECORDS_STAGES]
 
 
 def call(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
@@ -105,7 +106,8 @@ def test_a_campaign_that_was_begun_runs_to_its_report(begun: Path) -> None:
     assert "fit: 1 done" in lines
     assert "1 of 3 records were refused" in lines[-1]
     alone = call(begun, "pendpipe", "campaign", "-n", "--record", "rod", "--", "--forcerun", "fit")
-    assert jobs(alone) == dict.fromkeys(RECORDS_STAGES, 1) | {"all": 1, "total": 5}
+    files = {f"{name}_files_{number}": 1 for number, name in enumerate(RECORDS_STAGES)}
+    assert jobs(alone) == dict.fromkeys(RECORDS_STAGES, 1) | files | {"all": 1, "total": 9}
     assert not sprung.exists(), f"neither the run nor the plan uses them: {sprung.read_text()}"
 
 
@@ -137,22 +139,20 @@ rule all:
     )
     records = begun / "config/records.tsv"
     records.write_text("record\tsource\nrod\trecordings/rod-pendulum.csv\n", encoding="utf-8")
-    targets = ("results/chunks/fit-all.json", "results/records.csv")
+    targets = ("results/rod/fit.json", "results/records.csv")
     ran = jobs(call(begun, "snakemake", "--cores", "2", *targets))
-    names = {f"pendpipe_{name}" for name in (*RECORDS_STAGES, "records")}
+    names = {f"pendpipe_{name}" for name in (*RECORDS_STAGES, "fit_files_3", "records")}
     assert set(ran) == names | {"total"}
     fit, table = begun / "results/rod/fit.json", begun / "results/records.csv"
-    points = fit.with_name("turning_points.csv")
-    made, before = points.stat().st_ino, (fit.read_bytes(), table.read_bytes())
+    before = (fit.read_bytes(), table.read_bytes())
     for path in (fit, table):
         path.write_bytes(path.read_bytes()[:-5])
     again = call(
         begun, "snakemake", "--cores", "2", *targets, "--forcerun", "pendpipe_turning_points"
     )
     assert set(jobs(again)) == {
-        f"pendpipe_{name}" for name in ("turning_points", "fit", "records")
+        f"pendpipe_{name}" for name in ("turning_points", "fit", "fit_files_3", "records")
     } | {"total"}, "all else is done"
-    assert points.stat().st_ino != made, "made again, under the name that the rule has here"
     assert (fit.read_bytes(), table.read_bytes()) == before
     assert len(list(fit.parent.glob("fit.json.damaged-*"))) == 1
 
@@ -263,11 +263,12 @@ def test_a_row_says_how_its_file_is_read(begun: Path, monkeypatch: pytest.Monkey
     )
     monkeypatch.chdir(begun)
     campaign = load_campaign(read_configuration("config/config.yaml"), "config/config.yaml")
-    for stage in ("acquire", "calibrate", "turning-points", "fit"):
-        out = STAGES[stage].path(campaign, "all")
-        out.parent.mkdir(parents=True, exist_ok=True)
+    archives = [STAGES[stage].path(campaign, "all") for stage in ORDER]
+    for number, (stage, out) in enumerate(zip(ORDER, archives, strict=True)):
         words = ["stage", stage, "--campaign", "config/config.yaml", "--chunk", "all"]
-        assert main([*words, "--out", str(out)]) == 0
+        assert main([*words, "--out", str(out), "--reading", *map(str, archives[:number])]) == 0
+    for path in archives:
+        assert main(["unpack", str(path), "results"]) == 0
     fit = json.loads((begun / "results/comma/fit.json").read_text(encoding="utf-8"))
     assert fit["parameters"]["amplitude"]["unit"] == "m"
     assert fit["restoring"] == "linear"
@@ -334,20 +335,23 @@ def test_a_source_of_any_name_stops_no_other_record(tmp_path: Path) -> None:
     assert counted["diagnose_pendulum"] == 1
 
 
-def test_recordings_of_others_need_no_file_for_a_plan(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_recordings_of_others_need_no_file_for_a_plan(tmp_path: Path) -> None:
     """On a clean checkout there is no ../shared; the records are then refused, one by one."""
-    monkeypatch.chdir(ROOT)
-    name = "benchmarks/shared_recordings.yaml"
-    content = read_configuration(name) | {"results": (tmp_path / "results").as_posix()}
-    campaign = load_campaign(content, name)
-    planned = {
-        chunk: [plan(campaign, stage, chunk, records).found for stage in STAGES.values()]
-        for chunk, records in chunks_of(campaign).items()
-    }
-    assert len(planned) == chunks(ROOT / "benchmarks/shared_recordings.tsv")
-    assert not any(found.damages for of_chunk in planned.values() for found in of_chunk)
+    words = ("--configfile", str(ROOT / "benchmarks/shared_recordings.yaml"))
+    counted = jobs(dry_run(tmp_path / "results", *words))
+    assert counted["acquire"] == chunks(ROOT / "benchmarks/shared_recordings.tsv")
+
+
+def test_a_record_of_many_has_its_files_when_they_are_asked_for(tmp_path: Path) -> None:
+    """Ten thousand are planned in chunks; a job brings out a file that is asked for."""
+    rows = "".join(f"r{number}\tdecay.csv\n" for number in range(SMALL + 1))
+    (tmp_path / "records.tsv").write_text(f"record\tsource\n{rows}", encoding="utf-8")
+    (tmp_path / "config.yaml").write_text("title: Many\nrecords: records.tsv\n", encoding="utf-8")
+    words = ("snakemake", "-n", "--snakefile", str(SNAKEFILE), "--configfile", "config.yaml")
+    everything = jobs(call(tmp_path, *words))
+    assert not any("files" in name for name in everything)
+    one = jobs(call(tmp_path, *words, "--", "results/r7/fit.json"))
+    assert one == dict.fromkeys((*RECORDS_STAGES, "record_file"), 1) | {"total": 5}
 
 
 def test_a_faulty_configuration_stops_before_any_job(tmp_path: Path) -> None:

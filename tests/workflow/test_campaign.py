@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,6 @@ import pendpipe
 from pendpipe.cli import main
 from pendpipe.configuration.load import read_records
 from pendpipe.files import check_output
-from pendpipe.manifest import FOLDER, manifests
 from pendpipe.project import SNAKEFILE
 from pendpipe.stages.chunks import split
 
@@ -166,9 +166,9 @@ def test_the_inertia_has_the_errors_of_its_frequency_and_of_its_torque(campaign:
 
 def test_every_result_says_inside_who_made_it(campaign: Campaign) -> None:
     """That is how it may be replaced; a user's own file may not, nor what he has edited."""
-    homes = [path.parent for path in campaign.results.rglob(FOLDER)]
-    made = {home / name for home in homes for one in manifests(home) for name in one.outputs}
-    assert {path.suffix for path in made} >= {".csv", ".json", ".svg", ".parquet", ".html"}
+    made = [path for path in campaign.results.rglob("*") if path.is_file()]
+    made = [path for path in made if path.suffix != ".log"]
+    assert {path.suffix for path in made} >= {".csv", ".json", ".svg", ".parquet", ".html", ".zip"}
     for path in made:
         check_output(path)
 
@@ -220,11 +220,15 @@ HEAD = "record\tsource\tfluid\tbranch\tgeometry\tstart_s\ttemperature_c\n"
 BY_HAND = """
 acquire --campaign config/config.yaml --caliper --out results/calibration/caliper.csv
 calibrate results/calibration/caliper.csv --arm-m 0.3 --out results/calibration/sensor.json
-stage acquire --campaign config/config.yaml --chunk all --out results/chunks/acquire-all.json
-stage calibrate --campaign config/config.yaml --chunk all --out results/chunks/calibrate-all.json
+stage acquire --campaign config/config.yaml --chunk all --out results/chunks/acquire-all.zip
+stage calibrate --campaign config/config.yaml --chunk all --out results/chunks/calibrate-all.zip \
+ --reading results/chunks/acquire-all.zip
 stage turning-points --campaign config/config.yaml --chunk all \
- --out results/chunks/turning-points-all.json
-stage fit --campaign config/config.yaml --chunk all --out results/chunks/fit-all.json
+ --out results/chunks/turning-points-all.zip \
+ --reading results/chunks/acquire-all.zip results/chunks/calibrate-all.zip
+stage fit --campaign config/config.yaml --chunk all --out results/chunks/fit-all.zip --reading \
+ results/chunks/acquire-all.zip results/chunks/calibrate-all.zip \
+ results/chunks/turning-points-all.zip
 separate --campaign config/config.yaml --out results/separation.json
 compare --campaign config/config.yaml --separation results/separation.json \
  --out results/comparison.json --summary results/campaign.json
@@ -317,19 +321,16 @@ def damage(path: Path, change: Callable[[bytes], bytes]) -> None:
 def test_damaged_results_are_named_and_made_again_and_nothing_else_is(
     campaign: Campaign, tmp_path: Path
 ) -> None:
-    """Torn, emptied, lost, altered with their old times: the next run ends as the first.
-
-    Damages of each stage are those of `test_chunks`; these are of the last ones.
-    """
+    """Torn, emptied, lost, altered with their old times: the next run ends as the first."""
     damages: dict[str, Callable[[bytes], bytes]] = {
         "water-low-5/diagnosis/diagnosis.json": lambda content: content[:0],
         "water-high-4/figures/decay.svg": lambda content: content[:100],
+        "chunks/fit-0.zip": lambda content: content[:-3],
         "separation.json": lambda content: content.replace(b"1", b"2", 1),
         "campaign.json": lambda content: content[:-2],
     }
-    # Snakemake knows what the job of a chunk leaves, and no record's files.
     lost = ("water-low-4/diagnosis/diagnosis.json",)
-    before = (campaign.results / "campaign.json").read_bytes()
+    before = {name: (campaign.results / name).read_bytes() for name in (*damages, *lost)}
     source = campaign.folder / NO_DECAY.name
     source_before = (source.read_bytes(), source.stat().st_mtime_ns)
     for name, change in damages.items():
@@ -338,32 +339,61 @@ def test_damaged_results_are_named_and_made_again_and_nothing_else_is(
         (campaign.results / name).unlink()
     planned = campaign.snakemake("-n")
     assert not list(campaign.results.rglob("*.damaged-*")), "a dry run moves nothing"
-    # A copy of the library is the same library: nothing else runs.
-    ran = campaign.snakemake(library=copied_library(tmp_path))
-    assert jobs_in(ran) == jobs_in(planned)
-    for name in (*damages, *lost):
+    assert jobs_in(planned)["fit"] == 1
+    assert not {"acquire", "diagnose"} & jobs_in(planned).keys()
+    ran = campaign.snakemake()
+    for name in damages:
         assert f"{campaign.results.name}/{name}: " in planned
         assert f"{campaign.results.name}/{name}: " in ran
-        assert (campaign.results / name).exists()
-        aside = campaign.results.glob(f"{name}.damaged-*")
-        assert len(list(aside)) == (0 if name in lost else 1)
-    assert (campaign.results / "campaign.json").read_bytes() == before
+        assert len(list(campaign.results.glob(f"{name}.damaged-*"))) == 1
+    for name, content in before.items():
+        # (The logs in an archive bear dates.)
+        assert (campaign.results / name).read_bytes() == content or name.endswith(".zip")
     assert (source.read_bytes(), source.stat().st_mtime_ns) == source_before
+    # A copy of the library is the same library.
+    said = campaign.snakemake("-n", library=copied_library(tmp_path))
+    assert not jobs_in(said), said
 
 
-def test_a_job_that_reads_a_damaged_result_says_so_and_writes_none(
-    campaign: Campaign, tmp_path: Path, answer_of: Any
-) -> None:
-    """Damage between planning and job: status 2, one line, and no refusal."""
-    record = tmp_path / "results/air-07"
-    shutil.copytree(campaign.results / "air-07", record)
-    damage(record / "turning_points.csv", lambda content: content[:3000])
-    call = ["fit", str(record / "recording.csv"), "--record", "air-07"]
-    call += ["--calibration", str(record / "calibration.json")]
-    call += ["--turning-points", str(record / "turning_points.csv")]
-    call += ["--out", str(record / "fit.json"), "--refused", str(record / "refused.json")]
-    (line,) = answer_of(call, 2).err.splitlines()
-    assert "turning_points.csv: it is torn" in line
-    assert "run snakemake again" in line
-    assert not (record / "refused.json").exists()
-    assert not (record / "turning_points.csv").exists()
+STAGE_NAMES = ("acquire", "calibrate", "turning_points", "fit", "diagnose")
+OF_THE_CAMPAIGN = {
+    *("separate", "compare", "diagnose_campaign", "records", "figures", "report", "all")
+}
+
+
+def rules_of(planned: dict[str, int]) -> dict[str, int]:
+    """The jobs of each rule; those that bring out the files of a stage's records together."""
+    found = Counter[str]()
+    for name, number in planned.items():
+        found[re.sub(r"_files_\d+$", "_files", name)] += number
+    del found["total"]
+    return dict(found)
+
+
+def test_what_is_asked_for_is_planned_and_no_more(campaign: Campaign, tmp_path: Path) -> None:
+    """A record's file, a stage of all by its target, ``--until``, ``--forcerun``, ``only``."""
+    new, n = Campaign(tmp_path), campaign.chunks
+    up_to_fit = dict.fromkeys(STAGE_NAMES[:4], 1)
+    one = rules_of(new.planned(f"{new.results.name}/air-07/fit.json"))
+    assert one == up_to_fit | {"caliper": 1, "fit_files": 1}
+    of_all = dict.fromkeys(STAGE_NAMES[:4], n) | {"caliper": 1}
+    assert rules_of(new.planned("all_fit")) == of_all | {"fit_files": n, "all_fit": 1}
+    assert rules_of(new.planned("--until", "fit")) == of_all
+    alone = ("--config", "only=[air-07]")
+    files = {f"{name}_files": 1 for name in STAGE_NAMES}
+    stages = dict.fromkeys(STAGE_NAMES, 1)
+    assert rules_of(new.planned(*alone)) == stages | files | {"caliper": 1, "all": 1}
+    # Of a finished campaign.
+    forced = dict.fromkeys(OF_THE_CAMPAIGN, 1) | {"fit": n, "fit_files": n}
+    for words in (("--forcerun", "fit"), ("-R", "fit")):
+        assert rules_of(campaign.planned(*words)) == forced
+    file = f"{campaign.results.name}/air-07/fit.json"
+    assert rules_of(campaign.planned("--forcerun", "fit", "--", file)) == {"fit": 1, "fit_files": 1}
+
+
+def test_snakemake_knows_every_file_of_a_finished_campaign(campaign: Campaign) -> None:
+    """But its configuration, and damaged results that were kept."""
+    listed = campaign.snakemake("--list-untracked").splitlines()
+    unknown = [line for line in listed if line.startswith(f"{campaign.results.name}/")]
+    assert [name for name in unknown if ".damaged-" not in name] == []
+    assert "config/config.yaml" in listed, "so it does list"

@@ -8,19 +8,20 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
+import zipfile
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from pendpipe import manifest
 from pendpipe.cli import main
 from pendpipe.configuration.load import Campaign, Record, load_campaign, read_configuration
-from pendpipe.files import sha256
-from pendpipe.stages.chunks import STAGES, chunks_of, plan, split
+from pendpipe.stages.archive import gathered, made_in
+from pendpipe.stages.chunks import STAGES, Stage, chunks_of, refused, split, tidy
 
 RECORDS = ("one", "two", "three", "four", "five")
 ORDER = ("acquire", "calibrate", "turning-points", "fit")
@@ -35,8 +36,8 @@ def of_names(words: set[str]) -> dict[str, Record]:
 @given(names, st.integers(1, 20), st.text("abcdefghij", min_size=1, max_size=6))
 def test_an_added_record_changes_one_chunk(words: set[str], batch: int, added: str) -> None:
     before, after = split(of_names(words), batch), split(of_names(words | {added}), batch)
-    for chunks, members in ((before, words), (after, words | {added})):
-        assert sorted(each.record for rows in chunks.values() for each in rows) == sorted(members)
+    for chunks, all_words in ((before, words), (after, words | {added})):
+        assert sorted(each.record for rows in chunks.values() for each in rows) == sorted(all_words)
         assert max(map(len, chunks.values())) <= batch
     as_sets = [
         {name: {each.record for each in rows} for name, rows in chunks.items()}
@@ -88,8 +89,13 @@ def loaded() -> Campaign:
 
 
 def words(stage: str, chunk: str = "all") -> list[str]:
-    out = STAGES[stage].path(loaded(), chunk)
-    return ["stage", stage, "--campaign", "config.yaml", "--chunk", chunk, "--out", str(out)]
+    """The command of a job, as its rule has it."""
+    campaign = loaded()
+    before = ORDER[:3] if stage in ("fit", "diagnose") else ORDER[: ORDER.index(stage)]
+    reading = [str(STAGES[name].path(campaign, chunk)) for name in before]
+    out = str(STAGES[stage].path(campaign, chunk))
+    call = ["stage", stage, "--campaign", "config.yaml", "--chunk", chunk, "--out", out]
+    return [*call, "--reading", *reading] if reading else call
 
 
 def run(*stages: str) -> None:
@@ -97,59 +103,73 @@ def run(*stages: str) -> None:
         assert main(words(stage)) == 0
 
 
-def fits() -> dict[str, Path]:
-    return {name: Path("results", name, "fit.json") for name in RECORDS}
-
-
-def written(paths: dict[str, Path]) -> dict[str, int]:
-    return {name: path.stat().st_mtime_ns for name, path in paths.items() if path.exists()}
-
-
-def changed(before: dict[str, int]) -> list[str]:
-    """The records whose file was written again."""
-    after = written(fits())
-    return [name for name in RECORDS if after[name] != before[name]]
+def fits() -> dict[str, bytes]:
+    """What the archive of the fits holds of each record."""
+    with zipfile.ZipFile(STAGES["fit"].path(loaded(), "all")) as archive:
+        return {name: archive.read(f"{name}/fit.json") for name in RECORDS}
 
 
 @pytest.fixture
-def before(done: Campaign) -> dict[str, int]:
-    """When the fit of each record was written."""
-    return written(fits())
+def calls(monkeypatch: pytest.MonkeyPatch) -> Callable[[], list[str]]:
+    """The records that were fitted since the last question."""
+    original, seen = Stage.call, list[str]()
+
+    def counted(stage: Stage, campaign: Campaign, record: Record, *rest: Any) -> list[str]:
+        if stage.name == "fit":
+            seen.append(record.record)
+        return original(stage, campaign, record, *rest)
+
+    monkeypatch.setattr(Stage, "call", counted)
+
+    def since() -> list[str]:
+        found, seen[:] = [*seen], []
+        return found
+
+    return since
 
 
-def test_what_is_done_is_not_done_again(done: Campaign, before: dict[str, int]) -> None:
-    assert set(before) == set(RECORDS)
-    STAGES["fit"].path(done, "all").unlink()  # as Snakemake does before the job
-    run("fit")
-    assert written(fits()) == before
+Calls = Callable[[], list[str]]
 
 
-def test_a_changed_input_is_done_anew_and_no_other(before: dict[str, int]) -> None:
+def test_a_changed_input_is_done_anew_and_no_other(done: Campaign, calls: Calls) -> None:
+    before = fits()
     write_decay(Path("two.csv"), 17)
     run(*ORDER)
-    assert changed(before) == ["two"]
+    assert calls() == ["two"]
+    assert [name for name, fit in fits().items() if fit != before[name]] == ["two"]
 
 
-def test_a_changed_setting_is_done_anew(before: dict[str, int]) -> None:
+def test_a_changed_setting_is_done_anew(done: Campaign, calls: Calls) -> None:
     with Path("config.yaml").open("a", encoding="utf-8") as stream:
         stream.write("fit: {method: waveform}\n")
     run("fit")
-    assert changed(before) == list(RECORDS)
+    assert calls() == list(RECORDS)
 
 
-def test_a_forced_stage_is_done_anew(
-    before: dict[str, int], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv(manifest.RUN, "")
-    manifest.hand_on(anew=["fit"], repaired={})
+def test_what_is_asked_for_once_more_is_done_anew(done: Campaign, calls: Calls) -> None:
+    """A job is run only for a reason: where no record has one, it was forced."""
+    before = fits()
     run("fit")
-    assert changed(before) == list(RECORDS)
+    assert calls() == list(RECORDS)
+    assert fits() == before
 
 
-def test_one_records_fault_is_its_own(
+def test_a_chunk_that_is_split_or_alone_takes_over_what_is_done(
+    done: Campaign, calls: Calls
+) -> None:
+    for extra in ("batch: 3", "batch: 3\nonly: [two]"):
+        Path("config.yaml").write_text(f"title: Five\nrecords: records.tsv\n{extra}\n", "utf-8")
+        for chunk, stage in product(chunks_of(loaded()), ORDER):
+            assert main(words(stage, chunk)) == 0
+    assert calls() == []
+    tidy(done)
+    left = {path.name for path in Path("results/chunks").iterdir()}
+    assert left == {f"{stage}-all.zip" for stage in ORDER}
+
+
+def test_one_records_fault_fails_its_chunk_alone_and_names_it(
     campaign: Campaign, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The others are done, the chunk's job fails, and the next ends what is left."""
     run(*ORDER[:3])
     from pendpipe.arguments import COMMANDS
     from pendpipe.commands import fit
@@ -164,131 +184,44 @@ def test_one_records_fault_is_its_own(
     with monkeypatch.context() as patched:
         patched.setitem(COMMANDS, real, COMMANDS[real]._replace(run=faulty))
         assert main(words("fit")) == 1
-    assert "two: ZeroDivisionError: a fault of the program" in capsys.readouterr().err
-    assert "Traceback" in Path("results/two/logs/fit.log").read_text(encoding="utf-8")
-    before = written(fits())
-    assert set(before) == set(RECORDS) - {"two"}
-    assert not STAGES["fit"].path(campaign, "all").exists()
+    said = capsys.readouterr().err
+    assert "two: ZeroDivisionError: a fault of the program" in said
+    assert "Traceback" in said
+    assert not STAGES["fit"].path(campaign, "all").exists(), "whole or absent"
     run("fit")
-    assert {name: number for name, number in written(fits()).items() if name != "two"} == before
+    assert set(fits()) == set(RECORDS)
 
 
-def test_a_refused_record_stops_no_chunk(campaign: Campaign) -> None:
-    Path("two.csv").write_text("no recording\n", encoding="utf-8")
+def test_a_refused_record_stops_no_chunk_and_its_refusal_ends_with_its_fault(
+    campaign: Campaign, calls: Calls
+) -> None:
+    """Its files are stubs with the reason, and one says it in a line."""
+    whole = Path("two.csv").read_text(encoding="utf-8")
+    Path("two.csv").write_text("".join(whole.splitlines(keepends=True)[:40]), encoding="utf-8")
     run(*ORDER)
-    assert json.loads(fits()["two"].read_text(encoding="utf-8"))["refused"]
-    before = written(fits())
+    tidy(campaign)
+    refusal = Path("results/two/refused.json")
+    reason = json.loads(refusal.read_text(encoding="utf-8"))["reason"]
+    assert json.loads(fits()["two"])["refused"] == reason
+    assert refused(campaign) == ["two"]
+    Path("two.csv").write_text(whole, encoding="utf-8")
+    calls()
     run(*ORDER)
-    assert written(fits()) == before
+    tidy(campaign)
+    assert calls() == ["two"]
+    assert refused(campaign) == []
+    assert not refusal.exists()
 
 
-def cut(path: Path) -> None:
+def test_a_torn_archive_is_set_aside_and_made_again(
+    done: Campaign, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, before = STAGES["fit"].path(done, "all"), fits()
     path.write_bytes(path.read_bytes()[:-5])
-
-
-def altered(path: Path) -> None:
-    before = path.stat()
-    path.write_bytes(path.read_bytes().replace(b"1", b"7"))
-    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
-
-
-def in_the_future(path: Path) -> None:
-    """Altered while the manifest's time lies in the future."""
-    later = time.time() + 1e6
-    os.utime(path.parent / "manifest/fit.json", (later, later))
-    altered(path)
-
-
-@pytest.mark.parametrize(
-    ("change", "name"),
-    [
-        (Path.unlink, "fit.json"),
-        (cut, "fit.json"),
-        (altered, "fit.json"),
-        (in_the_future, "fit.json"),
-        (altered, "manifest/fit.json"),
-        (cut, "manifest/fit.json"),
-        (cut, "recording.csv"),
-        (Path.unlink, "calibration.json"),
-        (altered, "turning_points.csv"),
-    ],
-)
-def test_a_plan_notices_what_a_job_then_makes_again(
-    done: Campaign,
-    change: Callable[[Path], None],
-    name: str,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    output = Path(name).name
-    (stage,) = (each for each in STAGES.values() if each.output == output)
-    files, records = [Path("results", each, output) for each in RECORDS], chunks_of(done)["all"]
-    sound = plan(done, stage, "all", records).found
-    assert (sound.repaired, sound.damages) == ("", ())
-    before, times = [sha256(path) for path in files], [path.stat().st_mtime_ns for path in files]
-    change(Path("results/two", name))
-    found = plan(done, stage, "all", records).found
-    (damage,) = found.damages
-    assert damage.path == Path("results/two", name)
-    assert found.repaired != sound.repaired, "a changed parameter runs the job"
-    run(stage.name)
-    assert ("; set aside as " in capsys.readouterr().err) == (damage.found != "missing")
-    assert [sha256(path) for path in files] == before
-    after = plan(done, stage, "all", records).found
-    assert (after.damages, after.repaired) == ((), found.repaired), "and runs it once"
-    anew = [path.stat().st_mtime_ns != time_ns for path, time_ns in zip(files, times, strict=True)]
-    assert anew == [name == "two" for name in RECORDS]
-
-
-def test_a_torn_refusal_is_made_again(campaign: Campaign) -> None:
-    refused, stage = Path("results/two/refused.json"), STAGES["turning-points"]
-    Path("two.csv").write_text(
-        "time_s,angle_rad\n" + "".join(f"{n},1\n" for n in range(400)), "utf-8"
-    )
-    run(*ORDER)
-    before = refused.read_bytes()
-    refused.write_bytes(before[:20])
-    found = plan(campaign, stage, "all", chunks_of(campaign)["all"]).found
-    run(*ORDER)
-    assert refused.read_bytes() == before
-    after = plan(campaign, stage, "all", chunks_of(campaign)["all"]).found
-    assert (after.damages, after.repaired) == ((), found.repaired)
-    assert found.repaired.startswith("refused.json:")
-
-
-def test_a_refusal_that_is_over_is_no_damage(campaign: Campaign) -> None:
-    """A stage refused a record, and its file was changed: acquire takes the refusal back."""
-    two = Path("two.csv")
-    whole, fit = two.read_text(encoding="utf-8"), STAGES["fit"]
-    two.write_text("".join(whole.splitlines(keepends=True)[:40]), encoding="utf-8")
-    run(*ORDER)
-    refused = json.loads(Path("results/two/refused.json").read_text(encoding="utf-8"))
-    assert refused["stage"] != "acquire"
-    two.write_text(whole, encoding="utf-8")
-    before = plan(campaign, fit, "all", chunks_of(campaign)["all"])
-    run(*ORDER)
-    after = plan(campaign, fit, "all", chunks_of(campaign)["all"])
-    assert (before.found, after.found) == (manifest.Findings(), manifest.Findings())
-
-
-def test_what_a_chunk_says_when_it_is_torn_is_made_again(
-    campaign: Campaign, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    run("acquire")
-    acquire, records = STAGES["acquire"], chunks_of(campaign)["all"]
-    path = acquire.path(campaign, "all")
-    whole = path.read_bytes()
-    sound = plan(campaign, acquire, "all", records).found
-    path.write_bytes(whole[:100])
-    torn = plan(campaign, acquire, "all", records)
-    (damage,) = torn.found.damages
-    assert damage.path == path
-    assert torn.found.repaired != sound.repaired, "a changed parameter runs the job"
-    monkeypatch.setenv(manifest.RUN, "")
-    manifest.hand_on(anew=[], repaired={str(path): torn.own})
-    damage.set_aside()  # as when a run starts
-    run("acquire")
-    after = plan(campaign, acquire, "all", records).found
-    assert (after.damages, after.repaired) == ((), torn.found.repaired), "and runs it once"
+    assert made_in(path) == {}
+    run("fit")
+    assert "set aside as fit-all.zip.damaged-" in capsys.readouterr().err
+    assert fits() == before
 
 
 def test_records_of_an_instrument_have_a_chunk_each(campaign: Campaign) -> None:
@@ -301,29 +234,39 @@ def test_records_of_an_instrument_have_a_chunk_each(campaign: Campaign) -> None:
 
 
 @pytest.mark.slow
-def test_a_chunk_that_is_killed_ends_the_same_and_repeats_nothing(done: Campaign) -> None:
-    """Killed -9 four times, anywhere: what was finished stays, and all ends as undisturbed."""
-    undisturbed = {name: sha256(path) for name, path in fits().items()}
+def test_chunks_of_any_size_give_the_same_results(campaign: Campaign) -> None:
+    """With ``batch: 1`` a job a record: every file of a record but its logs, byte for byte."""
+
+    def results() -> dict[str, bytes]:
+        with gathered(Path("results"), *(stage.output for stage in STAGES.values())) as folder:
+            paths = [path for path in folder.rglob("*") if path.is_file()]
+            return {str(path.relative_to(folder)): path.read_bytes() for path in paths}
+
+    order = (*ORDER, "diagnose")
+    run(*order)
+    together = results()
+    assert len(together) == 5 * len(RECORDS)
+    shutil.rmtree("results")
+    Path("config.yaml").write_text("title: Five\nrecords: records.tsv\nbatch: 1\n", "utf-8")
+    for chunk, stage in product(chunks_of(loaded()), order):
+        assert main(words(stage, chunk)) == 0
+    assert results() == together
+
+
+@pytest.mark.slow
+def test_a_chunk_that_is_killed_ends_the_same(done: Campaign) -> None:
+    """Killed -9 wherever it is: its archive is whole or absent, and all ends as undisturbed."""
+    undisturbed, path = fits(), STAGES["fit"].path(done, "all")
     draw = random.Random(1)
-    for _ in range(4):
-        for name, path in fits().items():
-            path.unlink()
-            (path.parent / "manifest/fit.json").unlink()
-            assert not written({name: path})
+    for _ in range(5):
+        path.unlink(missing_ok=True)
         command = [sys.executable, "-m", "pendpipe.cli", *words("fit")]
         job = subprocess.Popen(command, start_new_session=True)
-        wanted = draw.randrange(len(RECORDS))
-        while job.poll() is None and len(written(fits())) < wanted:
-            time.sleep(0.001)
-        time.sleep(draw.uniform(0.0, 0.03))
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            job.wait(draw.uniform(0.2, 2.0))
         if job.poll() is None:
             os.killpg(job.pid, signal.SIGKILL)
         job.wait()
-        keyed = {
-            name: number
-            for name, number in written(fits()).items()
-            if manifest.read_manifest(Path("results", name), "fit").key
-        }
-        run("fit")
-        assert {name: sha256(path) for name, path in fits().items()} == undisturbed
-        assert {name: written(fits())[name] for name in keyed} == keyed
+        assert not path.exists() or fits() == undisturbed
+    run("fit")
+    assert fits() == undisturbed

@@ -6,15 +6,16 @@ import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
 
 import numpy as np
 import pytest
+import yaml
 from benchmarks.acquisition import recorded_bytes
 
-from pendpipe import manifest
 from pendpipe.acquisition.raw import lock
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.cli import main
@@ -31,6 +32,8 @@ from pendpipe.configuration.load import (
 )
 from pendpipe.errors import InputError
 from pendpipe.files import check_writable, replaced, sha256, write_json
+from pendpipe.recording import Recording, write_plain
+from pendpipe.stages.archive import pack
 from pendpipe.stages.results import RecordResult, placed
 from pendpipe.stages.separate import common_relative_sd
 
@@ -257,6 +260,23 @@ def test_the_jobs_get_numbers_where_the_command_line_gave_text(
     assert jobs.store(again, tmp_path) == jobs.store(load_campaign(content, "--config"), tmp_path)
 
 
+@pytest.mark.parametrize("url", ["file:///home/me/pendpipe", "file:///x/pendpipe-1.whl", None])
+def test_an_environment_of_conda_installs_what_exists(
+    url: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From where pendpipe was installed; without that, an index has it."""
+    installed = Mock(read_text=lambda _: url and json.dumps({"url": url}))
+    monkeypatch.setattr(jobs, "distribution", lambda _: installed)
+    content = yaml.safe_load(
+        Path(jobs.environment(tmp_path, ROOT / "workflow/envs/pendpipe.yaml")).read_text(
+            encoding="utf-8"
+        )
+    )
+    (wanted,) = content["dependencies"][-1]["pip"]
+    assert wanted == (f"pendpipe @ {url}" if url else f"pendpipe=={version('pendpipe')}")
+    assert "pip" in content["dependencies"]
+
+
 def test_null_on_the_command_line_blanks_a_key(content: dict[str, Any]) -> None:
     """Snakemake hands on `--config typical_record=null` as the text null."""
     assert content["typical_record"]
@@ -271,7 +291,7 @@ def test_a_change_of_the_truth_touches_the_records_it_concerns(content: dict[str
     changed["fluids"]["water"]["viscosity_pa_s"] = 1.1e-3
     after = load_campaign(changed, "config.yaml")
     same = {
-        one.record: jobs.acquisition(before, one) == jobs.acquisition(after, other)
+        one.record: jobs.acquisition(before, one, sha256) == jobs.acquisition(after, other, sha256)
         for one, other in zip(before.records, after.records, strict=True)
     }
     assert {name for name, kept in same.items() if kept} == {
@@ -346,21 +366,24 @@ def test_results_are_tried_before_a_run(tmp_path: Path) -> None:
 
 @pytest.fixture
 def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Results of one record: a recording, a fit made from it, and a separation."""
+    """Results of one record: archives of a recording and of a fit made from it, and its files."""
     monkeypatch.chdir(tmp_path)
-    record = tmp_path / "results/air-01"
-    record.mkdir(parents=True)
-    recording, fit = record / "recording.csv", record / "fit.json"
-    with manifest.job(record, "acquire") as written:
-        recording.write_text("time_s,volts\n0.0,1.0\n")
-        written.append(recording)
-    with manifest.job(record, "fit", inputs=[recording]) as written:
-        write_json(fit, {"a": 1, "provenance": {"input_sha256": sha256(recording)}})
-        written.append(fit)
-    with manifest.job(record.parent, "separate", inputs=[fit]) as written:
-        write_json(record.parent / "separation.json", {"k": 3940})
-        written.append(record.parent / "separation.json")
-    return record.parent
+    results = tmp_path / "results"
+    for stage, name in (("acquire", "recording.csv"), ("fit", "fit.json")):
+        leave(results, "air-01", stage, name)
+    write_json(results / "separation.json", {"schema_version": 1, "k": 3940})
+    return results
+
+
+def leave(results: Path, record: str, stage: str, name: str, number: float = 1.0) -> None:
+    """Leave what a stage does of a record: its file, and an archive of it."""
+    path, read = results / record / name, {}
+    if name.endswith(".csv"):
+        write_plain(path, Recording(np.arange(3.0), np.full(3, number), "angle_rad"))
+    else:
+        write_json(path, {"a": number})
+        read = {"recording.csv": sha256(results / record / "recording.csv")}
+    pack(results / f"chunks/{stage}-all.zip", results, [path], {record: {"read": read}})
 
 
 def kinds(results: Path) -> set[tuple[str, str]]:
@@ -377,14 +400,7 @@ def put(name: str, content: str = "x") -> Callable[[Path], object]:
 
 
 def other_recording(results: Path) -> None:
-    with manifest.job(results / "air-01", "acquire") as written:
-        (results / "air-01/recording.csv").write_text("time_s,volts\n0.0,2.0\n")
-        written.append(results / "air-01/recording.csv")
-
-
-def killed_stage(results: Path) -> None:
-    with pytest.raises(KeyboardInterrupt), manifest.job(results / "air-01", "calibrate"):
-        raise KeyboardInterrupt
+    leave(results, "air-01", "acquire", "recording.csv", 2.0)
 
 
 def test_sound_results_have_no_finding(results: Path, answer_of: Any) -> None:
@@ -398,14 +414,16 @@ def test_sound_results_have_no_finding(results: Path, answer_of: Any) -> None:
     ("change", "expected"),
     [
         (put("air-01/fit.json", "{}"), ("altered", "fit.json")),
-        (put("air-01/manifest/fit.json", "{"), ("altered", "fit.json")),
-        (lambda results: (results / "air-01/fit.json").unlink(), ("incomplete", "fit.json")),
-        (killed_stage, ("incomplete", "air-01")),
-        (other_recording, ("stale", "fit.json")),
+        (put("chunks/fit-all.zip", "{"), ("altered", "fit-all.zip")),
+        (put("campaign.json", '{"torn": '), ("altered", "campaign.json")),
+        (put("pendulums/steel/diagnosis.json", ""), ("altered", "diagnosis.json")),
+        (put("air-01/recording.csv", "time_s,vo"), ("altered", "recording.csv")),
+        (other_recording, ("stale", "fit-all.zip")),
         (put("air-01/notes.csv"), ("orphaned", "notes.csv")),
         (put("notes.json"), ("orphaned", "notes.json")),
         (put("air-01/.notes.20240101"), ("orphaned", ".notes.20240101")),
         (put("air-01/.fit.json.ab120f3c"), ("temporary", ".fit.json.ab120f3c")),
+        (put("chunks/.fit-0.zip.ab120f3c"), ("temporary", ".fit-0.zip.ab120f3c")),
         (put("air-01/fit.json.damaged-1a2b3c4d"), ("set-aside", "fit.json.damaged-1a2b3c4d")),
         (put("live/raw/2026.raw"), ("raw", "2026.raw")),
         (put("decay.raw"), ("raw", "decay.raw")),
@@ -429,23 +447,17 @@ def test_each_thing_that_is_wrong_is_named(
 
 def other_campaign(results: Path) -> None:
     """Results of another campaign in a folder of these, as config/recordings.yaml has them."""
-    record = results / "recordings/steel"
-    with manifest.job(record, "fit") as written:
-        for name in ("fit.json", "diagnosis/diagnosis.json"):
-            write_json(record / name, {})
-            written.append(record / name)
-    with manifest.job(record.parent, "compare") as written:
-        write_json(record.parent / "comparison.json", {})
-        written.append(record.parent / "comparison.json")
+    for stage, name in (("acquire", "recording.csv"), ("fit", "fit.json")):
+        leave(results / "recordings", "steel", stage, name)
+    write_json(results / "recordings/comparison.json", {})
     put("recordings/steel/logs/fit.log")(results)
     put("recordings/steel/raw/README.md")(results)
     put("recordings/report-of-mine/notes.txt")(results)
 
 
 def record_named_raw(results: Path) -> None:
-    with manifest.job(results / "raw", "fit") as written:
-        write_json(results / "raw/fit.json", {})
-        written.append(results / "raw/fit.json")
+    for stage, name in (("acquire", "recording.csv"), ("fit", "fit.json")):
+        leave(results, "raw", stage, name)
 
 
 @pytest.mark.parametrize("change", [other_campaign, record_named_raw, put("my notes/plan.txt")])
@@ -472,22 +484,17 @@ def test_what_is_damaged_is_named_in_every_folder(
     assert kinds(results) == {("altered", Path(damaged).name)}
 
 
-def test_the_diagnosis_of_a_pendulum_is_a_result_as_all_others(results: Path) -> None:
-    files = []
+def test_records_that_were_refused_are_left_out_of_a_pendulums_diagnosis(
+    results: Path, answer_of: Any
+) -> None:
     for name in ("air-01", "air-02"):
-        put(f"{name}/refused.json", '{"reason": "short", "stage": "acquire"}')(results)
-        put(f"{name}/swing.csv", "time_s,angle_rad\n0.0,0.1\n")(results)
-        files.append(str(results / name / "swing.csv"))
+        put(f"{name}/recording.csv", "# refused: short\n")(results)
+    files = [str(results / name / "recording.csv") for name in ("air-01", "air-02")]
     out = results / "pendulums/steel"
     words = ["diagnose", *files, "--record", "steel", "--out", str(out), "--refused", "-"]
-    assert main(words) == 0
-    assert "pendulums" not in "".join(each.path for each in examine(results))
-    for content in ("", '{"torn": ', '{"schema_version": 1}'):
-        put("pendulums/steel/diagnosis.json", content)(results)
-        assert ("altered", "diagnosis.json") in kinds(results)
-        found = manifest.look_through(manifest.manifests(out))
-        assert "diagnosis.json" in found.repaired
-        assert "makes it again" in str(found.damages[0])
+    said = answer_of(words).err
+    assert said.count("refused, and left out") == 2
+    assert "fewer than two recordings" in (out / "diagnosis.json").read_text(encoding="utf-8")
 
 
 def test_nothing_sound_is_called_deletable(results: Path) -> None:

@@ -1,17 +1,18 @@
 rule acquire:
+    input:
+        sources,
     output:
-        chunk_of("acquire"),
+        update(chunk_of("acquire")),
     log:
         f"{RESULTS}/logs/acquire-{{chunk}}.log",
     conda:
-        "../envs/pendpipe.yaml"
+        ENVIRONMENT
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(30),
         configuration=CONFIGURATION,
     params:
-        settings=planned("acquire"),
-        repaired=repaired("acquire"),
+        plan=planned("acquire"),
         code=code_version("pendpipe.stages.acquire"),
     message:
         "acquire, chunk {wildcards.chunk}"

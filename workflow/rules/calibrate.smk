@@ -8,7 +8,7 @@ rule caliper:
     log:
         f"{RESULTS}/calibration/logs/caliper.log",
     conda:
-        "../envs/pendpipe.yaml"
+        ENVIRONMENT
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(30),
@@ -16,9 +16,10 @@ rule caliper:
     params:
         arm=option("arm-m", CALIPER and CALIPER.arm_m),
         error=option("displacement-sd-m", CALIPER and CALIPER.displacement_sd_m),
-        depends=jobs.caliper(CAMPAIGN),
-        caliper=repaired("caliper", "calibration"),
-        sensor=repaired("sensor", "calibration"),
+        depends=jobs.caliper(CAMPAIGN, source_hash),
+        damages=history(
+            f"{RESULTS}/calibration/caliper.csv", f"{RESULTS}/calibration/sensor.json"
+        ),
         code=code_version("pendpipe.stages.acquire")
         + code_version("pendpipe.commands.calibrate"),
     message:
@@ -33,21 +34,20 @@ rule calibrate:
         recordings=chunk_of("acquire"),
         sensor=rules.caliper.output.sensor if CAMPAIGN.configuration.calibration else [],
     output:
-        chunk_of("calibrate"),
+        update(chunk_of("calibrate")),
     log:
         f"{RESULTS}/logs/calibrate-{{chunk}}.log",
     conda:
-        "../envs/pendpipe.yaml"
+        ENVIRONMENT
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(10),
         configuration=CONFIGURATION,
     params:
-        settings=planned("calibrate"),
-        repaired=repaired("calibrate"),
+        plan=planned("calibrate"),
         code=code_version("pendpipe.commands.calibrate"),
     message:
         "calibrate, chunk {wildcards.chunk}"
     shell:
         "pendpipe stage calibrate --campaign {resources.configuration:q} --chunk {wildcards.chunk:q}"
-        " --out {output:q} 2> {log:q}"
+        " --reading {input.recordings:q} --out {output:q} 2> {log:q}"

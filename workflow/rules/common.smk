@@ -2,19 +2,18 @@
 import os
 import re
 import shlex
-from functools import cache
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
-from pendpipe import manifest
 from pendpipe.configuration import jobs
-from pendpipe.configuration.load import load_campaign, read_configuration
+from pendpipe.configuration.load import NAME, load_campaign, read_configuration
 from pendpipe.errors import InputError
 from pendpipe.files import check_writable
 from pendpipe.provenance import code_version
 from pendpipe.report.captions import CAPTIONS
 from pendpipe.stages import chunks
+from pendpipe.stages.watch import Watch
 
 jobs.prepare_environment()
 
@@ -35,7 +34,11 @@ CAMPAIGN = checked(
 )
 # The rules hand the file on as a resource: unlike a parameter, that is nothing to rerun for.
 # What a rule takes from the configuration is digested in its own parameters.
-CONFIGURATION = checked(jobs.store, CAMPAIGN, ".snakemake/pendpipe")
+OURS = ".snakemake/pendpipe"
+CONFIGURATION = checked(jobs.store, CAMPAIGN, OURS)
+ENVIRONMENT = checked(
+    jobs.environment, OURS, workflow.source_path("../envs/pendpipe.yaml")
+)
 RESULTS = CAMPAIGN.configuration.results
 # With `only` the campaign's own stages are not run: they need all records.
 RECORDS = [record.record for record in CAMPAIGN.selected]
@@ -47,11 +50,13 @@ for record in CAMPAIGN.selected:
         PENDULUMS.setdefault(record.pendulum, []).append(record.record)
 FORMS = ["svg", "png"]
 STRICT = CAMPAIGN.configuration.strict
+SMALL = chunks.is_small(CAMPAIGN)
 
 
 # A job does a stage for a chunk of records. Live recordings are a chunk each, and stay on this
 # machine.
 CHUNKS = chunks.chunks_of(CAMPAIGN)
+CHUNK_OF = {row.record: chunk for chunk, rows in CHUNKS.items() for row in rows}
 LIVE = [chunk for chunk, rows in CHUNKS.items() if rows[0].source.startswith("dataq:")]
 STAGES = [
     stage
@@ -60,83 +65,54 @@ STAGES = [
 ]
 
 
-RULE_NAMES = {
-    name: workflow.modifier.modify_rulename(name.replace("-", "_"))
-    for name in chunks.STAGES
-}
+# One look at each file, by the process that plans; a job has no use for it.
+WATCH = Watch(Path(OURS, "files.json")) if workflow.is_main_process else None
+
+
+def history(*paths):
+    """The damages that results have had, a parameter: a new one makes their rule run again."""
+    return WATCH.history(*map(str, paths)) if WATCH else ""
+
+
+def source_hash(path):
+    """The hash of a user's file, a parameter as well."""
+    return WATCH and WATCH.sha256(path)
 
 
 # Before any job has begun: while they run, results come and go.
 PLANS = {
-    (stage.name, chunk): checked(chunks.plan, CAMPAIGN, stage, chunk, records)
-    for stage in STAGES
-    for chunk, records in CHUNKS.items()
-}
-# The campaign's own stages, by the file of their manifest.
-FOUND = {
-    str(each.path): checked(manifest.look_through, [each])
-    for folder in ("", "calibration", *(f"pendulums/{name}" for name in PENDULUMS))
-    for each in manifest.manifests(Path(RESULTS, folder))
-}
-
-
-@cache
-def hand_on():
-    """Let the jobs inherit what is forced, and the damages that they can't find themselves.
-
-    Snakemake says what is forced after it has read the rules. Another workflow may give them names
-    of its own (`use rule * from ... as`).
-    """
-    if workflow.is_main_process:
-        asked = workflow.dag_settings
-        forced = [
-            name
-            for name, rule in RULE_NAMES.items()
-            if asked.forceall or rule in asked.forcerun
+    (stage.name, chunk): jobs.digest(
+        [
+            *(chunks.settings(CAMPAIGN, stage, row, source_hash) for row in rows),
+            history(stage.path(CAMPAIGN, chunk)),
         ]
-        own = {path: found.repaired for path, found in FOUND.items()}
-        torn = {
-            str(chunks.STAGES[name].path(CAMPAIGN, chunk)): plan.own
-            for (name, chunk), plan in PLANS.items()
-            if plan.own
-        }
-        manifest.hand_on(anew=forced, repaired=own | torn)
-
-
-def damages():
-    """The results that are not as their stages wrote them."""
-    found = (*(plan.found for plan in PLANS.values()), *FOUND.values())
-    return [damage for each in found for damage in each.damages]
+    )
+    for stage in STAGES
+    for chunk, rows in CHUNKS.items()
+}
 
 
 def planned(name):
-    """What the configuration says of the records of a job."""
-
-    def of_job(wildcards):
-        hand_on()
-        return PLANS[name, wildcards.chunk].settings
-
-    return of_job
+    """What the configuration says of the records of a job, and the damages of what it left."""
+    return lambda wildcards: PLANS[name, wildcards.chunk]
 
 
-def repaired(name, folder=None):
-    """The damages that made a job run again: a new one is a changed parameter."""
-
-    def of_job(wildcards):
-        hand_on()
-        if folder is None:
-            return PLANS[name, wildcards.chunk].found.repaired
-        home = Path(RESULTS, folder.format(**wildcards))
-        found = FOUND.get(str(manifest.Manifest(home, name).path), manifest.Findings())
-        return found.repaired
-
-    return of_job
+def chunk_of(*names, only=None):
+    """What the jobs of stages leave: of the same chunk, or of those in `only`."""
+    paths = expand(f"{RESULTS}/chunks/{{name}}-{{{{chunk}}}}.zip", name=names)
+    return paths if only is None else expand(paths, chunk=only)
 
 
-def chunk_of(name, only=None):
-    """What the jobs of a stage leave: that of the same chunk, or of all (or of `only`)."""
-    path = f"{RESULTS}/chunks/{name}-{{chunk}}.json"
-    return path if only is None else expand(path, chunk=only)
+def of_all(*names):
+    """What all jobs of stages leave; nothing of a stage that the campaign does not ask for."""
+    return chunk_of(*(stage.name for stage in STAGES if stage.name in names), only=[*CHUNKS])
+
+
+def sources(wildcards):
+    """The users' files of a chunk: known by their content, not by their times."""
+    files = [str(row.file) for row in CHUNKS[wildcards.chunk] if row.file]
+    # Snakemake would take what stands in brackets for a variable of its own.
+    return [ancient(file) for file in files if os.path.isfile(file) and not {*"{}<>"} & {*file}]
 
 
 wildcard_constraints:
@@ -144,13 +120,14 @@ wildcard_constraints:
     pendulum="|".join(map(re.escape, PENDULUMS)) or "-",
 
 
-def of_all_chunks(name):
-    """What all jobs of a stage leave; nothing of a stage that the campaign does not ask for."""
-    return (
-        chunk_of(name, only=list(CHUNKS))
-        if any(name == stage.name for stage in STAGES)
-        else []
-    )
+def record_files(stage, records=RECORDS):
+    """The files of these records that a stage leaves."""
+    return expand(f"{RESULTS}/{{record}}/{{name}}", record=records, name=stage.files)
+
+
+def of_stage(stage):
+    """All that a stage leaves: the records' files, or in a large campaign its archives."""
+    return record_files(stage) if SMALL else chunk_of(stage.name, only=[*CHUNKS])
 
 
 def campaign_diagnosis():
@@ -167,19 +144,20 @@ def pendulum_diagnoses():
     return [f"{RESULTS}/pendulums/{name}/diagnosis.json" for name in names]
 
 
-def of_every_record():
-    """All results of all records: what the jobs of each stage leave."""
-    return [path for stage in STAGES for path in of_all_chunks(stage.name)]
-
-
 def figure_files():
     """The figures of the paper, where the campaign has an apparatus to compare with."""
     if CAMPAIGN.configuration.apparatus is None:
         return []
-    names = [name for name in CAPTIONS if name.startswith("fig")]
-    return expand(
-        "{results}/figures/{name}.{form}", results=RESULTS, name=names, form=FORMS
-    )
+    names = [name for name in CAPTIONS if name.startswith("fig") or name == "walls"]
+    names += ["causes"] if campaign_diagnosis() else []
+    return expand(f"{RESULTS}/figures/{{name}}.{{form}}", name=names, form=FORMS)
+
+
+def decay_files():
+    """The figure of each record, or of a large campaign their archive."""
+    if not SMALL:
+        return [f"{RESULTS}/figures/{chunks.DECAYS}"]
+    return expand(f"{RESULTS}/{{record}}/figures/decay.svg", record=RECORDS)
 
 
 def doubled(number):
@@ -194,20 +172,24 @@ def option(name, value):
 
 def wanted():
     """The targets of `all`. Of some records alone: their own results."""
+    records = [path for stage in STAGES for path in of_stage(stage)]
     if not WHOLE:
-        return of_every_record()
+        return records
+    # Also what others are made from: Snakemake makes a lost file again only where it is asked for.
     return [
         f"{RESULTS}/campaign.json",
+        f"{RESULTS}/comparison.json",
+        f"{RESULTS}/separation.json",
         f"{RESULTS}/report.html",
         f"{RESULTS}/records.parquet",
-        *figure_files(),
-        # Whatever else is missing: Snakemake makes a lost file again only where a job that is
-        # to run declares it.
-        f"{RESULTS}/separation.json",
         f"{RESULTS}/records.csv",
+        f"{RESULTS}/figures/drawn.json",
+        *figure_files(),
+        *decay_files(),
         *campaign_diagnosis(),
         *pendulum_diagnoses(),
-        *of_every_record(),
+        *records,
+        *of_all(*chunks.STAGES),
     ]
 
 
@@ -220,32 +202,5 @@ def missing_sources():
 
 def refusals():
     """How many of the records were refused, in a line; empty for none."""
-    refused = sum(Path(RESULTS, record, "refused.json").exists() for record in RECORDS)
+    refused = len(chunks.refused(CAMPAIGN))
     return f"{refused} of {len(RECORDS)} records were refused" if refused else ""
-
-
-def chunks_of_pendulum(name):
-    """What a stage leaves of the chunks with a pendulum's records."""
-
-    def files(wildcards):
-        own = set(PENDULUMS[wildcards.pendulum])
-        return chunk_of(
-            name,
-            only=[
-                chunk
-                for chunk, rows in CHUNKS.items()
-                if own & {row.record for row in rows}
-            ],
-        )
-
-    return files
-
-
-def of_pendulum(name):
-    """One file of each record of a pendulum, as words of a command."""
-
-    def words(wildcards):
-        records = PENDULUMS[wildcards.pendulum]
-        return " ".join(shlex.quote(f"{RESULTS}/{record}/{name}") for record in records)
-
-    return words

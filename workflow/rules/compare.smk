@@ -1,5 +1,6 @@
 rule compare:
     input:
+        of_all("calibrate", "turning-points", "fit"),
         separation=f"{RESULTS}/separation.json",
         sensor=rules.caliper.output.sensor if CAMPAIGN.configuration.calibration else [],
     output:
@@ -8,14 +9,14 @@ rule compare:
     log:
         f"{RESULTS}/logs/compare.log",
     conda:
-        "../envs/pendpipe.yaml"
+        ENVIRONMENT
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(30),
         configuration=CONFIGURATION,
     params:
         depends=jobs.theory(CAMPAIGN),
-        repaired=repaired("compare", ""),
+        damages=history(f"{RESULTS}/comparison.json", f"{RESULTS}/campaign.json"),
         code=code_version("pendpipe.stages.compare"),
     message:
         "the losses beside Eq. 16"

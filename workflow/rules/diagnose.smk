@@ -1,26 +1,23 @@
 rule diagnose:
     input:
-        chunk_of("acquire"),
-        chunk_of("calibrate"),
-        chunk_of("turning-points"),
+        chunk_of("acquire", "calibrate", "turning-points"),
     output:
-        chunk_of("diagnose"),
+        update(chunk_of("diagnose")),
     log:
         f"{RESULTS}/logs/diagnose-{{chunk}}.log",
     # It takes longest: begun last, it would leave the other cores idle.
     priority: 1
     conda:
-        "../envs/pendpipe.yaml"
+        ENVIRONMENT
     resources:
         mem_mb=doubled(2000),
         runtime=doubled(240),
         configuration=CONFIGURATION,
     params:
-        settings=planned("diagnose"),
-        repaired=repaired("diagnose"),
+        plan=planned("diagnose"),
         code=code_version("pendpipe.commands.diagnose"),
     message:
         "what physics is missing, chunk {wildcards.chunk}"
     shell:
         "pendpipe stage diagnose --campaign {resources.configuration:q} --chunk {wildcards.chunk:q}"
-        " --out {output:q} 2> {log:q}"
+        " --reading {input:q} --out {output:q} 2> {log:q}"

@@ -1,12 +1,12 @@
 rule diagnose_campaign:
     input:
-        of_all_chunks("fit"),
+        of_all("calibrate", "fit"),
     output:
         f"{RESULTS}/campaign_diagnosis.json",
     log:
         f"{RESULTS}/logs/diagnose_campaign.log",
     conda:
-        "../envs/pendpipe.yaml"
+        ENVIRONMENT
     resources:
         mem_mb=doubled(2000),
         runtime=doubled(30),
@@ -15,7 +15,7 @@ rule diagnose_campaign:
         folder=subpath(output[0], parent=True),
         depends=jobs.theory(CAMPAIGN),
         level=CAMPAIGN.configuration.diagnose.level,
-        repaired=repaired("diagnose-campaign", ""),
+        damages=history(f"{RESULTS}/campaign_diagnosis.json"),
         code=code_version("pendpipe.stages.diagnose_campaign"),
     message:
         "what all records together say is missing"

@@ -2,19 +2,19 @@ rule figures:
     input:
         comparison=f"{RESULTS}/comparison.json",
         together=campaign_diagnosis(),
-        fits=of_all_chunks("fit"),
+        records=of_all("acquire", "turning-points", "fit"),
     output:
         figures=report(
             figure_files(),
             category="Figures",
             caption="../report/figure.rst",
         ),
-        # What was drawn beside these: a figure for every record that was not refused.
+        decays=decay_files(),
         drawn=f"{RESULTS}/figures/drawn.json",
     log:
         f"{RESULTS}/logs/figures.log",
     conda:
-        "../envs/pendpipe.yaml"
+        ENVIRONMENT
     threads: 2
     resources:
         mem_mb=doubled(3000),
@@ -22,7 +22,7 @@ rule figures:
         configuration=CONFIGURATION,
     params:
         folder=subpath(output.drawn, parent=True),
-        repaired=repaired("figures", ""),
+        damages=history(*figure_files(), *decay_files(), f"{RESULTS}/figures/drawn.json"),
         code=code_version("pendpipe.commands.figures"),
     message:
         "figures 3 to 10"

@@ -1,21 +1,20 @@
 rule records:
     input:
-        fits=of_all_chunks("fit"),
-        diagnoses=of_all_chunks("diagnose"),
+        of_all("calibrate", "fit", "diagnose"),
     output:
         f"{RESULTS}/records.parquet",
         f"{RESULTS}/records.csv",
     log:
         f"{RESULTS}/logs/records.log",
     conda:
-        "../envs/pendpipe.yaml"
+        ENVIRONMENT
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(10),
         configuration=CONFIGURATION,
     params:
         depends=jobs.theory(CAMPAIGN),
-        repaired=repaired("records", ""),
+        damages=history(f"{RESULTS}/records.parquet", f"{RESULTS}/records.csv"),
         code=code_version("pendpipe.stages.records"),
     message:
         "a table of the records"

@@ -3,8 +3,8 @@ rule report:
         comparison=f"{RESULTS}/comparison.json",
         campaign=f"{RESULTS}/campaign.json",
         together=campaign_diagnosis(),
-        figures=rules.figures.output.drawn,
-        diagnoses=of_all_chunks("diagnose"),
+        figures=[*figure_files(), *decay_files(), f"{RESULTS}/figures/drawn.json"],
+        records=[path for stage in STAGES for path in of_stage(stage)],
     output:
         report(
             f"{RESULTS}/report.html",
@@ -14,13 +14,13 @@ rule report:
     log:
         f"{RESULTS}/logs/report.log",
     conda:
-        "../envs/pendpipe.yaml"
+        ENVIRONMENT
     resources:
         mem_mb=doubled(2000),
         runtime=doubled(20),
         configuration=CONFIGURATION,
     params:
-        repaired=repaired("report", ""),
+        damages=history(f"{RESULTS}/report.html"),
         code=code_version("pendpipe.commands.report"),
     message:
         "the page about the campaign"

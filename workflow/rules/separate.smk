@@ -1,19 +1,19 @@
 rule separate:
     input:
-        of_all_chunks("fit"),
+        of_all("calibrate", "fit"),
     output:
         f"{RESULTS}/separation.json",
     log:
         f"{RESULTS}/logs/separate.log",
     conda:
-        "../envs/pendpipe.yaml"
+        ENVIRONMENT
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(20),
         configuration=CONFIGURATION,
     params:
         depends=jobs.theory(CAMPAIGN),
-        repaired=repaired("separate", ""),
+        damages=history(f"{RESULTS}/separation.json"),
         code=code_version("pendpipe.stages.separate"),
     message:
         "hysteretic and viscous losses"

@@ -201,14 +201,13 @@ def _record(arguments: Arguments) -> None:
 def _caliper(arguments: Arguments) -> None:
     """Acquire the caliper run of a campaign."""
     from pendpipe.configuration.jobs import caliper_source
-    from pendpipe.manifest import job
+    from pendpipe.files import writing
     from pendpipe.stages.acquire import run_caliper
 
     refuse_if(not arguments.out, "--out", "no file is named", "give --out FILE.csv")
-    campaign, out = load(arguments.campaign), Path(arguments.out)
-    source = caliper_source(campaign)
-    with job(out.parent, "caliper", sources=[source] if source else [], outputs=[out]):
-        run_caliper(campaign, out)
+    campaign = load(arguments.campaign)
+    with writing(inputs=filter(None, [caliper_source(campaign)])):
+        run_caliper(campaign, Path(arguments.out))
 
 
 def _stage(arguments: Arguments) -> None:
@@ -220,6 +219,10 @@ def _stage(arguments: Arguments) -> None:
     record = campaign.record(arguments.record)
     folder = Path(campaign.configuration.results, record.record)
     out = Path(arguments.out) if arguments.out else folder / "recording.csv"
+    if not arguments.out:  # by hand: the next run of the campaign reads what is kept now
+        from pendpipe.stages.chunks import ALONE, STAGES
+
+        STAGES["acquire"].path(campaign, f"{ALONE}{record.record}").unlink(missing_ok=True)
     refused = arguments.refused
     if record.source.startswith("dataq:"):
         # What fails here is the line, not the record: the job fails, and the next run tries

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from pendpipe import manifest
 from pendpipe.arguments import Arguments, command, print_answer
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import is_stream, read_json, write_json
@@ -73,10 +72,6 @@ def run(arguments: Arguments) -> None:
             refused=arguments.refused,
             inputs=[arguments.file, arguments.sensor],
         )
-    elif out is not None and (out.parent / manifest.FOLDER).is_dir():
-        # The campaign's caliper run, in its folder of results.
-        with manifest.job(out.parent, "sensor", inputs=[arguments.file], outputs=[out]):
-            _sensor(arguments)
     else:
         _sensor(arguments)
 

@@ -31,11 +31,10 @@ from pendpipe.diagnosis.result import FILE_NAME, Diagnosis, not_analysable
 from pendpipe.errors import DamagedError, InputError, refuse_if
 from pendpipe.figures import OF_A_DIAGNOSIS
 from pendpipe.files import check_output, distinct_names, make_folder, write_json
-from pendpipe.manifest import check, job
 from pendpipe.options import OUTPUTS, flags, flags_of, given
 from pendpipe.process import keep_memory
 from pendpipe.quantities import listed
-from pendpipe.stages.refusal import reason_of, within_results
+from pendpipe.stages.refusal import is_stub, reason_of, within_results
 
 FOUND = 3
 """Exit status where ``--fail-on`` asks for it."""
@@ -77,37 +76,21 @@ def run(arguments: Arguments) -> int:
     if arguments.out is not None:
         for path in (arguments.out / FILE_NAME, *_figures_in(arguments.out)):
             check_output(path)
-    several = len(arguments.files) > 1
-    if several and arguments.record is None:
-        return _diagnose_several(arguments)
     refuse_if(
         arguments.record is not None and arguments.out is None,
         "--record",
         "a campaign's record needs a folder",
         "add --out DIR",
     )
-    if several:
-        # Recordings of one pendulum of a campaign.
-        inputs = [Path(file) for file in (*arguments.files, *arguments.calibration)]
-        out = arguments.out / FILE_NAME
-        with job(arguments.out, "diagnose-pendulum", inputs=inputs, outputs=[out]):
-            return _diagnose_several(arguments)
+    if len(arguments.files) > 1:
+        return _diagnose_several(arguments)
     arguments.file = arguments.files[0]
     arguments.calibration = next(iter(arguments.calibration), None)
     fixed = parse_fixed(arguments.fixed, arguments.baseline)
     if arguments.out is not None and Path(arguments.file).is_file():
         # Before the work: a long diagnosis must not end without a folder to write to.
         make_folder(arguments.out)
-    if arguments.record is None:
-        return _diagnose(arguments, fixed)
-    read = (Path(arguments.file), arguments.calibration, arguments.turning_points)
-    inputs = [path for path in read if path is not None]
-    with job(arguments.out.parent, "diagnose", inputs=inputs) as written:
-        check([arguments.refused] if arguments.refused is not None else [])
-        status = _diagnose(arguments, fixed)
-        made = sorted(arguments.out.iterdir())
-        written += [p for p in made if p.name == FILE_NAME or p.suffix in (".svg", ".png")]
-    return status
+    return _diagnose(arguments, fixed)
 
 
 def _diagnose(arguments: Arguments, fixed: dict[str, float]) -> int:
@@ -174,11 +157,12 @@ def _diagnose_several(arguments: Arguments) -> int:
     )
     names = distinct_names(arguments.files)
     for number, (file, name) in enumerate(zip(arguments.files, names, strict=True)):
-        if Path(file).with_name("refused.json").exists():
-            tell(f"{file}: refused, and left out")
-            continue
         arguments.file = file
         arguments.calibration = constants[number % len(constants)] if constants else None
+        read = filter(None, (file, arguments.calibration))
+        if arguments.record is not None and any(map(is_stub, read)):
+            tell(f"{file}: refused, and left out")
+            continue
         recordings[name], provenance = read_motion(arguments)
         made.append({"name": name, **provenance})
     if len(recordings) < 2:

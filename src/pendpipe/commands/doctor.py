@@ -5,28 +5,28 @@ to do. The exit status is 0, unless ``--fail-on findings`` asks for 3.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from pendpipe import manifest
 from pendpipe.arguments import Arguments, command, print_answer
 from pendpipe.errors import InputError, refuse_if
+from pendpipe.files import SET_ASIDE, damage_of
 from pendpipe.options import flags
+from pendpipe.stages.archive import FOLDER, archives, hashes, made_in, members
 
 TEMPORARY: Final = re.compile(r"\.(.+)\.[0-9a-f]{8}")
 """The name of a file that `pendpipe.files.replaced` had not finished."""
-_OF_NO_STAGE: Final = (manifest.FOLDER, "logs", "raw")
-"""Folders in one with results that hold none."""
 _CHALLENGE: Final = ("challenge", "challenge-sealed")
 _LEAVE: Final = "no stage reads it: keep it, or move it elsewhere"
 _RUN: Final = "snakemake makes it again"
 _NAMES: Final = (
     *("recording.csv", "calibration.json", "turning_points.csv", "fit.json", "refused.json"),
-    *("diagnosis.json", "caliper.csv", "sensor.json", "separation.json", "comparison.json"),
-    *("campaign.json", "report.html", "records.csv", "records.parquet"),
+    *("diagnosis.json", "decay.svg", "record.html", "caliper.csv", "sensor.json", "records.zip"),
+    *("separation.json", "comparison.json", "campaign.json", "campaign_diagnosis.json"),
+    *("report.html", "records.csv", "records.parquet", "drawn.json"),
 )
-"""Of results, beside those that manifests list."""
+"""Of results, beside the archives of chunks."""
 
 
 @command(
@@ -94,10 +94,8 @@ def examine(results: Path) -> list[Finding]:
             return found
         raise InputError(results, "there is no such folder", "name a folder of results")
     homes = _homes(results)
-    stages = [stage for home in homes for stage in manifest.manifests(home)]
-    found += [finding for stage in stages for finding in _of_manifest(stage)]
-    listed = {(stage.home / name).resolve() for stage in stages for name in stage.outputs}
-    found += _of_files(results, homes, listed)
+    found += [finding for home in homes for finding in _stale(home)]
+    found += _of_files(results, homes)
     refuse_if(
         not (homes or found),
         results,
@@ -107,65 +105,64 @@ def examine(results: Path) -> list[Finding]:
     return found
 
 
-def _homes(results: Path) -> list[Path]:
-    """The folders with a manifest: a campaign's, its records', and those of others in it."""
-    found = (path.parent for path in results.rglob(manifest.FOLDER) if any(path.glob("*.json")))
-    return sorted(home for home in found if not set(_inside(home, results)) & set(_CHALLENGE))
+def _homes(results: Path) -> dict[Path, set[str]]:
+    """The folders of campaigns' results, this one and others in it, with their records."""
+    folders = {path.parent.parent for path in results.rglob(f"{FOLDER}/*.zip")}
+    return {
+        home: {name.partition("/")[0] for path in archives(home, "*") for name in members(path)}
+        for home in sorted(folders)
+        if not _of_the_challenge(home, results)
+    }
 
 
-def _inside(path: Path, folder: Path) -> tuple[str, ...]:
-    return path.relative_to(folder).parts
+def _of_the_challenge(path: Path, results: Path) -> bool:
+    return bool({*path.relative_to(results).parts} & {*_CHALLENGE})
 
 
-def _of_manifest(stage: manifest.Manifest) -> Iterator[Finding]:
-    """Results that are not what their stage wrote, from other files, or never finished."""
-    damages, index = stage.damages(hash_all=True), manifest.Index()
-    for damage in damages:
-        kind = "incomplete" if damage.found == "missing" else "altered"
-        yield Finding(kind, str(damage.path), damage.problem, _RUN)
-    for path in (stage.home / name for name in stage.outputs):
-        if path.is_file() and (stale := index.made_from_others(path, stage)):
-            yield Finding("stale", str(path), stale.problem, _RUN)
-    if not stage.outputs and not damages:
-        yield Finding(
-            "incomplete",
-            str(stage.home),
-            f"stage {stage.stage} began and did not end",
-            "snakemake runs it again",
-        )
+def _stale(home: Path) -> Iterator[Finding]:
+    """Results that were made from other files than those that there are now."""
+    whole = [path for path in archives(home, "*") if damage_of(path) is None]
+    now = {name: found for path in whole for name, found in hashes(path).items()}
+    for path in whole:
+        for record, made in made_in(path).items():
+            for name, was in made["read"].items():
+                if now.get(f"{record}/{name}", was) != was:
+                    problem = f"{record} in it was made from another {name} than the one there now"
+                    yield Finding("stale", str(path), problem, _RUN)
 
 
-def _of_files(results: Path, homes: list[Path], listed: set[Path]) -> Iterator[Finding]:
-    """Files that no stage claims, and recordings that were never decoded."""
-    names, known = {path.name for path in listed} | set(_NAMES), set(homes)
-    campaigns = {parent for home in homes for parent in home.parents}
+def _of_files(results: Path, homes: Mapping[Path, set[str]]) -> Iterator[Finding]:
+    """Results that are not as they were written, files of nobody, recordings never decoded."""
     for path in sorted(path for path in results.rglob("*") if path.is_file()):
-        if set(_inside(path, results)) & set(_CHALLENGE):
-            continue
-        home = next((parent for parent in path.parents if parent in known), None)
-        ours = path.resolve() in listed or path.name.lower() == "readme.md"
+        ours = path.name in _NAMES or (path.parent.name == FOLDER and path.suffix == ".zip")
         begun = TEMPORARY.fullmatch(path.name)
-        if begun and (begun[1] in names or path.parent.name == manifest.FOLDER):
-            yield Finding(
-                "temporary",
-                str(path),
-                "a process was killed while it wrote this",
-                "delete it when no run is alive",
-            )
-        elif manifest.SET_ASIDE in path.name:
-            yield Finding(
-                "set-aside",
-                str(path),
-                "a damaged result, kept when it was made again",
-                _LEAVE,
-            )
+        if _of_the_challenge(path, results):
+            continue
+        if begun and (begun[1] in _NAMES or path.parent.name == FOLDER):
+            problem = "a process was killed while it wrote this"
+            yield Finding("temporary", str(path), problem, "delete it when no run is alive")
+        elif SET_ASIDE in path.name:
+            problem = "a damaged result, kept when it was made again"
+            yield Finding("set-aside", str(path), problem, _LEAVE)
         elif path.suffix == ".raw":
             yield from _undecoded(path)
-        elif home is None or ours or set(_inside(path, home)) & set(_OF_NO_STAGE):
-            continue
-        # A folder in the campaign's own is the user's, unless a stage works there.
-        elif path.parent == home or home not in campaigns:
+        elif ours and (damage := damage_of(path)):
+            yield Finding("altered", str(path), damage.problem, _RUN)
+        elif not ours and _is_orphan(path, homes):
             yield Finding("orphaned", str(path), "no stage has written this", _LEAVE)
+
+
+def _is_orphan(path: Path, homes: Mapping[Path, set[str]]) -> bool:
+    """Whether a file lies among a campaign's results or in a record's folder, and is nobody's.
+
+    Another folder is the user's, and so are the folders of raw recordings and of logs.
+    """
+    home = next((parent for parent in path.parents if parent in homes), None)
+    if home is None or path.name.lower() == "readme.md":
+        return False
+    first, *rest = path.relative_to(home).parts
+    of_a_record = first in homes[home] and {*rest[:-1]} <= {"diagnosis", "figures"}
+    return not rest or (of_a_record and rest[0] != "diagnosis")
 
 
 def _undecoded(raw: Path) -> Iterator[Finding]:

@@ -7,9 +7,10 @@ each of figures 3 to 10 is written all the same, with the reason in its place.
 from pathlib import Path
 
 from pendpipe.arguments import Arguments, command, tell
-from pendpipe.files import write_json
-from pendpipe.manifest import job
+from pendpipe.files import write_json, write_whole, writing
 from pendpipe.options import OUTPUTS, flags
+from pendpipe.stages.archive import gathered, pack
+from pendpipe.stages.chunks import DECAYS, SMALL
 
 
 @command(
@@ -19,7 +20,7 @@ from pendpipe.options import OUTPUTS, flags
             "required": True,
             "type": Path,
             "metavar": "FOLDER",
-            "help": "where figures 3 to 10 go; a record's figures go to RESULTS/<record>/figures",
+            "help": "where figures 3 to 10 go; a record's goes to RESULTS/<record>/figures",
         }
         | OUTPUTS,
         "--processes": {
@@ -36,22 +37,22 @@ def run(arguments: Arguments) -> None:
     from pendpipe.figures.data import read_compared
 
     _, folder, comparison = read_compared(arguments.campaign, arguments.comparison)
-    inputs = [
-        folder / entry["record"] / name
-        for entry in comparison["records"]
-        for name in ("recording.csv", "turning_points.csv", "fit.json")
-    ]
-    together = folder / "campaign_diagnosis.json"
-    inputs += [arguments.comparison, *([together] if together.is_file() else [])]
-    listed = arguments.out / "drawn.json"
-    with job(folder, "figures", inputs=inputs, outputs=[listed]) as written:
-        drawn = draw_all(comparison, folder, arguments.out, processes=arguments.processes)
-        for name, reason in drawn.left_out.items():
-            tell(f"pendpipe: {name} is not drawn: {reason}")
-        names = [
-            (file.relative_to(folder) if file.is_relative_to(folder) else file).as_posix()
-            for file in drawn.files
-        ]
-        write_json(listed, {"schema_version": 1, "files": names, "left_out": dict(drawn.left_out)})
-        written += drawn.files
-    tell(f"{arguments.out}: {len(drawn.files)} files drawn")
+    out: Path = arguments.out
+    with (
+        writing(inputs=[arguments.comparison]),
+        gathered(folder, "recording.csv", "turning_points.csv", "fit.json") as records,
+    ):
+        drawn = draw_all(comparison, folder, out, records=records, processes=arguments.processes)
+        decays = [path for path in drawn.files if path.is_relative_to(records)]
+        if len(comparison["records"]) > SMALL:
+            pack(out / DECAYS, records, decays, {})
+        elif records != folder:
+            for path in decays:
+                write_whole(folder / path.relative_to(records), path.read_bytes())
+    homes = (records, folder)
+    names = [next((p.relative_to(h) for h in homes if p.is_relative_to(h)), p) for p in drawn.files]
+    content = {"files": [name.as_posix() for name in names], "left_out": dict(drawn.left_out)}
+    write_json(out / "drawn.json", {"schema_version": 1, **content})
+    for name, reason in drawn.left_out.items():
+        tell(f"pendpipe: {name} is not drawn: {reason}")
+    tell(f"{out}: {len(drawn.files)} files drawn")

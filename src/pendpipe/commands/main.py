@@ -52,6 +52,7 @@ STAGES: Final = {
     "separate": "separate hysteretic from viscous loss in a campaign",
     "compare": "compare a campaign's losses with Eq. 16",
     "records": "write one table of a campaign's records, as Parquet and CSV",
+    "unpack": "write records' files out of an archive of a campaign",
     "diagnose-campaign": "diagnose all records of a campaign together",
 }
 """Stages of a campaign that are commands themselves."""

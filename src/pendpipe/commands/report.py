@@ -5,7 +5,10 @@ from the folder `figures` beside the page, where pendpipe figures has put them. 
 campaign's numbers go to standard output too, beside the paper's and the simulated truth.
 """
 
+import os
+import shutil
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from pendpipe.arguments import Arguments, command, tell
 from pendpipe.options import INPUT, OUTPUT, flags
@@ -38,31 +41,40 @@ from pendpipe.options import INPUT, OUTPUT, flags
 def run(arguments: Arguments) -> None:
     """Write the page."""
     from pendpipe.figures.data import read_compared
-    from pendpipe.files import read_json, write_whole
-    from pendpipe.manifest import job
-    from pendpipe.report.page import OWN_PAGE, page_files, render
+    from pendpipe.files import make_folder, read_json, write_whole, writing
+    from pendpipe.report.page import OF_A_RECORD, OF_THE_CAMPAIGN, OWN_PAGE, render
     from pendpipe.report.tables import as_text, headline
+    from pendpipe.stages.archive import gather, unpack
+    from pendpipe.stages.chunks import DECAYS, SMALL
 
     configuration, folder, comparison = read_compared(arguments.campaign, arguments.comparison)
-    out = arguments.out or folder / "report.html"
+    out: Path = arguments.out or folder / "report.html"
     compared = arguments.comparison or folder / "comparison.json"
     summary = arguments.summary or compared.with_name("campaign.json")
     figures = arguments.figures or out.parent / "figures"
-    inputs = [compared, summary, *page_files(comparison, folder, figures)]
-    with job(folder, "report", inputs=inputs, outputs=[out]) as written:
-
-        def own_page(record: str, page: str) -> None:
-            write_whole(folder / record / OWN_PAGE, page)
-            written.append(folder / record / OWN_PAGE)
-
+    small = len(comparison["records"]) <= SMALL
+    make_folder(out.parent)
+    with writing(inputs=[compared, summary]), TemporaryDirectory(prefix="pendpipe-") as place:
+        beside, home = folder, out
+        if not small:  # as the results lie beside the page, for the links
+            way = os.path.relpath(folder, out.parent)
+            if way.startswith(".."):
+                beside = Path(place)
+            else:
+                beside, home = Path(place, way), Path(place, out.name)
+            gather(folder, beside, (*OF_A_RECORD, "diagnosis/residual_map.svg"))
+            unpack(figures / DECAYS, beside)
+            for name in filter(lambda name: (folder / name).is_file(), OF_THE_CAMPAIGN):
+                shutil.copy(folder / name, beside / name)
         page = render(
             configuration,
             comparison,
             read_json(summary),
-            folder,
+            beside,
             figures,
-            home=out,
-            own_page=own_page,
+            home=home,
+            own_page=lambda record, page: write_whole(folder / record / OWN_PAGE, page),
+            linked=small,
         )
         write_whole(out, page)
     tell(f"{out}: {len(page.encode()) / 1e6:.1f} MB")

@@ -1,83 +1,130 @@
 """Do one stage for a chunk of a campaign's records: what a job of the workflow calls.
 
-A record whose stage is done, with the same settings, code and inputs, is left as it is. One
-record's fault is its own: the others are done, and the command then ends with its status. What a
-record's stage prints goes to RESULTS/<record>/logs/<stage>.log. What an instrument's record was
-made from, now recorded or kept from before, is said to the user as well.
+It reads archives of the stages before and leaves one of its own, FILE. A record that is done, with
+the same settings, code and inputs, is taken over from an earlier archive; where none differs, the
+stage was asked for once more, and all are done. What a record's stage prints goes to its logs; what
+an instrument's record was made from is said to the user as well.
 """
 
 import traceback
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 from pendpipe.arguments import Arguments, command, load, tell
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.errors import refuse_if
-from pendpipe.files import make_folder
-from pendpipe.manifest import disown, handed_on, read_manifest, set_aside_damaged
+from pendpipe.files import damage_of, sha256
 from pendpipe.options import flags
-from pendpipe.stages.chunks import (
-    STAGES,
-    Stage,
-    call,
-    chunks_of,
-    key,
-    write_chunk,
-)
+from pendpipe.provenance import code_version
+from pendpipe.stages.archive import archives, made_in, pack, unpack
+from pendpipe.stages.chunks import STAGES, Stage, chunks_of, settings
 
 
 @command(
     {
         "stage": {"choices": tuple(STAGES), "help": "what to do"},
         "--chunk": {"required": True, "metavar": "NAME", "help": "which records"},
-        "--out": {"required": True, "type": Path, "metavar": "JSON", "help": "what was done"},
+        "--reading": {
+            "type": Path,
+            "nargs": "*",
+            "default": [],
+            "metavar": "FILE",
+            "help": "what the stages before have left",
+        },
+        "--out": {"required": True, "type": Path, "metavar": "FILE", "help": "what it leaves"},
         **flags("--campaign", required=True),
     }
 )
 def run(arguments: Arguments) -> int:
     """Do what is left to do."""
     campaign = load(arguments.campaign)
-    stage = STAGES[arguments.stage]
+    stage, out = STAGES[arguments.stage], arguments.out
     records = chunks_of(campaign).get(arguments.chunk, ())
     refuse_if(not records, f"--chunk {arguments.chunk}", "there is no such chunk", "see snakemake")
-    status = 0
-    for record in records:
-        status = max(status, _of_record(campaign, stage, record, str(arguments.campaign)))
-    if status == 0:
-        write_chunk(campaign, stage, records, arguments.out)
-    return status
+    if out.is_file() and (damage := damage_of(out)):
+        tell(f"pendpipe: {out}: {damage.problem}; {damage.set_aside()}")
+    with TemporaryDirectory(prefix="pendpipe-") as place:
+        folder = Path(place)
+        for path in arguments.reading:
+            unpack(path, folder, lambda name: "/logs/" not in name)
+        given = _files(folder)
+        code = code_version(stage.module)
+        wanted = {each.record: _made(campaign, stage, each, folder, code) for each in records}
+        own, done = made_in(out), dict[str, Path]()
+        if any(own.get(name) != made for name, made in wanted.items()):
+            for path in archives(campaign.folder, stage.name):
+                earlier = made_in(path)
+                done |= {n: path for n, made in wanted.items() if earlier.get(n) == made}
+        for path in set(done.values()):
+            records_in = {name for name, used in done.items() if used == path}
+            unpack(path, folder, partial(_is_of, records_in))
+        statuses = [
+            _of_record(campaign, stage, record, folder, str(arguments.campaign))
+            for record in records
+            # (A recording of an instrument is decoded anew, from raw files that may be others.)
+            if record.record not in done or record.source.startswith("dataq:")
+        ]
+        if not any(statuses):
+            pack(out, folder, _files(folder) - given, wanted)
+    return max(statuses, default=0)
 
 
-def _of_record(campaign: Campaign, stage: Stage, record: Record, configuration: str) -> int:
-    """Do the stage for one record unless it is done; return the command's status."""
-    home = campaign.folder / record.record
-    wanted = key(campaign, stage, record)
-    done = read_manifest(home, stage.name)
-    if done.key == wanted and stage.name not in handed_on()["anew"] and not done.damages():
-        return 0
-    # Before the command looks at its outputs: a torn file is nobody's.
-    disown(set_aside_damaged(done))
-    log = home / "logs" / f"{stage.name.replace('-', '_')}.log"
-    status = _logged(log, call(campaign, stage, record, configuration))
+def _is_of(records: set[str], name: str) -> bool:
+    return name.partition("/")[0] in records
+
+
+def _files(folder: Path) -> set[Path]:
+    return {path for path in folder.rglob("*") if path.is_file()}
+
+
+def _made(
+    campaign: Campaign, stage: Stage, record: Record, folder: Path, code: str
+) -> dict[str, Any]:
+    """All that a record's stage depends on: settings, code, and the hashes of what it reads."""
+    home = folder / record.record
+    read = {name: home / name for name in (*stage.inputs, "refused.json")}
+    if stage.name == "calibrate" and campaign.sensor:
+        read["sensor.json"] = campaign.sensor
+    return {
+        "settings": settings(campaign, stage, record, _sha256),
+        "code": code,
+        "read": {name: found for name, path in read.items() if (found := _sha256(path))},
+    }
+
+
+def _sha256(path: Path) -> str | None:
+    try:
+        return sha256(path)
+    except OSError:  # no such file: its own stage says so
+        return None
+
+
+def _of_record(
+    campaign: Campaign, stage: Stage, record: Record, folder: Path, configuration: str
+) -> int:
+    """Do the stage for one record; return the command's status."""
+    home = folder / record.record
+    log = home / stage.files[1]
+    status = _logged(log, stage.call(campaign, record, home, configuration))
     lines = [line for line in log.read_text(encoding="utf-8").splitlines() if line.strip()]
     if status:
-        tell(f"{record.record}: {lines[-1] if lines else f'status {status}'}")
-        return status
-    for line in lines:
+        tell("\n".join([*lines[:-1], f"{record.record}: {(lines or [f'status {status}'])[-1]}"]))
+    for line in lines if not status else ():
         if line.startswith("pendpipe: "):
             tell(line)
         elif line.startswith(f"{record.record}: "):
             print(line)
-    replace(read_manifest(home, stage.name), key=wanted).write()
-    return 0
+    return status
 
 
 def _logged(log: Path, words: list[str]) -> int:
     """Run a command; what it prints goes to the log, the traceback of a fault too."""
     from pendpipe.commands.main import main
 
-    make_folder(log.parent)
+    log.parent.mkdir(parents=True, exist_ok=True)
     with log.open("w", encoding="utf-8") as out, redirect_stdout(out), redirect_stderr(out):
         try:
             return main(words)

@@ -1,13 +1,15 @@
 """What the workflow's rules need to know about a campaign: names, sources, digests."""
 
+import json
 import os
 import sys
+from collections.abc import Callable
+from importlib.metadata import distribution, version
 from pathlib import Path
 from typing import Any
 
 from pendpipe import files
 from pendpipe.configuration.load import Campaign, Record
-from pendpipe.manifest import Manifest, read_manifest, source_sha256
 from pendpipe.process import leave_the_folder_out, one_thread
 
 
@@ -42,21 +44,16 @@ def store(campaign: Campaign, folder: str | Path) -> str:
     return path.as_posix()
 
 
-def acquisition(campaign: Campaign, row: Record, made: Manifest | None = None) -> str:
-    """Digest all that a record's acquisition depends on, a file's content included.
+Hash = Callable[[Path], str | None]
+"""How the content of a user's file is known; None where it can't be read."""
 
-    Parameters
-    ----------
-    campaign, row
-        The record and its campaign.
-    made
-        What the stage has listed, where that is known already.
-    """
+
+def acquisition(campaign: Campaign, row: Record, sha256: Hash) -> str:
+    """Digest all that a record's acquisition depends on, a file's content included."""
     settings = campaign.configuration
-    made = made or read_manifest(Path(settings.results, row.record), "acquire")
     content: dict[str, Any] = {
         "row": vars(row),
-        "source_sha256": row.file and source_sha256(made, row.file),
+        "source_sha256": row.file and sha256(row.file),
     }
     if row.source == "simulated" and settings.simulated is not None:
         truth = settings.simulated.model_dump()
@@ -72,18 +69,15 @@ def acquisition(campaign: Campaign, row: Record, made: Manifest | None = None) -
     return digest(content)
 
 
-def caliper(campaign: Campaign) -> str:
+def caliper(campaign: Campaign, sha256: Hash) -> str:
     """Digest all that the sensor's calibration depends on."""
     settings, source = campaign.configuration, caliper_source(campaign)
-    made, truth = (
-        read_manifest(Path(settings.results, "calibration"), "caliper"),
-        settings.simulated,
-    )
+    truth = settings.simulated
     return digest(
         {
             "run": settings.calibration and settings.calibration.model_dump(),
             "seed": settings.seed,
-            "source_sha256": source and source_sha256(made, source),
+            "source_sha256": source and sha256(source),
             "instrument": truth and truth.model_dump(include={"sensor", "device"}),
         }
     )
@@ -101,3 +95,19 @@ def theory(campaign: Campaign) -> str:
         include={"title", "apparatus", "geometries", "fluids", "typical_record"}
     )
     return digest([content, [vars(record) for record in campaign.records]])
+
+
+def environment(folder: str | Path, template: str | Path) -> str:
+    """Write the environment of `snakemake --sdm conda`, and say where.
+
+    That of `template`, with this pendpipe from where it was installed: a clone of the
+    repository, a wheel; from an index by its version.
+    """
+    content = Path(template).read_text(encoding="utf-8")
+    origin = json.loads(distribution("pendpipe").read_text("direct_url.json") or "{}")
+    wanted = f" @ {origin['url']}" if "url" in origin else f"=={version('pendpipe')}"
+    content += f"  - pip:\n      - pendpipe{wanted}\n"
+    path = Path(folder, f"environment-{digest(content)}.yaml").absolute()
+    if not path.exists():
+        files.write_whole(path, content)
+    return path.as_posix()

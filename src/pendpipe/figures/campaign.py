@@ -56,6 +56,10 @@ from pendpipe.recording import read_plain
 Comparison = Mapping[str, Any]
 
 
+DECAY: Final = "figures/decay.svg"
+"""A record's figure, in its folder; of one that was refused it says so."""
+
+
 class Drawn(NamedTuple):
     """What was drawn, and what was left out and why."""
 
@@ -63,7 +67,14 @@ class Drawn(NamedTuple):
     left_out: dict[str, str]
 
 
-def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int = 1) -> Drawn:
+def draw_all(
+    comparison: Comparison,
+    folder: Path,
+    out: Path,
+    *,
+    records: Path | None = None,
+    processes: int = 1,
+) -> Drawn:
     """Draw figures 3 to 10 and each record's decay.
 
     Parameters
@@ -71,9 +82,12 @@ def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int 
     comparison
         The content of comparison.json.
     folder
-        The campaign's results: a folder a record lies in it.
+        The campaign's results.
     out
-        Where the campaign's figures go; a record's go to its own folder.
+        Where the campaign's figures go.
+    records
+        A folder with one for each record, of its results, where its figure goes; that of the
+        campaign unless it is another.
     processes
         How many draw at once.
 
@@ -83,11 +97,12 @@ def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int 
         A campaign with theory leaves a file for each of figures 3 to 10, with the reason
         in it where there was nothing to draw; one without leaves them out.
     """
+    records = records or folder
     draws: dict[str, Callable[[], Figure]] = {
         "fig03": partial(draw_fig03, comparison.get("calibration")),
         "fig04": partial(draw_fig04, comparison),
-        "fig07": partial(_typical_decay, comparison, folder),
-        "fig08": partial(_typical_quality, comparison, folder),
+        "fig07": partial(_typical_decay, comparison, records),
+        "fig08": partial(_typical_quality, comparison, records),
     }
     has_theory = bool(comparison.get("has_theory"))
     if has_theory:
@@ -99,8 +114,11 @@ def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int 
             "causes": partial(draw_causes, folder / "campaign_diagnosis.json"),
             "walls": partial(draw_walls, comparison),
         }
+    together = (folder / "campaign_diagnosis.json").is_file()
     tasks = [
-        partial(_drawn, name, draw, out / name, keep_place=has_theory and name.startswith("fig"))
+        partial(
+            _drawn, name, draw, out / name, keep_place=has_theory and (together or name != "causes")
+        )
         for name, draw in sorted(draws.items())
     ]
     # (For the page: a record's drawing in pixels would take as long again.)
@@ -108,8 +126,9 @@ def draw_all(comparison: Comparison, folder: Path, out: Path, *, processes: int 
         partial(
             _drawn,
             f"{entry['record']}, decay",
-            partial(_decay, folder, entry),
-            folder / entry["record"] / "figures" / "decay",
+            partial(_decay, records, entry),
+            records / entry["record"] / DECAY.removesuffix(".svg"),
+            keep_place=True,
             forms=("svg",),
         )
         for entry in comparison["records"]
@@ -164,7 +183,8 @@ def _drawn(
         return Drawn(save(draw(), stem, forms=forms), {})
     except NothingToDrawError as fault:
         reason = str(fault)
-    return Drawn(save(placeholder(reason), stem) if keep_place else [], {name: reason})
+    drawn = save(placeholder(reason), stem, forms=forms) if keep_place else []
+    return Drawn(drawn, {name: reason})
 
 
 @styled

@@ -10,7 +10,6 @@ from pendpipe.arrays import FloatArray
 from pendpipe.configuration.load import read_configuration
 from pendpipe.errors import refuse_if
 from pendpipe.files import read_json
-from pendpipe.manifest import check
 
 Entry = Mapping[str, Any]
 """One record of ``comparison.json``."""
@@ -110,7 +109,6 @@ def read_compared(
     configuration = read_configuration(campaign)
     folder = Path(str(configuration.get("results") or "results"))
     comparison = comparison or folder / "comparison.json"
-    check([comparison])
     content = read_json(comparison)
     again = "make it again with pendpipe compare"
     whole = isinstance(content, dict) and "records" in content

@@ -58,8 +58,8 @@ _ROW_BYTES, _RECORD_BYTES = 2_000, 4_500
 
 TOGETHER: Final = "campaign_diagnosis.json"
 OWN_PAGE: Final = "record.html"
-_OF_THE_CAMPAIGN: Final = ("records.csv", "comparison.json", TOGETHER)
-_OF_A_RECORD: Final = (
+OF_THE_CAMPAIGN: Final = ("records.csv", "comparison.json", TOGETHER)
+OF_A_RECORD: Final = (
     *("recording.csv", "turning_points.csv", "fit.json", "diagnosis/diagnosis.json"),
     "figures/decay.svg",
 )
@@ -144,6 +144,7 @@ def render(
     *,
     home: Path | None = None,
     own_page: Callable[[str, str], None] | None = None,
+    linked: bool = True,
 ) -> str:
     """Make the page.
 
@@ -159,6 +160,8 @@ def render(
         The page's file: it links to the results that lie beside or below it.
     own_page
         Is handed the name and the page of each record that is not wholly on this one.
+    linked
+        Whether the records' files stay where they are, for links.
 
     Returns
     -------
@@ -180,13 +183,13 @@ def render(
         line["diagnosis"] = _diagnosis(folder / line["name"]) if enabled else None
     title = comparison.get("title") or "A campaign of free decays"
     below = home is not None and folder.absolute().is_relative_to(home.absolute().parent)
-    links = Links(folder, home.parent if home is not None and below else None)
+    links = Links(folder, home.parent if home is not None and below else None, linked)
     shared = _FOR_TEMPLATES | own_files()
     _draw_records(folder, lines, room, links)
     for line in lines:
         if own_page is not None and below and not line["refused"] and not line["zoom"]:
             line["page"] = links.to(line["name"], OWN_PAGE)
-            own_page(line["name"], _own_page(folder, line, home, title, shared))
+            own_page(line["name"], _own_page(folder, line, home, title, shared, linked=linked))
         line["link"] = f"#{line['anchor']}" if line["drawn"] else line["page"]
     return fill_template(
         "pendpipe.report",
@@ -203,7 +206,7 @@ def render(
         together=read_json(folder / TOGETHER) if (folder / TOGETHER).is_file() else None,
         asked=asked,
         records=lines,
-        files=links.present(_OF_THE_CAMPAIGN),
+        files=links.present(OF_THE_CAMPAIGN),
         counts=Counter(line["health"][:3] for line in lines),
         states=STATES,
         comparison=comparison,
@@ -262,6 +265,8 @@ class Links(NamedTuple):
 
     folder: Path
     home: Path | None
+    records: bool = True
+    """Whether the records' files are linked to as well."""
 
     def to(self, *names: str) -> str | None:
         """The link to a result, by its folder and name."""
@@ -273,7 +278,8 @@ class Links(NamedTuple):
 
     def present(self, names: Iterable[str], record: str = "") -> list[tuple[str, str]]:
         """Names and links of those of a record's (or the campaign's) files that there are."""
-        there = [name for name in names if (self.folder / record / name).is_file()]
+        wanted = names if self.records or not record else ()
+        there = [name for name in wanted if (self.folder / record / name).is_file()]
         return [(name, link) for name in there if (link := self.to(record, name))]
 
 
@@ -286,7 +292,7 @@ def _draw_records(folder: Path, lines: list[dict[str, Any]], room: Room, links: 
         line |= {"drawn": False, "zoom": False, "files": []}
     first = sorted(lines, key=lambda line: not line["marked"])
     for line in first if len(lines) <= MANY else [line for line in first if line["marked"]]:
-        line["files"] = links.present(_OF_A_RECORD, line["name"])
+        line["files"] = links.present(OF_A_RECORD, line["name"])
         drawings = {} if line["refused"] else _drawings(folder, line["entry"])
         size = _RECORD_BYTES + sum(chart.size for chart in drawings.values())
         line["drawn"] = room.take(size)
@@ -338,11 +344,19 @@ def _drawings(folder: Path, entry: Content) -> dict[str, Chart]:
 
 
 def _own_page(
-    folder: Path, line: Content, home: Path | None, campaign: str, shared: Content
+    folder: Path,
+    line: Content,
+    home: Path | None,
+    campaign: str,
+    shared: Content,
+    *,
+    linked: bool,
 ) -> str:
     """The page of one record, with all its drawings."""
     room, place = Room(BUDGET_BYTES), folder / line["name"]
-    own = {**line, "page": None, "zoom": True, "files": Links(place, place).present(_OF_A_RECORD)}
+    own = {**line, "page": None, "zoom": True, "files": []}
+    if linked:
+        own["files"] = Links(place, place).present(OF_A_RECORD)
     if not line["drawn"]:
         own |= _drawings(folder, line["entry"])
     own["zoom"] = own["waveform"] is not None
@@ -353,17 +367,6 @@ def _own_page(
     return fill_template(
         "pendpipe.report", "record_page.html", line=own, home=back, campaign=campaign, **shared
     )
-
-
-def page_files(comparison: Content, folder: Path, figures: Path) -> list[Path]:
-    """The results beside the comparison that a page is made of, where they are there."""
-    files = [folder / TOGETHER, *(figures / f"{name}.svg" for name in CAPTIONS)]
-    files += [
-        folder / str(entry["record"]) / name
-        for entry in comparison["records"]
-        for name in (*_OF_A_RECORD, "diagnosis/residual_map.svg")
-    ]
-    return [path for path in files if path.is_file()]
 
 
 VERDICTS: Final = {

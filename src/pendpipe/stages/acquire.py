@@ -10,8 +10,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.files import MADE_BY, MARK, replaced, write_whole, writing
-from pendpipe.manifest import SET_ASIDE
+from pendpipe.files import MADE_BY, MARK, SET_ASIDE, replaced, write_whole, writing
 from pendpipe.recording import Recording, read_plain, write_plain
 
 RATE_HZ = 60.0
@@ -41,7 +40,7 @@ def acquire_record(
     campaign, name
         The record and its campaign.
     out
-        The recording; an instrument's raw files are kept in the folder ``raw`` beside it.
+        The recording; an instrument's raw files are kept in the record's folder of results.
     anew
         Record from an instrument even if a recording is kept.
     accept_short
@@ -60,6 +59,7 @@ def acquire_record(
     if record.source.startswith("dataq:"):
         _instrument(
             record,
+            campaign.folder / name,
             out,
             f"pendpipe acquire --campaign {place} --record {name} --anew records it anew",
             anew=anew,
@@ -87,7 +87,9 @@ def _simulated(campaign: Campaign, record: Record) -> Recording:
     return replace(recording, metadata=metadata)
 
 
-def _instrument(record: Record, out: Path, again: str, *, anew: bool, accept_short: bool) -> None:
+def _instrument(
+    record: Record, home: Path, out: Path, again: str, *, anew: bool, accept_short: bool
+) -> None:
     """Write the recording of a ``dataq:`` record from its raw file; record only if there is none.
 
     An attempt that a lost line has ended is none, unless it is accepted.
@@ -112,19 +114,21 @@ def _instrument(record: Record, out: Path, again: str, *, anew: bool, accept_sho
         "fix the cell",
     )
     channel = int(record.channel) if record.channel else None
-    folder = out.parent / "raw"
+    folder, earlier = home / "raw", home / "recording.csv"
     attempts = read_attempts(folder.glob("*.raw"))
     if attempts and accept_short and not anew and choose(attempts).lost_line:
         accept(choose(attempts))
         attempts = read_attempts(folder.glob("*.raw"))
-    if not attempts and not anew and _is_recording(out):
+    if not attempts and not anew and _is_recording(earlier):
+        if not (out.exists() and out.samefile(earlier)):
+            write_whole(out, earlier.read_bytes())
         print(f"{record.record}: {out.name} is kept as it is, without a raw file; {again}")
         return
     if anew or all(attempt.lost_line for attempt in attempts):
         _record(record, folder, channel or 1, accept_short=accept_short)
         attempts = read_attempts(folder.glob("*.raw"))
     used = choose([attempt for attempt in attempts if not attempt.lost_line])
-    recording = decode_attempt(used.path, out.parent, channel)
+    recording = decode_attempt(used.path, home, channel)
     # What was made from one of the raw files can be made from it again.
     kept = {str(attempt.header["recorded_at"]) for attempt in attempts}
     with kept_in(used.path, out), writing(force=_recorded_at(out) in kept):

@@ -1,43 +1,30 @@
-"""Chunks of records: what one job of a stage does, and how a run learns what is left to do.
+"""Chunks of records: what one job of a stage does.
 
 A group of more than `batch` records is split by the next bit of the SHA-256 of their names
 (extendible hashing), so that a record that is added changes one chunk. A job does a stage for the
-records of a chunk and leaves ``chunks/<stage>-<chunk>.json``: the manifests of its records in one
-file, which a plan reads instead of theirs. Snakemake knows that file alone, and deletes it before
-the job. A record's own manifest stays, so that what is done is not done again: with the key of what
-its stage was done with.
+records of a chunk and leaves an archive, ``chunks/<stage>-<chunk>.zip``. A record's own files come
+out of it: always in a campaign of up to `SMALL` records, else when they are asked for.
 """
 
 from __future__ import annotations
 
 import hashlib
-import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from pendpipe.configuration import jobs
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.configuration.models import Configuration
-from pendpipe.files import write_json
-from pendpipe.manifest import (
-    Findings,
-    Manifest,
-    changed_ns,
-    handed_on,
-    joined,
-    look_through,
-    of_content,
-    read_checked,
-    read_manifest,
-    recorded,
-)
-from pendpipe.provenance import code_version
-from pendpipe.version import __version__
+from pendpipe.files import damage_of
+from pendpipe.stages.archive import FOLDER, archives, members, unpack
 
-FOLDER: Final = "chunks"
+SMALL: Final = 100
+"""In campaigns of up to so many records each has a folder of its files (docs/scale.md): a folder
+that one can look through."""
+DECAYS: Final = "records.zip"
+"""Of larger ones the decays of all records, among the figures."""
 WHOLE: Final = "all"
 """Name of the chunk that was not split."""
 ALONE: Final = "record."
@@ -56,7 +43,7 @@ class Stage:
     inputs
         The files of a record's folder that it reads.
     output
-        The file there that the following stages read.
+        The file there that the following stages read; others (`files`) are its log, a refusal.
     options
         Options of its command that are no files.
     """
@@ -71,9 +58,35 @@ class Stage:
         """The module of its command."""
         return f"pendpipe.commands.{self.name.replace('-', '_')}"
 
+    @property
+    def rule(self) -> str:
+        """The name of its rule."""
+        return self.name.replace("-", "_")
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """What it leaves of every record, refused or not."""
+        return self.output, f"logs/{self.rule}.log"
+
     def path(self, campaign: Campaign, chunk: str) -> Path:
-        """Where the job of a chunk says what it did."""
-        return campaign.folder / FOLDER / f"{self.name}-{chunk}.json"
+        """The archive that the job of a chunk leaves."""
+        return campaign.folder / FOLDER / f"{self.name}-{chunk}.zip"
+
+    def call(self, campaign: Campaign, record: Record, home: Path, configuration: str) -> list[str]:
+        """Return the words of the command that does it for a record, whose files are at `home`."""
+        files: dict[str, Any] = {
+            Path(name).stem.replace("_", "-"): home / name for name in self.inputs[1:]
+        }
+        if self.name == "acquire":
+            files["campaign"] = configuration
+        if self.name == "calibrate":
+            files["sensor"] = campaign.sensor
+        out = home / self.output
+        files["out"] = out.parent if self.name == "diagnose" else out
+        files["refused"] = None if campaign.configuration.strict else home / "refused.json"
+        options = files | self.options(campaign.configuration, record) | {"record": record.record}
+        given = [f"--{name}={value}" for name, value in options.items() if value is not None]
+        return [self.name, *(str(home / name) for name in self.inputs[:1]), *given]
 
 
 STAGES: Final = {
@@ -111,6 +124,11 @@ STAGES: Final = {
         ),
     )
 }
+
+
+def is_small(campaign: Campaign) -> bool:
+    """Whether every record has a folder of its files."""
+    return len(campaign.selected) <= SMALL
 
 
 def batch_for(number: int) -> int:
@@ -151,100 +169,64 @@ def split(records: dict[str, Record], batch: int) -> dict[str, tuple[Record, ...
     }
 
 
-def call(campaign: Campaign, stage: Stage, record: Record, configuration: str) -> list[str]:
-    """Return the words of the command that does a stage for one record."""
-    home = campaign.folder / record.record
-    files: dict[str, Any] = {
-        Path(name).stem.replace("_", "-"): home / name for name in stage.inputs[1:]
-    }
+def settings(campaign: Campaign, stage: Stage, record: Record, hash_of: jobs.Hash) -> str:
+    """What the configuration says of one record's stage, and the user's file."""
     if stage.name == "acquire":
-        files["campaign"] = configuration
-    if stage.name == "calibrate":
-        files["sensor"] = campaign.sensor
-    out = home / stage.output
-    files["out"] = out.parent if stage.name == "diagnose" else out
-    files["refused"] = None if campaign.configuration.strict else home / "refused.json"
-    options = files | stage.options(campaign.configuration, record) | {"record": record.record}
-    given = [f"--{name}={value}" for name, value in options.items() if value is not None]
-    return [stage.name, *(str(home / name) for name in stage.inputs[:1]), *given]
-
-
-def settings(campaign: Campaign, stage: Stage, record: Record, made: Manifest | None = None) -> str:
-    """What the configuration says of one record's stage: a part of its key."""
-    if stage.name == "acquire":
-        return jobs.acquisition(campaign, record, made)
+        return jobs.acquisition(campaign, record, hash_of)
     options = stage.options(campaign.configuration, record)
     return f"{record.record} {campaign.configuration.strict} {options}"
 
 
-def key(campaign: Campaign, stage: Stage, record: Record) -> str:
-    """Digest all that a record's stage depends on: settings, code and what it reads."""
-    home = campaign.folder / record.record
-    sensor = campaign.sensor if stage.name == "calibrate" else None
-    files = [home / name for name in stage.inputs] + ([sensor] if sensor else [])
-    read = recorded(files)
-    return jobs.digest([settings(campaign, stage, record), _code(stage.module), read])
+def extras(campaign: Campaign, stage: Stage, archive: Path) -> list[str]:
+    """Files in the records' folders that an archive has of some: a refusal, figures."""
+    own = [name for name in members(archive) if name.partition("/")[2] not in stage.files]
+    return [name for name in own if (campaign.folder / name).is_file()]
 
 
-_code = cache(code_version)
-"""It takes 3 ms, and is asked for each record."""
+def _archives_of(campaign: Campaign) -> dict[Path, Stage]:
+    """The archives that there are of a campaign's chunks, with their stages."""
+    places = {
+        stage.path(campaign, chunk): stage
+        for stage in STAGES.values()
+        for chunk in chunks_of(campaign)
+    }
+    return {path: stage for path, stage in places.items() if path.is_file()}
 
 
-def write_chunk(campaign: Campaign, stage: Stage, records: Sequence[Record], out: Path) -> None:
-    """Write the manifests of a chunk's records into one file."""
-    made = (read_manifest(campaign.folder / record.record, stage.name) for record in records)
-    content = {one.home.name: one.content() for one in made}
-    head = {"schema_version": 1, "stage": stage.name, "version": __version__}
-    repaired = handed_on()["repaired"].get(str(out), "")
-    write_json(out, head | {"repaired": repaired, "records": content})
+def refused(campaign: Campaign) -> list[str]:
+    """The records that were refused."""
+    names = (name.split("/", 1) for path in _archives_of(campaign) for name in members(path))
+    return sorted({record for record, name in names if name == "refused.json"})
 
 
-class Plan(NamedTuple):
-    """What a plan knows of the job of a chunk.
+def restore(campaign: Campaign, paths: Collection[Path]) -> None:
+    """Write files of the records' folders anew, as their archives have them."""
+    for path in _archives_of(campaign) if paths else ():
+        unpack(path, campaign.folder, lambda name: campaign.folder / name in paths)
 
-    Parameters
-    ----------
-    settings
-        Digest of what the configuration says of its records: a parameter of the rule.
-    found
-        What is wrong with their results, and with the chunk's own file.
-    own
-        The history of damages of the chunk's own file, which its job writes into the next.
+
+def tidy(campaign: Campaign) -> None:
+    """Put the folders in order when a run has ended.
+
+    The records' files of a stage that it ended with (`--until`) come out of their archives. What is
+    the archive of no chunk any more goes, and in the records' folders a refusal that is over and
+    figures of an earlier diagnosis: nothing that anything is made from.
     """
-
-    settings: str
-    found: Findings
-    own: str
-
-
-def plan(campaign: Campaign, stage: Stage, chunk: str, records: Iterable[Record]) -> Plan:
-    """Look at the results of a chunk; nothing is touched.
-
-    One `stat` a file: it is hashed only where length or time of change speak.
-    """
-    path = stage.path(campaign, chunk)
-    content, torn = read_checked(path)
-    listed = content.get("records", {})
-    written = changed_ns(path)
-    made = [_manifest(campaign, stage, record, listed, written) for record in records]
-    said = [settings(campaign, stage, *each) for each in zip(records, made, strict=True)]
-    own = joined([content.get("repaired", ""), *(each.mark for each in torn)])
-    damages, repaired = look_through(made)
-    found = Findings((*torn, *damages), joined([own, repaired]))
-    return Plan(jobs.digest(said), found, own)
+    made = _archives_of(campaign)
+    for path, stage in made.items() if is_small(campaign) else ():
+        names = [name for name in members(path) if name.partition("/")[2] in stage.files]
+        if any(_is_older(campaign.folder / name, path) for name in names):
+            unpack(path, campaign.folder)
+    if not campaign.configuration.only:
+        for path in {*archives(campaign.folder, "*")} - made.keys():
+            path.unlink()
+    there = {campaign.folder / name for path in made for name in members(path)}
+    for record in campaign.selected:
+        home = campaign.folder / record.record
+        for path in {home / "refused.json", *home.glob("diagnosis/*.[sp][vn]g")} - there:
+            if path.is_file() and damage_of(path) is None:
+                path.unlink()
 
 
-def _manifest(
-    campaign: Campaign, stage: Stage, record: Record, listed: dict[str, Any], written_ns: int
-) -> Manifest:
-    """What a record's stage wrote, as its chunk says unless that is older."""
-    # (As text: a Path takes longer, and records are many.)
-    home = f"{campaign.configuration.results}/{record.record}"
-    content = listed.get(record.record)
-    if content is None and not os.path.isdir(home):  # noqa: PTH112
-        return Manifest(Path(home), stage.name)
-    one = None if content is None else of_content(Path(home), stage.name, content)
-    # It was altered, or a later job is cut.
-    if one is None or changed_ns(one.path) >= written_ns:
-        return read_manifest(Path(home), stage.name)
-    return one
+def _is_older(path: Path, archive: Path) -> bool:
+    return not path.is_file() or path.stat().st_mtime_ns < archive.stat().st_mtime_ns

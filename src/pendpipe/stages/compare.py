@@ -14,18 +14,17 @@ from pendpipe.campaign.values import Line, Values, campaign_values
 from pendpipe.configuration.jobs import digest
 from pendpipe.configuration.load import Campaign
 from pendpipe.estimate import Estimate
-from pendpipe.files import read_json, write_json
-from pendpipe.manifest import job
+from pendpipe.files import read_json, write_json, writing
 from pendpipe.options import INPUT, OUTPUT, flags
 from pendpipe.physics import inertia_from_frequency
 from pendpipe.provenance import code_version
+from pendpipe.stages.archive import gathered
 from pendpipe.stages.results import (
     RecordResult,
     branch_curves,
     campaign_data,
     enough,
     read_results,
-    record_files,
     record_theory,
     twins,
 )
@@ -44,20 +43,16 @@ from pendpipe.version import __version__
 def run(arguments: Arguments) -> None:
     """Compare."""
     campaign = load(arguments.campaign)
-    inputs = [
-        arguments.separation,
-        *filter(None, [campaign.sensor]),
-        *record_files(campaign, "fit.json", "calibration.json", "turning_points.csv"),
-    ]
-    outputs = [arguments.out, arguments.summary]
-    with job(campaign.folder, "compare", inputs=inputs, outputs=outputs):
-        compare_campaign(campaign, arguments.separation, arguments.out, arguments.summary)
+    names = ("fit.json", "calibration.json", "turning_points.csv")
+    with writing(inputs=[arguments.separation]), gathered(campaign.folder, *names) as folder:
+        content = compare_campaign(campaign, folder, read_json(arguments.separation))
+        write_json(arguments.out, content)
+        write_json(arguments.summary, campaign_summary(content))
 
 
-def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: Path) -> None:
-    """Compare the losses with Eq. 16 and write both files."""
-    results = read_results(campaign)
-    separated = read_json(separation)
+def compare_campaign(campaign: Campaign, folder: Path, separated: dict[str, Any]) -> dict[str, Any]:
+    """Compare the losses of the records, whose results are in `folder`, with Eq. 16."""
+    results = read_results(campaign, folder)
     together = campaign_data(campaign, results)
     spread = inertia_sds(together[0]) if together else {}
     values = together and campaign_values(*together)
@@ -66,13 +61,15 @@ def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: P
     joint = joint_values(*together) if together and enough(together[0]) else None
     settings = campaign.configuration
     copies = twins(results)
-    content = {
+    return {
         "schema_version": 1,
         "title": settings.title,
         "typical_record": settings.typical_record,
         "has_theory": settings.apparatus is not None,
         "records": [
-            _record(campaign, result, split, found, spread.get(result.record.record), copies)
+            _record(
+                campaign, folder, result, split, found, spread.get(result.record.record), copies
+            )
             for result in results
         ],
         "curves": _curves(campaign, separated["hysteretic_coefficient"]),
@@ -89,7 +86,7 @@ def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: P
             for result in results
             if result.record.record == settings.typical_record and result.refused is None
             for fit in tail_fits(
-                read_turning_points(campaign.folder / result.record.record / "turning_points.csv")
+                read_turning_points(folder / result.record.record / "turning_points.csv")
             )
         ],
         "calibration": read_json(campaign.sensor) if campaign.sensor else None,
@@ -101,8 +98,6 @@ def compare_campaign(campaign: Campaign, separation: Path, out: Path, summary: P
             "packages": {name: version(name) for name in PACKAGES},
         },
     }
-    write_json(out, content)
-    write_json(summary, campaign_summary(content))
 
 
 _OF_A_FIT: Final = (
@@ -122,6 +117,7 @@ _OF_A_FIT: Final = (
 
 def _record(
     campaign: Campaign,
+    folder: Path,
     result: RecordResult,
     split: dict[str, dict[str, Any]],
     found: Values | None,
@@ -145,7 +141,7 @@ def _record(
     excluded = [] if result.usable else [f"not separated: {fit['light_reason']}"]
     if row.record in copies:
         excluded.append(f"the same recording as {copies[row.record]}: it counts once")
-    points = read_turning_points(campaign.folder / row.record / "turning_points.csv")
+    points = read_turning_points(folder / row.record / "turning_points.csv")
     content |= {
         **fit["parameters"],
         **{name: fit[name] for name in _OF_A_FIT},

@@ -12,10 +12,10 @@ from typing import Any
 from pendpipe.arguments import Arguments, command, load, print_answer
 from pendpipe.configuration.load import Campaign
 from pendpipe.files import write_json
-from pendpipe.manifest import job
 from pendpipe.options import OUTPUT, flags
 from pendpipe.provenance import code_version
-from pendpipe.stages.results import campaign_data, enough, read_results, record_files, twins
+from pendpipe.stages.archive import gathered
+from pendpipe.stages.results import campaign_data, enough, read_results, twins
 from pendpipe.version import __version__
 
 FILE_NAME = "campaign_diagnosis.json"
@@ -44,20 +44,19 @@ def run(arguments: Arguments) -> int:
     there = campaign.configuration.model_copy(update={"results": str(arguments.folder)})
     campaign = Campaign(there, campaign.records)
     out = arguments.out or arguments.folder / FILE_NAME
-    inputs = record_files(campaign, "fit.json", "calibration.json")
-    with job(campaign.folder, "diagnose-campaign", inputs=inputs, outputs=[out]):
-        answer = diagnose_campaign(campaign)
-        write_json(out, answer)
+    with gathered(campaign.folder, "fit.json", "calibration.json") as folder:
+        answer = diagnose_campaign(campaign, folder)
+    write_json(out, answer)
     print_answer(arguments, answer, answer["statement"])
     return 3 if arguments.fail_on and answer["verdict"] == arguments.fail_on else 0
 
 
-def diagnose_campaign(campaign: Campaign) -> dict[str, Any]:
-    """Return the content of campaign_diagnosis.json."""
+def diagnose_campaign(campaign: Campaign, folder: Path) -> dict[str, Any]:
+    """Return the content of campaign_diagnosis.json, from the records' results in a folder."""
     from pendpipe.campaign.diagnose import BASELINE, campaign_diagnosis, search
 
     provenance = {"version": __version__, "code": code_version(__name__)}
-    results = read_results(campaign)
+    results = read_results(campaign, folder)
     found = campaign_data(campaign, results)
     if found is None or not enough(found[0]):
         from pendpipe.diagnosis.result import not_analysable

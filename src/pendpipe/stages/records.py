@@ -14,10 +14,10 @@ from pendpipe.cells import csv_text
 from pendpipe.configuration.load import Campaign
 from pendpipe.errors import refuse_if
 from pendpipe.files import MADE_BY, MARK, read_json, write_whole
-from pendpipe.manifest import job
 from pendpipe.options import OUTPUT, flags
 from pendpipe.report.class_table import Fitted, record as row_of
-from pendpipe.stages.results import RecordResult, read_results, record_files
+from pendpipe.stages.archive import gathered
+from pendpipe.stages.results import RecordResult, read_results
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -52,32 +52,30 @@ def run(arguments: Arguments) -> None:
         known = out.suffix in (".parquet", ".csv")
         refuse_if(not known, out, "its format is unknown", "end its name in .parquet or .csv")
     campaign = load(arguments.campaign)
-    names = ["fit.json", "calibration.json"]
-    names += ["diagnosis/diagnosis.json"] if campaign.configuration.diagnose.enabled else []
-    inputs = record_files(campaign, *names)
-    with job(campaign.folder, "records", inputs=inputs, outputs=arguments.out):
-        table = records_table(campaign)
-        for out in arguments.out:
-            write_whole(out, _in_form(table, out.suffix))
+    names = ("fit.json", "calibration.json", "diagnosis/diagnosis.json")
+    with gathered(campaign.folder, *names) as folder:
+        table = records_table(campaign, folder)
+    for out in arguments.out:
+        write_whole(out, _in_form(table, out.suffix))
 
 
-def records_table(campaign: Campaign) -> pa.Table:
+def records_table(campaign: Campaign, folder: Path) -> pa.Table:
     """Return the table of `COLUMNS`, in the order of the campaign's own table."""
     import pyarrow as pa
 
-    rows = [_row(campaign, result) for result in read_results(campaign)]
+    rows = [_row(campaign, folder, result) for result in read_results(campaign, folder)]
     kinds = [(name, pa.string() if name in _WORDS else pa.float64()) for name in COLUMNS]
     schema = pa.schema(kinds, metadata={MARK: MADE_BY})
     return pa.Table.from_pylist(rows, schema=schema)
 
 
-def _row(campaign: Campaign, result: RecordResult) -> dict[str, Any]:
+def _row(campaign: Campaign, folder: Path, result: RecordResult) -> dict[str, Any]:
     """The numbers of a fit; of a law that contradicts the decay only what needs no law."""
     record, fit = result.record, result.fit
     row: dict[str, Any] = {name: getattr(record, name) or None for name in _OF_THE_TABLE}
     row["refusal"] = result.refused
     if campaign.configuration.diagnose.enabled:
-        diagnosis = read_json(campaign.folder / record.record / "diagnosis" / "diagnosis.json")
+        diagnosis = read_json(folder / record.record / "diagnosis" / "diagnosis.json")
         row["verdict"] = diagnosis["verdict"]
     if fit is not None:
         row |= row_of(Fitted(record.record, fit)) | {"unit": fit["amplitude"].unit}

@@ -11,8 +11,15 @@ from pathlib import Path
 from typing import Any, Final
 
 from pendpipe.errors import DamagedError, InputError, UnwritableError
-from pendpipe.files import MADE_BY, MARK, read_json, without_folders, write_json, write_whole
-from pendpipe.manifest import check, disown, job, read_manifest
+from pendpipe.files import (
+    MADE_BY,
+    MARK,
+    read_json,
+    without_folders,
+    write_json,
+    write_whole,
+    writing,
+)
 
 ORDER: Final = ("acquire", "calibrate", "turning-points", "fit", "diagnose")
 """The stages that run once a record, in the order of the data."""
@@ -25,7 +32,7 @@ def run_stage(
     *,
     outputs: Sequence[Path],
     refused: Path | None,
-    inputs: Iterable[Path | None] = (),
+    inputs: Iterable[Path | str | None] = (),
     sources: Iterable[Path] = (),
 ) -> None:
     """Run one stage of one record; if the record can't be used, refuse it.
@@ -35,16 +42,15 @@ def run_stage(
     stage
         What runs, one of `ORDER`.
     record
-        The campaign's record; ``None`` outside a campaign, where nothing is checked or
-        recorded.
+        The campaign's record; ``None`` outside a campaign.
     work
         Does it, and writes all of `outputs`.
     outputs
-        The files that the stage declares, in the record's folder.
+        The files that it leaves of every record.
     refused
         Where a refusal is written; ``None`` lets the error end the program (status 2).
     inputs, sources
-        The results and the user's files that are read (`pendpipe.manifest`).
+        The results and the user's files that are read, which nothing replaces.
 
     Raises
     ------
@@ -53,39 +59,27 @@ def run_stage(
     UnwritableError
         If there is no room for the outputs, say. Nor does that.
     """
-    if record is None:
-        _work_or_refuse(stage, str(outputs[0]), work, outputs, refused, ())
-        return
-    home = outputs[0].parent
-    given = [path for path in inputs if path is not None]
-    with job(home, stage, inputs=given, sources=sources, outputs=outputs) as written:
-        check([refused] if refused is not None else [])
-        _work_or_refuse(stage, record, work, outputs, refused, sources)
-        if refused is not None and refused.exists() and reason_of(refused, before=stage) is None:
-            written.append(refused)
+    with writing(inputs=filter(None, (*inputs, *sources))):
+        if refused is None:
+            work()
+        else:
+            _work_or_refuse(stage, record, work, outputs, refused, sources)
 
 
 def _work_or_refuse(
     stage: str,
-    record: str,
+    record: str | None,
     work: Callable[[], None],
     outputs: Sequence[Path],
-    refused: Path | None,
+    refused: Path,
     sources: Iterable[Path],
 ) -> None:
-    if refused is None:
-        work()
-        return
     earlier = reason_of(refused, before=stage)
     if earlier is not None:
         _write_stubs(outputs, earlier)
         print(f"pendpipe: {record} was refused before: {earlier}", file=sys.stderr)
         return
-    if refused.exists():
-        later = read_manifest(refused.parent, read_json(refused)["stage"])
-        if later.outputs:
-            disown(later)
-        refused.unlink()
+    refused.unlink(missing_ok=True)
     try:
         work()
     except (DamagedError, UnwritableError):
@@ -121,6 +115,13 @@ def reason_of(refused: Path, *, before: str | None = None) -> str | None:
     if before is not None and ORDER.index(content["stage"]) >= ORDER.index(before):
         return None
     return str(content["reason"])
+
+
+def is_stub(path: str | Path) -> bool:
+    """Whether this stands in the place of a refused record's result."""
+    with Path(path).open("rb") as stream:
+        head = stream.read(300)
+    return head.startswith(b"# refused: ") or b'"refused":' in head
 
 
 def _write_stubs(outputs: Sequence[Path], reason: str) -> None:

@@ -45,19 +45,14 @@ class RecordResult:
         return self.fit.parameters[name]
 
 
-def record_files(campaign: Campaign, *names: str) -> list[Path]:
-    """The files of these names in every record's folder."""
-    return [campaign.folder / row.record / name for row in campaign.records for name in names]
-
-
-def read_results(campaign: Campaign) -> list[RecordResult]:
-    """Read every record's fit, in the order of the table."""
+def read_results(campaign: Campaign, folder: Path) -> list[RecordResult]:
+    """Read every record's fit, in the order of the table, from a folder with one for each."""
     results = []
     for record in campaign.records:
-        folder = campaign.folder / record.record
-        refused = read_json(folder / "fit.json").get("refused")
-        fit = None if refused else read_fit(folder / "fit.json")
-        constant = read_json(folder / "calibration.json")
+        home = folder / record.record
+        refused = read_json(home / "fit.json").get("refused")
+        fit = None if refused else read_fit(home / "fit.json")
+        constant = read_json(home / "calibration.json")
         results.append(RecordResult(record, fit, constant, refused))
     return results
 

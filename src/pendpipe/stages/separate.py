@@ -1,5 +1,6 @@
 """Separate the hysteretic from the viscous losses of a campaign (Fig. 4, Eq. 17)."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,9 @@ from pendpipe.campaign.values import WORST_LINE, Values, campaign_values
 from pendpipe.configuration.load import Campaign
 from pendpipe.estimate import Z95, Estimate
 from pendpipe.files import write_json
-from pendpipe.manifest import job
 from pendpipe.options import OUTPUT, flags
-from pendpipe.stages.results import RecordResult, campaign_data, read_results, record_files
+from pendpipe.stages.archive import gathered
+from pendpipe.stages.results import RecordResult, campaign_data, read_results
 
 
 @command(
@@ -24,19 +25,17 @@ from pendpipe.stages.results import RecordResult, campaign_data, read_results, r
 def run(arguments: Arguments) -> None:
     """Separate."""
     campaign = load(arguments.campaign)
-    inputs = record_files(campaign, "fit.json", "calibration.json")
-    with job(campaign.folder, "separate", inputs=inputs, outputs=[arguments.out]):
-        separate_campaign(campaign, arguments.out)
+    with gathered(campaign.folder, "fit.json", "calibration.json") as folder:
+        write_json(arguments.out, separate_campaign(campaign, read_results(campaign, folder)))
 
 
-def separate_campaign(campaign: Campaign, out: Path) -> None:
+def separate_campaign(campaign: Campaign, results: Sequence[RecordResult]) -> dict[str, Any]:
     """Apply Eq. 17 to all records, with the loss torque of the joint fit; ``separation.json``.
 
     A campaign without records that swing in no fluid has no k, and nothing is separated; so it is
     where these contradict ``Q_h = k f^2 (I/I_0)^(1 - p)``. Records whose fitted law contradicts
     the decay (a red light) are left out; `compare` reports the reason.
     """
-    results = read_results(campaign)
     together = campaign_data(campaign, results)
     values = together and campaign_values(*together)
     content: dict[str, Any] = {
@@ -63,7 +62,7 @@ def separate_campaign(campaign: Campaign, out: Path) -> None:
         | separated(values, result.record.record)
         for result in usable
     ]
-    write_json(out, content)
+    return content
 
 
 def is_line(values: Values) -> bool:
