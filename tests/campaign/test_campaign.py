@@ -1,11 +1,15 @@
 """Causes of what a campaign lacks, and the sentence about them."""
 
 from dataclasses import replace
+from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from pendpipe import physics
+from pendpipe.analysis.fit.result import FitResult
+from pendpipe.arrays import FloatArray
 from pendpipe.campaign.design import height_sd, terms_of
 from pendpipe.campaign.diagnose import (
     campaign_diagnosis,
@@ -32,8 +36,12 @@ from pendpipe.campaign.fit import (
     predict,
 )
 from pendpipe.campaign.tank import Surface, by_depth, confined, told
+from pendpipe.configuration.load import load_campaign, read_configuration
+from pendpipe.estimate import Estimate
+from pendpipe.stages.results import RecordResult
+from pendpipe.stages.separate import separate_campaign
 
-from .campaigns import data, default
+from .campaigns import ROOT, data, default
 
 # A campaign as one measurement.
 
@@ -411,6 +419,45 @@ def test_a_record_that_disagrees_is_named_and_no_cause(record: str, percent: flo
     assert numbers["all_records"]["chi2"] - numbers["without"]["chi2"] > 30.0
     drag = numbers["without"]["drag_factor"]
     assert abs(drag["value"] - 1.0) < 3.0 * drag["sd"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("record", ["air-03", "water-high-8"])
+def test_the_table_of_a_campaign_is_that_without_a_foreign_record(record: str) -> None:
+    """Twice its loss: it is named, by the words of the diagnosis, and no number is lost by it."""
+    path = ROOT / "config/config.yaml"
+    campaign = load_campaign(
+        read_configuration(path) | {"records": str(ROOT / "config/records.tsv")}, path
+    )
+
+    def separated(percent: float, without: str = "") -> dict[str, Any]:
+        readings = odd_record(record, percent, 3)
+        results = [
+            RecordResult(row, fit_of(*reading), {"volts_per_radian": None})
+            for row, *reading in zip(campaign.records, *readings, strict=True)
+            if row.record != without
+        ]
+        return separate_campaign(campaign, results)
+
+    found, sound = separated(100.0), separated(100.0, without=record)
+    (reason,) = found["left_out"].values()
+    assert reason.startswith(f"off the others: {record} +")
+    assert sound["left_out"] == {}
+    for name in ("hysteretic_coefficient", "loss_torque", "benchmark"):
+        assert found[name] == sound[name] is not None
+    quality = {entry["record"]: entry.get("quality_factor_viscous") for entry in found["records"]}
+    assert quality[record] is None
+    assert quality["water-low-7"]
+
+
+def fit_of(values: FloatArray, whitening: FloatArray) -> FitResult:
+    """A fit of these numbers, for what the campaign's stages take from one."""
+    covariance = np.linalg.inv(whitening.T @ whitening)
+    numbers = dict(zip(("frequency", "b"), values.tolist(), strict=True))
+    fit = Mock(FitResult, light="green", parameters=dict.fromkeys("ac", Estimate(0.0, 1e-6, "")))
+    fit.value.side_effect = numbers.__getitem__
+    fit.covariance_of.side_effect = lambda *_: covariance
+    return fit  # type: ignore[no-any-return]
 
 
 @pytest.mark.slow

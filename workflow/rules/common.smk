@@ -92,6 +92,11 @@ PLANS = {
 }
 
 
+OF_PENDULUMS = {
+    name: history(f"{RESULTS}/pendulums/{name}/diagnosis.json") for name in PENDULUMS
+}
+
+
 def planned(name):
     """What the configuration says of the records of a job, and the damages of what it left."""
     return lambda wildcards: PLANS[name, wildcards.chunk]
@@ -105,14 +110,20 @@ def chunk_of(*names, only=None):
 
 def of_all(*names):
     """What all jobs of stages leave; nothing of a stage that the campaign does not ask for."""
-    return chunk_of(*(stage.name for stage in STAGES if stage.name in names), only=[*CHUNKS])
+    return chunk_of(
+        *(stage.name for stage in STAGES if stage.name in names), only=[*CHUNKS]
+    )
 
 
 def sources(wildcards):
     """The users' files of a chunk: known by their content, not by their times."""
     files = [str(row.file) for row in CHUNKS[wildcards.chunk] if row.file]
     # Snakemake would take what stands in brackets for a variable of its own.
-    return [ancient(file) for file in files if os.path.isfile(file) and not {*"{}<>"} & {*file}]
+    return [
+        ancient(file)
+        for file in files
+        if os.path.isfile(file) and not {*"{}<>"} & {*file}
+    ]
 
 
 wildcard_constraints:
@@ -204,3 +215,10 @@ def refusals():
     """How many of the records were refused, in a line; empty for none."""
     refused = len(chunks.refused(CAMPAIGN))
     return f"{refused} of {len(RECORDS)} records were refused" if refused else ""
+
+
+def of_pendulum(file):
+    """A file of each record of a pendulum."""
+    return lambda wildcards: expand(
+        f"{RESULTS}/{{record}}/{file}", record=PENDULUMS[wildcards.pendulum]
+    )

@@ -1,17 +1,7 @@
-DAMAGES = {
-    name: history(f"{RESULTS}/pendulums/{name}/diagnosis.json") for name in PENDULUMS
-}
-
-
-def of_pendulum(name, file):
-    """A file of each record of a pendulum."""
-    return expand(f"{RESULTS}/{{record}}/{file}", record=PENDULUMS[name])
-
-
 rule diagnose_pendulum:
     input:
-        recordings=lambda wildcards: of_pendulum(wildcards.pendulum, "recording.csv"),
-        calibrations=lambda wildcards: of_pendulum(wildcards.pendulum, "calibration.json"),
+        recordings=of_pendulum("recording.csv"),
+        calibrations=of_pendulum("calibration.json"),
     output:
         f"{RESULTS}/pendulums/{{pendulum}}/diagnosis.json",
     log:
@@ -27,7 +17,7 @@ rule diagnose_pendulum:
         baseline=CAMPAIGN.configuration.diagnose.baseline,
         level=CAMPAIGN.configuration.diagnose.level,
         seed=CAMPAIGN.configuration.seed,
-        damages=lambda wildcards: DAMAGES[wildcards.pendulum],
+        damages=lambda wildcards: OF_PENDULUMS[wildcards.pendulum],
         code=code_version("pendpipe.commands.diagnose"),
     message:
         "{wildcards.pendulum}: what its recordings say together"

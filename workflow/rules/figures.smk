@@ -22,7 +22,9 @@ rule figures:
         configuration=CONFIGURATION,
     params:
         folder=subpath(output.drawn, parent=True),
-        damages=history(*figure_files(), *decay_files(), f"{RESULTS}/figures/drawn.json"),
+        damages=history(
+            *figure_files(), *decay_files(), f"{RESULTS}/figures/drawn.json"
+        ),
         code=code_version("pendpipe.commands.figures"),
     message:
         "figures 3 to 10"

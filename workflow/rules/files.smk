@@ -1,25 +1,30 @@
 # A record's own files come out of the archives: of every record in a campaign of up to a hundred,
 # else of those that are asked for. `snakemake all_fit` makes what all fits leave.
 if SMALL:
-    for number, (stage, chunk) in enumerate((each, chunk) for each in STAGES for chunk in CHUNKS):
+    for number, (stage, chunk) in enumerate(
+        (each, chunk) for each in STAGES for chunk in CHUNKS
+    ):
         archive = stage.path(CAMPAIGN, chunk)
         names = record_files(stage, [row.record for row in CHUNKS[chunk]])
         # A refusal, figures of a diagnosis: those that there are.
-        names += [f"{RESULTS}/{name}" for name in chunks.extras(CAMPAIGN, stage, archive)]
+        names += [
+            f"{RESULTS}/{name}" for name in chunks.extras(CAMPAIGN, stage, archive)
+        ]
 
         rule:
-            name: f"{stage.rule}_files_{number}"
-            localrule: True
+            name:
+                f"{stage.rule}_files_{number}"
             input:
                 str(archive),
             output:
                 update(names),
             log:
                 f"{RESULTS}/logs/files-{stage.name}-{chunk}.log",
+            localrule: True
             conda:
                 ENVIRONMENT
             params:
-                folder=RESULTS,
+                folder=subpath(input[0], ancestor=2),
                 damages=history(*names),
             message:
                 "the records' files, {input}"
@@ -45,7 +50,7 @@ else:
         conda:
             ENVIRONMENT
         params:
-            folder=RESULTS,
+            folder=subpath(input[0], ancestor=2),
         message:
             "{output}"
         shell:
@@ -55,6 +60,7 @@ else:
 for stage in STAGES:
 
     rule:
-        name: f"all_{stage.rule}"
+        name:
+            f"all_{stage.rule}"
         input:
             of_stage(stage),

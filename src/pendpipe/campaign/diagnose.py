@@ -704,14 +704,14 @@ def _rows(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> list[t
     silent = not search.found and not search.left_out
     beforehand = f"beforehand nothing is as likely as all {len(CATALOGUE)} causes together"
     return [
-        ("off the others", ", ".join(map(_off, search.left_out))),
+        ("off the others", ", ".join(map(off, search.left_out))),
         *(
             (_words(name), f"the drag is {fit.size(about=1.0)} times Eq. 16, k {coefficient(fit)}")
             for name, fit in (_with_and_without(search) if search.whole else {}).items()
         ),
         ("causes", "no effect of the catalogue stands out, nor any record" if silent else ""),
         ("most probable", ", beside ".join(map(_likely, search.found))),
-        ("or", f"{_off(search.suspect)}: take it anew first" if search.suspect else ""),
+        ("or", f"{off(search.suspect)}: take it anew first" if search.suspect else ""),
         *(("beside it", _others(one)) for one in search.found),
         *(
             ("decide by", _deciding(runs) if one.rivals else "")
@@ -727,7 +727,8 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _off(far: Far) -> str:
+def off(far: Far) -> str:
+    """Say how far a record lies from what all others predict."""
     return f"{far.record} {far.sigma:+.1f} sigma"
 
 

@@ -53,14 +53,16 @@ def run(arguments: Arguments) -> None:
 def compare_campaign(campaign: Campaign, folder: Path, separated: dict[str, Any]) -> dict[str, Any]:
     """Compare the losses of the records, whose results are in `folder`, with Eq. 16."""
     results = read_results(campaign, folder)
-    together = campaign_data(campaign, results)
+    together = campaign_data(campaign, results, separated["left_out"])
     spread = inertia_sds(together[0]) if together else {}
     values = together and campaign_values(*together)
     found = values if values and values.wet and is_line(values) else None
     split = {entry["record"]: entry for entry in separated["records"]}
     joint = joint_values(*together) if together and enough(together[0]) else None
     settings = campaign.configuration
-    copies = twins(results)
+    excluded = {
+        name: f"{name} is the same recording as {first}" for name, first in twins(results).items()
+    } | separated["left_out"]
     return {
         "schema_version": 1,
         "title": settings.title,
@@ -68,14 +70,17 @@ def compare_campaign(campaign: Campaign, folder: Path, separated: dict[str, Any]
         "has_theory": settings.apparatus is not None,
         "records": [
             _record(
-                campaign, folder, result, split, found, spread.get(result.record.record), copies
+                campaign, folder, result, split, found, spread.get(result.record.record), excluded
             )
             for result in results
         ],
         "curves": _curves(campaign, separated["hysteretic_coefficient"]),
         **{
             name: separated[name]
-            for name in ("hysteretic_coefficient", "reference_inertia", "loss_torque", "benchmark")
+            for name in (
+                *("hysteretic_coefficient", "reference_inertia", "loss_torque", "benchmark"),
+                "left_out",
+            )
         },
         "drag_factor": joint and joint["with_benchmark"]["drag_factor"],
         **_campaign_numbers(found),
@@ -122,7 +127,7 @@ def _record(
     split: dict[str, dict[str, Any]],
     found: Values | None,
     spread: InertiaSds | None,
-    copies: dict[str, str],
+    reasons: dict[str, str],
 ) -> dict[str, Any]:
     """Everything that is known of one record."""
     row = result.record
@@ -139,8 +144,7 @@ def _record(
         return content
     fit = result.fit.to_dict()
     excluded = [] if result.usable else [f"not separated: {fit['light_reason']}"]
-    if row.record in copies:
-        excluded.append(f"the same recording as {copies[row.record]}: it counts once")
+    excluded += [reasons[row.record]] if row.record in reasons else []
     points = read_turning_points(folder / row.record / "turning_points.csv")
     content |= {
         **fit["parameters"],
@@ -293,6 +297,7 @@ def campaign_summary(comparison: dict[str, Any]) -> dict[str, Any]:
         "history_coefficient": _number(comparison["history_coefficient"]),
         "volts_per_radian": _number(calibration and calibration["volts_per_radian"]),
         "joint": comparison["joint"],
+        "left_out": comparison["left_out"],
         "records": [
             {name: record[name] for name in ("record", "fluid", "branch")}
             | {name: _number(record.get(name)) for name in NUMBERS}

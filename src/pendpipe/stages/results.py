@@ -1,6 +1,6 @@
 """What the campaign's own stages build on: the records' results, their joint fit, the theory."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,17 +69,31 @@ def placed(campaign: Campaign, results: Sequence[RecordResult]) -> list[RecordRe
 
 
 def campaign_data(
-    campaign: Campaign, results: Sequence[RecordResult]
+    campaign: Campaign, results: Sequence[RecordResult], without: Collection[str] = ()
 ) -> tuple[Design, Measured] | None:
     """Design and data of the usable records with a geometry, each recording once; None without."""
-    copies = twins(results)
-    used = [one for one in placed(campaign, results) if one.record.record not in copies]
+    out = {*twins(results), *without}
+    used = [one for one in placed(campaign, results) if one.record.record not in out]
     if not used:
         return None
     design = design_of(campaign, [result.record for result in used])
     fits = [result.fit for result in used if result.fit is not None]
     values = np.array([(fit.value("frequency"), fit.value("b")) for fit in fits])
     return design, measured(values, np.array([fit.covariance_of("frequency", "b") for fit in fits]))
+
+
+def left_out(campaign: Campaign, results: Sequence[RecordResult]) -> dict[str, str]:
+    """Records that disagree with all others, and by how much, as the campaign's diagnosis says.
+
+    The campaign's numbers are those without them.
+    """
+    from pendpipe.campaign.diagnose import off, search
+
+    together = campaign_data(campaign, results)
+    if together is None or not enough(together[0]):
+        return {}
+    found = search(*together, level=campaign.configuration.diagnose.level)
+    return {far.record: f"off the others: {off(far)}" for far in found.left_out}
 
 
 def enough(design: Design) -> bool:

@@ -15,7 +15,7 @@ from pendpipe.estimate import Z95, Estimate
 from pendpipe.files import write_json
 from pendpipe.options import OUTPUT, flags
 from pendpipe.stages.archive import gathered
-from pendpipe.stages.results import RecordResult, campaign_data, read_results
+from pendpipe.stages.results import RecordResult, campaign_data, left_out, read_results
 
 
 @command(
@@ -34,9 +34,11 @@ def separate_campaign(campaign: Campaign, results: Sequence[RecordResult]) -> di
 
     A campaign without records that swing in no fluid has no k, and nothing is separated; so it is
     where these contradict ``Q_h = k f^2 (I/I_0)^(1 - p)``. Records whose fitted law contradicts
-    the decay (a red light) are left out; `compare` reports the reason.
+    the decay (a red light) are left out, and those that disagree with all others; `compare`
+    reports the reason.
     """
-    together = campaign_data(campaign, results)
+    out = left_out(campaign, results)
+    together = campaign_data(campaign, results, out)
     values = together and campaign_values(*together)
     content: dict[str, Any] = {
         "schema_version": 1,
@@ -44,6 +46,7 @@ def separate_campaign(campaign: Campaign, results: Sequence[RecordResult]) -> di
         "reference_inertia": None,
         "loss_torque": None,
         "benchmark": None,
+        "left_out": out,
     }
     if values:
         content["benchmark"] = _benchmark(values)
