@@ -122,7 +122,7 @@ _LEVEL: Final = 0.03
 _EVEN: Final = 0.01
 """Of an interval, within which those of a converter lie; of what people note down, few do."""
 _SWINGS: Final = 0.01
-"""How often a recording of a swing only falls: none of 190 files of strangers does."""
+"""How often a recording of a swing only falls: none of 190 files of others does."""
 
 
 def alternate(values: FloatArray) -> bool:

@@ -8,7 +8,7 @@ piece by piece, or those of a likelihood that is no sum of squares.
 
 scipy's `least_squares` takes 0.8 s to import, as long as a thousand of these fits, and 3 ms for
 five steps of five parameters. It needs the Jacobian of all readings in memory (10^8 have none), has
-no normal equations, no steps on trust, none that follow a curve, and can't be interrupted and
+no normal equations, no last step unverified, none that follow a curve, and can't be interrupted and
 resumed, as refits are that compete. So this is ours.
 """
 
