@@ -106,8 +106,21 @@ def _second(name: str) -> Row:
     if not is_none:
         bands = [_band(*each["load"](), each["start"], each["stop"]) for each in cases]
         case |= {"period_s": (min(low for low, _ in bands), max(high for _, high in bands))}
-    readings = [_wanted(*each["load"](), each["unit"]) for each in cases]
+    readings = [_wanted(*each) for each in _also_right(name)]
+    readings += [_wanted(*each["load"](), each["unit"]) for each in cases]
     return _by_third(case, readings)
+
+
+def _also_right(name: str) -> list[tuple[Any, Any, str]]:
+    """What else may be read of a file: another run, the position itself, the header's unit."""
+    second = judge_of("second", "cases")
+    if name.startswith("Sven"):
+        text = Path(second.p(name)).read_text("utf-8-sig").partition("\n")[0]
+        runs = sorted(set(re.findall(r"Angle, Ch 1\+2 \(rad\) Run #(\d+)", text)))
+        return [(*second.capstone(name, int(run)), "rad") for run in runs]
+    unit = {"data3.txt": "px", "pendulum_lab_1_data.txt": "px", "angles.txt": "deg"}
+    asked = unit.get(Path(name).name)
+    return [(*second.table(name, (0, 1)), asked)] if asked else []
 
 
 def _wanted(time: Any, values: Any, unit: str) -> tuple[Any, ...]:
