@@ -38,7 +38,8 @@ def amplitudes_in(label: str, time: FloatArray | None, values: FloatArray) -> Fa
     """
     said = f"'{label}' only falls: amplitudes against time"
     steps = np.diff(time) if time is not None else np.empty(0)
-    if alternate(values) and len(steps) and np.ptp(steps) < _EVEN * np.median(steps):
+    even = len(steps) > _BY_HAND and np.ptp(steps) < _EVEN * np.median(steps)
+    if even and alternate(values):
         said += ", or two readings a cycle, which show neither period nor loss"
         return Fact("amplitudes", label, "guessed", said)
     return Fact("amplitudes", label, "shown", said, _SWINGS)
@@ -119,6 +120,8 @@ _LEVEL: Final = 0.03
 """Of the range, by which falling sizes may lie above the least before them, on average."""
 
 
+_BY_HAND: Final = 100
+"""Turning points that somebody has noted; a converter takes more readings."""
 _EVEN: Final = 0.01
 """Of an interval, within which those of a converter lie; of what people note down, few do."""
 _SWINGS: Final = 0.01

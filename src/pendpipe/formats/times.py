@@ -217,9 +217,7 @@ def _time_unit(
         if largest > least and not ticks and factor * period < _LONGEST_S:
             said = f"'{column.label}' counts {name} since 1970"
             return factor, Fact("unit of time", name, "shown", said, _OTHER_PERIODS)
-    # The amplitudes of a list are a swing apart or more.
-    apart = float(np.median(np.abs(np.diff(values)))) if listed and len(values) > 1 else 0.0
-    return _time_by_size(column, period, apart, values)
+    return _time_by_size(column, period, values)
 
 
 def _period(reading: Column, values: FloatArray) -> float:
@@ -229,17 +227,11 @@ def _period(reading: Column, values: FloatArray) -> float:
     return cycle * span / max(1, len(values) - 1)
 
 
-def _time_by_size(
-    column: Column, period: float, apart: float, values: FloatArray
-) -> tuple[float, Fact]:
-    """Take seconds, unless no pendulum would be so slow; sure where no other unit gives a swing."""
+def _time_by_size(column: Column, period: float, values: FloatArray) -> tuple[float, Fact]:
+    """Take seconds, unless no pendulum would be so slow; sure of a list, or where no other fits."""
     kind, said = "unit of time", f"'{column.label}' is taken to be in seconds"
     short, long = _SWINGS_S
-    fits = [
-        size
-        for size, _ in _TICKS
-        if short <= size * (period or apart) <= (long if period else np.inf)
-    ]
+    fits = [size for size, _ in _TICKS if short <= size * period <= long]
     if period > _LONGEST_S:
         # The coarsest of those that make it a swing; a hundred milliseconds are one too.
         fitting = ((size, name) for size, name in _TICKS if size * period < _LONGEST_S / 10.0)
@@ -253,7 +245,7 @@ def _time_by_size(
             kind, "days", "shown" if dated else "guessed", said, _OTHER_PERIODS if dated else None
         )
     whole = bool(np.all(values[:1000] == np.rint(values[:1000])))
-    if (fits == [1.0] and not (whole and period)) or not (period or apart):
+    if (fits == [1.0] and not (whole and period)) or not period:
         return 1.0, Fact(kind, "s", "shown", said, _OTHER_PERIODS)
     said += f": a period of {period:.4g} s" if period else ""
     return 1.0, Fact(kind, "s", "guessed", said, option="--unit ms: for milliseconds")
