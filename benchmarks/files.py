@@ -148,7 +148,18 @@ def _by_third(case: Row, readings: list[Any] | None) -> Row:
     judge = judge_of("", "check_third")
     wanted = judge.wanted if readings is None else lambda _case: readings
     executable = str(Path(sys.executable).with_name("pendpipe"))
-    with tempfile.TemporaryDirectory() as folder, patch.object(judge, "wanted", wanted):
+    plain = judge.read_plain
+
+    def in_volts(path: str) -> tuple[Any, ...]:
+        """Give the unit that the name of the plain form's column states."""
+        name, unit, *rest = plain(path)
+        return (name, "V" if name == "volts" else unit, *rest)
+
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        patch.object(judge, "wanted", wanted),
+        patch.object(judge, "read_plain", in_volts),
+    ):
         read, fit, why, told, *_ = judge.check(executable, case, folder)
     light = [*re.findall(r"\b(green|amber|red)\b", told), "none"][0]
     fit = None if fit is None else bool(fit)

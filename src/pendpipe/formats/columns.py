@@ -378,7 +378,9 @@ def _of_equals(equals: Sequence[tuple[Column, ...]]) -> tuple[tuple[Column, ...]
     often = [each for each in equals if each[0].swing.clear and _cycles(each[0]) > 8.0] or equals
     clearest = max(column[0].swing.clarity for column in often)
     clear = [each for each in often if each[0].swing.clarity >= 0.7 * clearest]
-    wander = len(clear) < len(equals) and clear[0][0].swing.clear and not clear[0][0].name
+    hardly = equals[0][0].swing.clarity < 0.5 * clearest
+    wander = len(clear) == 1 < len(equals) or (hardly and len(clear) < len(equals))
+    wander = wander and clear[0][0].swing.clear and not clear[0][0].name
     equals = clear if wander else equals
     first = equals[0]
     if len(equals) == 1 or len(first) > 1:

@@ -212,7 +212,9 @@ def _without_clear_spikes(values: FloatArray) -> FloatArray:
         noise = float(np.median(np.abs(_off_cubic(x, usual, rows)))) / 0.6745
         side = np.abs(np.sign(off).sum(axis=0)) == rows
         size = np.abs(off).min(axis=0)
-        away, back = x[at] - x[at - 1], x[at + rows] - x[at + rows - 1]
+        # Beyond the step before it, and the one behind: those of the swing.
+        step = np.diff(x)
+        away, back = step[at - 1] - step[at - 2], step[at + rows - 1] - step[at + rows]
         least_step, most_step = np.sort(np.abs([away, back]), axis=0)
         returns = (away * back < 0.0) & (least_step > np.maximum(0.5 * size, 0.25 * most_step))
         # What lies between two spikes has a step before it, or behind.
