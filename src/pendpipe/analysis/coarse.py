@@ -111,7 +111,8 @@ def _between_uneven(time_s: FloatArray, values: FloatArray, dense: float) -> Bet
     power = lombscargle(time_s - time_s[0], rest, omegas)
     omega = float(omegas[np.argmax(power)])
     per_cycle = 2.0 * math.pi * count / (omega * span)
-    if not _SPARSE < per_cycle < dense:
+    most = omega * float(np.max(np.diff(time_s))) / math.pi
+    if not _SPARSE < per_cycle < dense or most > 1.0:  # a half cycle is in a gap
         return None
     window = min(max(round(_WINDOW * per_cycle), 8), count)
     place = np.linspace(time_s[0], time_s[-1], math.ceil(_WANTED * count / per_cycle))
