@@ -29,6 +29,7 @@ from pendpipe.options import (
     measured_number,
 )
 from pendpipe.reading import read
+from pendpipe.readings import motion_of
 from pendpipe.recording import Recording
 
 if TYPE_CHECKING:
@@ -414,7 +415,7 @@ def _source(recording: Any, angle_rad: "ArrayLike | None" = None) -> Source:
 def _motion(recording: Source, volts_per_radian: float | None = None) -> Recording:
     """Return the recording in radians (or metres), read from its file where it is one."""
     read_in = recording if isinstance(recording, Recording) else read(recording)
-    return read_in.as_motion(volts_per_radian, _place(recording))
+    return motion_of(read_in, volts_per_radian, _place(recording))
 
 
 def _place(recording: Source) -> str:

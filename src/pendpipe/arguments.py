@@ -135,11 +135,12 @@ def read_motion(
         ``volts_per_radian`` (None where none was used).
     """
     from pendpipe.formats.reading import file_bytes
+    from pendpipe.readings import motion_of
 
     recording = read(arguments.file, **given(arguments, read))
     constant = arguments.volts_per_radian or _calibrated(arguments.calibration)
     was_volts = recording.quantity == "volts"
-    recording = recording.as_motion(constant, arguments.file)
+    recording = motion_of(recording, constant, arguments.file)
     announce(arguments, recording, quiet=quiet, say=say)
     return recording, {
         "input_sha256": hashlib.sha256(file_bytes(Path(arguments.file))).hexdigest(),

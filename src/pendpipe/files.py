@@ -39,7 +39,8 @@ RECORDED_BY: Final = "recorded_by"
 """The key in a recording that an instrument has made: it is the user's own, as its raw file is."""
 _BY: Final = r'pendpipe(?: [^\s"<>)\0:]+)?(?: sha256:([0-9a-f]{16}))?'
 """Files of earlier versions have no digest."""
-_IN_TEXT: Final = rf'{_BY}(?=[\s"<])'
+_IN_TEXT: Final = rf'{_BY}(?=[\r\n"<])'
+"""Nothing else stands behind it: what is left of a damaged digest makes no earlier version."""
 _SVG: Final = r"\A(?:<\?xml[^>]*>\s*)?(?:<!DOCTYPE svg[^>]*>\s*)?<svg[^>]*>\s*"
 _HTML: Final = (
     r'\A<!doctype html>(?:\s*<(?:html|head|meta)[^<>]*>)*?\s*<meta name="generator" content="'

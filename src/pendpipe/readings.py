@@ -12,8 +12,32 @@ from pendpipe.facts import Fact
 from pendpipe.recording import Recording
 
 
-def motion_of(recording: Recording, volts_per_radian: float | None, place: str | Path) -> Recording:
-    """Return a recording in radians where the sensor's constant is known; see `as_motion`."""
+def motion_of(
+    recording: Recording, volts_per_radian: float | None = None, place: str | Path = "recording"
+) -> Recording:
+    """Return a recording in radians where the sensor's constant is known.
+
+    Angles are counted from where the pendulum hangs, without jumps. Anything else stays in its
+    own unit: metres, volts without a constant, counts, pixels. The analysis is the same, and Q
+    and the period need no constant; but the amplitude, a and c are then in that unit and no
+    angle, so that sin x does not apply.
+
+    Parameters
+    ----------
+    recording
+        As it was read.
+    volts_per_radian
+        The sensor's constant; by default the recording's own.
+    place
+        Named in messages.
+
+    Raises
+    ------
+    InputError
+        If the recording's own constant is not a number, or 0; if it is an accelerometer's pull
+        along the string, whose frequency is twice the pendulum's; or if the numbers are such as
+        no pendulum gives, and their squares or their differences no computer holds.
+    """
     motion = _in_radians(recording, volts_per_radian, place)
     _check_scale(motion, place)
     _refuse_pull(motion, place)

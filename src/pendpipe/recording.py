@@ -261,34 +261,6 @@ class Recording:
             radius_excess=None if self.radius_excess is None else self.radius_excess[keep],
         )
 
-    def as_motion(
-        self, volts_per_radian: float | None = None, place: str | Path = "recording"
-    ) -> "Recording":
-        """Return the same recording in radians where the sensor's constant is known.
-
-        Angles are counted from where the pendulum hangs, without jumps. Anything else stays in its
-        own unit: metres, volts without a constant, counts, pixels. The analysis is the same, and Q
-        and the period need no constant; but the amplitude, a and c are then in that unit and no
-        angle, so that sin x does not apply.
-
-        Parameters
-        ----------
-        volts_per_radian
-            The sensor's constant; by default the recording's own.
-        place
-            Named in messages.
-
-        Raises
-        ------
-        InputError
-            If the recording's own constant is not a number, or 0; if it is an accelerometer's pull
-            along the string, whose frequency is twice the pendulum's; or if the numbers are such as
-            no pendulum gives, and their squares or their differences no computer holds.
-        """
-        from pendpipe.readings import motion_of
-
-        return motion_of(self, volts_per_radian, place)
-
 
 def _column(name: str, values: ArrayLike) -> FloatArray:
     """Return readings as a one-dimensional array of numbers."""

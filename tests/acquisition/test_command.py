@@ -23,6 +23,7 @@ from pendpipe.acquisition.line import Line, cannot_open
 from pendpipe.acquisition.raw import read_raw
 from pendpipe.cli import main
 from pendpipe.errors import InputError
+from pendpipe.readings import motion_of
 from pendpipe.recording import read_plain
 
 # ``pendpipe acquire`` as a user calls it.
@@ -42,7 +43,7 @@ def test_all_a_newcomer_needs(
     assert recording.metadata["source"].startswith("simulated DI-")
     assert recording.resolution == 20.0 / 2**bits
     # 0.3 rad at 3.85 V/rad, and at 120 s down by exp(-pi 60/150).
-    values = recording.as_motion().values
+    values = motion_of(recording).values
     half_s = round(0.5 / recording.interval_s)
     assert np.abs(values[: 2 * half_s]).max() == pytest.approx(0.3, rel=0.02)
     assert np.abs(values[-2 * half_s :]).max() == pytest.approx(

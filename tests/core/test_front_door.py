@@ -28,6 +28,7 @@ from pendpipe.errors import InputError
 from pendpipe.facts import Fact
 from pendpipe.figures.style import ShownFigure
 from pendpipe.process import _AHEAD
+from pendpipe.readings import motion_of
 from pendpipe.recording import Recording, read_plain, write_plain
 
 # The lines of the README, the pages and the notebook do what they say.
@@ -288,7 +289,7 @@ def test_volts_become_radians_by_the_sensor_constant(tmp_path: Path) -> None:
     (tmp_path / "v.csv").write_text(
         "# volts_per_radian: 3.85\n# bits: 16\n# range_volts: 10\ntime_s,volts\n0,3.85\n1,0\n"
     )
-    motion = read_plain(tmp_path / "v.csv").as_motion()
+    motion = motion_of(read_plain(tmp_path / "v.csv"))
     assert motion.values.tolist() == [1.0, 0.0]
     assert motion.resolution == pytest.approx(20 / 2**16 / 3.85, rel=1e-15)
 
@@ -324,21 +325,21 @@ def test_a_faulty_file_is_refused_in_one_line(tmp_path: Path, name: str) -> None
 
 def test_volts_without_a_sensor_constant_stay_volts_and_say_so() -> None:
     recording = Recording(np.arange(3.0), np.zeros(3), "volts")
-    motion = recording.as_motion()
+    motion = motion_of(recording)
     assert motion.unit == "V"
     assert "--volts-per-radian" in motion.weak_guesses[0]
-    assert motion.as_motion().weak_guesses == motion.weak_guesses
-    assert recording.as_motion(2.0).unit == "rad"
+    assert motion_of(motion).weak_guesses == motion.weak_guesses
+    assert motion_of(recording, 2.0).unit == "rad"
     with pytest.raises(InputError, match="the sensor constant is 0"):
-        Recording(
-            np.arange(3.0), np.zeros(3), "volts", metadata={"volts_per_radian": "0"}
-        ).as_motion()
+        motion_of(
+            Recording(np.arange(3.0), np.zeros(3), "volts", metadata={"volts_per_radian": "0"})
+        )
 
 
 def test_arrays_in_memory_are_a_recording() -> None:
     recording = Recording(time_s=[0, 1, 2], volts=[0.1, 0.2, 0.1], volts_per_radian=2.0)
     assert recording.values.dtype == np.float64
-    np.testing.assert_array_equal(recording.as_motion().values, [0.05, 0.1, 0.05])
+    np.testing.assert_array_equal(motion_of(recording).values, [0.05, 0.1, 0.05])
 
 
 @pytest.mark.parametrize(
@@ -370,7 +371,7 @@ def test_a_reading_of_any_unit_keeps_it_in_the_plain_form(tmp_path: Path) -> Non
     write_plain(tmp_path / "counts.csv", recording)
     again = read_plain(tmp_path / "counts.csv")
     assert (again.quantity, again.unit) == ("reading", "counts")
-    assert again.as_motion() is again
+    assert motion_of(again) is again
     assert again.facts == recording.facts
     assert again.weak_guesses == ("the column is a guess (--column)",)
     assert dict(again.metadata) == {"unit": "counts"}
@@ -398,9 +399,9 @@ def test_angles_given_as_arrays_hang_at_zero_and_do_not_jump(level: float) -> No
     time_s = np.arange(400) / 50.0
     angle = 0.8 * np.exp(-0.05 * time_s) * np.cos(4.0 * time_s)
     wrapped = (angle + level + np.pi) % (2 * np.pi) - np.pi
-    motion = Recording(time_s=time_s, angle_rad=wrapped).as_motion()
+    motion = motion_of(Recording(time_s=time_s, angle_rad=wrapped))
     np.testing.assert_allclose(motion.values, angle, atol=1e-12)
-    assert motion.as_motion() is motion
+    assert motion_of(motion) is motion
     if level != 2 * np.pi:  # so many turns leave nothing to do
         assert "hangs near 0" in motion.notes[-1]
 
@@ -420,10 +421,10 @@ def test_a_pull_along_the_string_is_refused(level: float, unit: str, refused: bo
     pull = level + 0.3 * np.exp(-time / 20.0) * np.cos(6.0 * time)
     phone = Recording(time, pull, "reading", metadata={"unit": unit})
     if not refused:
-        assert phone.as_motion() is phone
+        assert motion_of(phone) is phone
         return
     with pytest.raises(InputError, match=r"twice per period; give the axis along the swing"):
-        phone.as_motion()
+        motion_of(phone)
 
 
 def test_a_number_that_a_fit_has_not_is_answered_with_those_that_it_has() -> None:

@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 import pendpipe as pp
 import pendpipe.diagnosis.quoted
+from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.quoted import LISTED, descriptions_of, printed_by, quoted
@@ -31,6 +33,7 @@ from .records import (
     TRUTH,
     diagnosed,
     null_fit,
+    other_engine,
     prepared,
     pulled,
     recording,
@@ -270,6 +273,39 @@ def test_a_fault_of_the_measurement_alone_leaves_one_description_without_it() ->
     given, alone = (each.parameters["frequency"] for each in (outcome.improved, outcome.baseline))
     assert abs(given.value - FREQUENCY_HZ) < 3.0 * given.sd
     assert given.sd < 0.3 * alone.sd
+
+
+CHIRP = 2e-5
+"""By how much a clock is slower at the end than at the beginning."""
+
+
+def braked() -> tuple[FloatArray, float]:
+    """A viscous brake is switched on half way, and the clock slows down; the mean period."""
+    time_s = TIME_S - 0.5 * CHIRP * TIME_S**2 / END_S
+    half_s = 0.5 * END_S
+    damped = 0.008 * np.minimum(time_s, half_s) + 0.024 * np.maximum(time_s - half_s, 0.0)
+    return 0.15 * np.exp(-damped) * np.cos(OMEGA_RAD_S * time_s), T0_S * (1.0 + 0.5 * CHIRP)
+
+
+def humming() -> tuple[FloatArray, float]:
+    """Hum of the mains that the sampling folds onto the swing, within its resolution."""
+    hum = 4e-4 * np.cos(2.0 * math.pi * (FREQUENCY_HZ + 0.005) * TIME_S + 1.0)
+    return other_engine(TRUTH) + hum, T0_S
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("make", [braked, humming])
+def test_a_cause_that_cannot_be_named_moves_no_period_beyond_its_error(
+    make: Callable[[], tuple[FloatArray, float]],
+) -> None:
+    """Nor is the diagnosis surer of it than the fit, where more than noise is left."""
+    readings, period_s = make()
+    outcome = diagnose_recording(recording(readings, 1), restoring="linear")
+    before, after = outcome.baseline, outcome.improved or outcome.baseline
+    for numbers in (before, after):
+        found = numbers.parameters["frequency"]
+        assert abs(1.0 / found.value - period_s) < 4.0 * found.sd / found.value**2
+    assert after.parameters["frequency"].sd > 0.99 * before.parameters["frequency"].sd
 
 
 # What explains nothing shrinks no error.

@@ -25,6 +25,7 @@ from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects.baseline import A, C
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.formats import read
+from pendpipe.readings import motion_of
 from pendpipe.recording import Recording
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "recordings"
@@ -38,7 +39,7 @@ ROD, GAP = "yfysiks-encoder/data2_14.csv", "yfysiks-encoder/data2_12.csv"
 
 
 def whole(name: str) -> Recording:
-    return read(SHARED / name).as_motion()
+    return motion_of(read(SHARED / name))
 
 
 @functools.cache

@@ -15,6 +15,7 @@ from pendpipe.effects.baseline import A as QUADRATIC, B as LINEAR, C as FRICTION
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model, jacobian
 from pendpipe.effects.stack import Differs, Stack
+from pendpipe.readings import motion_of
 from pendpipe.recording import Recording
 
 AMPLITUDES = (0.05, 0.15, 0.4)
@@ -163,7 +164,7 @@ def test_command_writes_the_keys_of_a_diagnosis_and_the_recordings(tmp_path: Pat
     files = []
     for number, amplitude in enumerate((0.1, 0.3)):
         files.append(str(tmp_path / f"{number}.csv"))
-        recording = swing(amplitude, 50 + number).as_motion(1.0, "x")
+        recording = motion_of(swing(amplitude, 50 + number), 1.0, "x")
         lines = [
             f"{t!r},{x!r}"
             for t, x in zip(recording.time_s.tolist(), recording.values.tolist(), strict=True)

@@ -9,6 +9,7 @@ import pytest
 from pendpipe.analysis.free_decay import find_free_decay
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.formats import ReadOptions, inspect, read
+from pendpipe.readings import motion_of
 
 from .cases import SHARED
 
@@ -110,7 +111,7 @@ def test_clamping_and_repositioning_are_cut_and_said(name: str) -> None:
 )
 def test_what_is_no_pendulum_is_refused(name: str) -> None:
     with pytest.raises(NotAnalysableError):
-        find_free_decay(read(SHARED / name).as_motion(1.0))
+        find_free_decay(motion_of(read(SHARED / name), 1.0))
 
 
 @pytest.mark.parametrize(

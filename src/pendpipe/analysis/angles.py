@@ -16,6 +16,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.estimate import Estimate
 from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 from pendpipe.quantities import with_error
+from pendpipe.readings import motion_of
 from pendpipe.recording import Recording
 
 TELLS: Final = 0.2
@@ -157,14 +158,16 @@ def as_pendulum(
     size = f"taken to be {name}" if name else f"a reading of 1 is worth {worth}"
     step = None if recording.resolution is None else factor * recording.resolution
     said = f"the period lengthens with the swing as a {what} does: {size}"
-    return replace(
-        recording,
-        values=factor * recording.values,
-        quantity="angle_rad" if length_m is None else "displacement_m",
-        resolution=step,
-        notes=(*recording.notes, said),
-        metadata={**recording.metadata, _SCALE_SD: repr(sd), READ_AS: said},
-    ).as_motion()
+    return motion_of(
+        replace(
+            recording,
+            values=factor * recording.values,
+            quantity="angle_rad" if length_m is None else "displacement_m",
+            resolution=step,
+            notes=(*recording.notes, said),
+            metadata={**recording.metadata, _SCALE_SD: repr(sd), READ_AS: said},
+        )
+    )
 
 
 def scale_of(recording: Recording) -> float:

@@ -376,7 +376,7 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     Parameters
     ----------
     recording
-        In radians or metres (`Recording.as_motion`); samples may be uneven.
+        In radians or metres (`readings.motion_of`); samples may be uneven.
     place
         Named in messages.
 

@@ -50,6 +50,7 @@ from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
 from pendpipe.levels import FALSE_ALARM
 from pendpipe.quantities import stretch, with_error
+from pendpipe.readings import motion_of
 from pendpipe.recording import Recording
 
 
@@ -114,7 +115,7 @@ def diagnose_recording(
 
     check_fixed(fixed or {}, baseline)
     progress("finding the free decay and its turning points")
-    motion = recording.as_motion(place=place)
+    motion = motion_of(recording, place=place)
     points, part = measure_recording(motion, place, length_m=length.value if length else None)
     if restoring == "sine" and part.unit == "m":
         angles, part = measure_recording(_angle_of(part, points, length, place), place)

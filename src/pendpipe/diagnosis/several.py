@@ -55,6 +55,7 @@ from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.estimate import Z95, Estimate
 from pendpipe.levels import FALSE_ALARM
 from pendpipe.quantities import listed
+from pendpipe.readings import motion_of
 from pendpipe.recording import Recording
 
 _HEAD: Final = 0.25
@@ -546,7 +547,7 @@ def _check_one_pendulum(recordings: Sequence[Recording], names: Sequence[str]) -
 
     found = []
     for recording, name in zip(recordings, names, strict=True):
-        points, _ = measure_recording(recording.as_motion(place=name), name)
+        points, _ = measure_recording(motion_of(recording, place=name), name)
         largest = min(float(np.max(points.amplitude_rad)), TOP) if points.unit == "rad" else 0.0
         half_swing = float(swing_phase(np.full(2, largest), "sine")[0])
         found.append((points.apparent_frequency_hz, half_swing / math.pi, name))

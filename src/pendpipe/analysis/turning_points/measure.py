@@ -30,7 +30,7 @@ from pendpipe.analysis.noise import noise_rms
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.dynamics.kernel import IntMatrix, Matrix, Stack, kernel
 from pendpipe.errors import NotAnalysableError, refuse_if
-from pendpipe.readings import decimal_step, find_step
+from pendpipe.readings import decimal_step, find_step, motion_of
 from pendpipe.recording import Recording
 
 FITTED: Final = 4
@@ -575,7 +575,7 @@ def prepare(recording: Recording, place: str | Path) -> Samples:
         A sensor constant that is not a number.
     """
     if recording.quantity == "volts":
-        recording = recording.as_motion(place=place)
+        recording = motion_of(recording, place=place)
     time, values, radius = recording.time_s, recording.values, recording.radius_excess
     low, high = _range(values)
     if recording.quality is not None or not math.isfinite(high - low):
