@@ -85,6 +85,14 @@ def test_runs_side_by_side_do_not_mix_and_are_offered_by_name(tmp_path: Path) ->
         assert other.time_s[0] == pytest.approx(0.5)
 
 
+def test_of_runs_side_by_side_the_last_is_read_where_it_alone_swings(tmp_path: Path) -> None:
+    still = 1e-3 * np.random.default_rng(5).standard_normal(len(TIME))
+    rows = each("{:.4f};{:.6f};{:.4f};{:.6f}\n", TIME, still, TIME + 0.5, ANGLE)
+    recording = read_as(tmp_path, "t1;theta1;t2;theta2\n" + rows)
+    same(recording)
+    assert recording.time_s[0] == pytest.approx(0.5)
+
+
 @pytest.mark.parametrize("order", ["one below the other", "in turn"])
 def test_a_long_table_is_read_by_the_quantity_that_it_names(tmp_path: Path, order: str) -> None:
     angles, rates = (
@@ -347,7 +355,10 @@ def test_a_zero_before_every_number_is_whole_or_its_own_column(tmp_path: Path) -
         (spoil(7, "0.12,inf")(SPOILT), "line 8: 1 reading(s) that are infinite"),
         (spoil_two_in_a_hundred("nan,0.4")(SPOILT), "line 51: the time is missing or NaN"),
         (spoil_two_in_a_hundred("{},oops")(SPOILT), "line 51: 'oops' is not a number"),
-        (text(np.where(TIME < 0.11, TIME, TIME - 0.05), ANGLE, digits=4), "the time falls (0.1 is"),
+        (
+            text(np.where(TIME < 0.11, TIME, TIME - 0.05), ANGLE, digits=4),
+            "line 7: the time falls (0.1 is",
+        ),
         (HEAD, "no block of rows with numbers"),
         ("", "the file is empty"),
         ("hello\nworld\n", "no reader knows this file: no block of rows"),
