@@ -362,7 +362,8 @@ def _numbers(columns: Sequence[Sequence[str]], way: Sequence[int]) -> list[Float
     found: list[FloatArray] = []
     for at, many in _placed(way):
         texts = columns[at] if many == 1 else map(".".join, zip(*columns[at : at + 2], strict=True))
-        values = np.array([float(text) if _NUMBER.fullmatch(text) else np.nan for text in texts])
+        numbers = (text.lower().replace("d", "e") for text in texts)  # Fortran's 1D5
+        values = np.array([float(text) if _NUMBER.fullmatch(text) else np.nan for text in numbers])
         lost = np.isnan(values)
         values[lost] = (
             np.interp(np.flatnonzero(lost), np.flatnonzero(~lost), values[~lost])

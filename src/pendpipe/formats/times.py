@@ -449,7 +449,8 @@ def _interpolate_torn(_choice: Choice, base: TimeBase) -> None:
     good = np.delete(np.arange(len(base.time_s)), wrong)
     rows, steps = np.diff(good), np.diff(base.time_s[good])
     # Behind a clock that was set back the next row comes too soon.
-    soon = np.any(steps[rows > 1] < 0.5 * rows[rows > 1] * np.median(steps))
+    far = rows > 1
+    soon = far.any() and np.any(steps[far] < 0.5 * rows[far] * np.median(steps))
     inside = not {0, len(base.time_s) - 1} & set(wrong.tolist())
     few = 0 < len(wrong) <= 0.05 * len(good)
     if few and inside and not soon and steps.min(initial=0.0) >= 0.0:
