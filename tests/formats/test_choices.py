@@ -337,6 +337,23 @@ def test_a_row_torn_among_decimal_commas_is_no_row(tmp_path: Path) -> None:
     assert any("2 damaged row(s)" in note for note in recording.notes)
 
 
+def test_an_exponent_of_fortran_among_joined_decimal_commas_is_a_number(tmp_path: Path) -> None:
+    """``0,1D5`` is 10000, which stands out among angles of 0.5: lost, and the file is read."""
+    rows = each("{:.0f},{:.4f}\n", 1e3 * TIME, ANGLE).replace(".", ",")
+    recording = read_as(tmp_path, with_lines("ms,angle\n" + rows, {501: "10000,0,1D5"}))
+    lost = np.isclose(recording.time_s, 10.0)
+    np.testing.assert_allclose(recording.values[~lost], ANGLE[~lost], atol=1e-4)
+    assert any("stand out (10000)" in note for note in recording.notes)
+
+
+def test_two_rows_whose_time_falls_are_refused_without_a_warning(tmp_path: Path) -> None:
+    """One good stamp has no steps, of which no median is asked."""
+    path = tmp_path / "two.csv"
+    path.write_text("time,angle\n1.0,0.3\n0.5,0.2\n")
+    with pytest.raises(InputError, match="line 3: the time falls"):
+        inspect(path, ReadOptions(column="1:2"))
+
+
 def test_a_zero_before_every_number_is_whole_or_its_own_column(tmp_path: Path) -> None:
     """``12,0,37856`` is two numbers or three: refused with both, and settled by --decimal."""
     size = 0.38 + 0.08 * np.cos(0.3 * np.arange(400))
