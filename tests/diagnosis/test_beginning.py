@@ -259,7 +259,7 @@ def seen(name: str) -> Recording:
 
 
 def same(
-    one: Mapping[str, Estimate], other: Mapping[str, Estimate], view: View, errors: float = 3e-3
+    one: Mapping[str, Estimate], other: Mapping[str, Estimate], view: View, errors: float = 1e-3
 ) -> None:
     """Values and errors, up to the sign and to what is counted from the first second."""
     assert set(one) == set(other)
