@@ -14,7 +14,7 @@ import pendpipe.diagnosis.quoted
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.quoted import LISTED, descriptions_of, printed_by, quoted
+from pendpipe.diagnosis.quoted import LISTED, averages, descriptions_of, printed_by, quoted
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.run import diagnose_recording
@@ -24,6 +24,8 @@ from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.curves import restoring_curve
 from pendpipe.effects.model import Model
+from pendpipe.estimate import Estimate
+from pendpipe.formats import read
 
 from .records import (
     FREQUENCY_HZ,
@@ -131,18 +133,27 @@ def test_a_period_that_jumps_is_quoted_in_the_mean_with_its_span() -> None:
 
 
 @pytest.mark.slow
-def test_a_ship_that_softens_is_quoted_with_its_small_swings() -> None:
-    """Its first swings take 4 % longer; fit and diagnosis are right within their errors."""
-    path, period_s = INPUTS / "n01_softening.csv", 0.8
+@pytest.mark.parametrize(
+    ("file", "stop_s", "restoring", "period_s"),
+    [
+        # The first swings of a ship that softens take 4 % longer.
+        ("n01_softening.csv", None, "linear", 0.8),
+        # An ellipse of 27° seen by one camera: its second plane moves every period.
+        ("n02_ellipse.csv", 8.0, "auto", 0.839017),
+    ],
+)
+def test_small_swings_are_quoted_within_errors_of_two_percent_whatever_the_law_lacks(
+    file: str, stop_s: float | None, restoring: Any, period_s: float
+) -> None:
+    path = INPUTS / file
     if not path.exists():
         pytest.skip(f"{path} is not here")
-    outcome = pp.diagnose(str(path), restoring="linear")
+    outcome = pp.diagnose(read(path).between(None, stop_s), restoring=restoring)
     found = 1.0 / outcome.improved.parameters["frequency"].value
     error = outcome.improved.parameters["frequency"].sd * found**2
-    assert abs(found - period_s) < 2.0 * error
     fitted = outcome.fit.period
-    assert abs(fitted.value - period_s) < 2.0 * fitted.sd < 0.01 * period_s
-    assert error < 0.01 * period_s
+    for value, sd in ((found, error), (fitted.value, fitted.sd)):
+        assert abs(value - period_s) < 2.0 * sd < 0.02 * period_s
 
 
 @pytest.mark.parametrize(
@@ -326,3 +337,14 @@ def test_what_leaves_more_than_noise_is_no_surer_than_the_fit() -> None:
         known = {**pull.improved.parameters, **pull.improved.quality_factors}
         assert known[name].sd > 0.999 * least.sd
     assert clean["frequency"].sd < 0.5 * told["frequency"].sd
+
+
+@pytest.mark.slow
+def test_what_leaves_more_than_noise_is_no_less_sure_than_what_is_seen() -> None:
+    """A second plane that leaves most of an ellipse said 0.83(41) s; turning points, 0.83(3) s."""
+    found = softening().search
+    (first, *_) = descriptions_of(found, weighed_of(softening()))
+    seen, lost = Estimate(1.204, 0.03, "Hz"), Estimate(1.3, 0.6, "Hz")
+    for level, sd in ((1.0, seen.sd), (0.0, lost.sd)):
+        quotes = averages(found, [first], lambda _: {"f": lost}, {"f": seen}, level)
+        assert quotes.constants["f"].sd == pytest.approx(sd)

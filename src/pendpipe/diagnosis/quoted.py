@@ -4,7 +4,7 @@ A description is a set of effects: of each that was found its name, a mate of it
 of these", with the product of their probabilities. Each is fitted as it is named; with none at all
 it is the fit, with its widened errors. Where some leave only noise, the others do not describe the
 recording. The frequency, a, b, c and Q are averaged (`pendpipe.estimate.averaged`). What leaves
-more than noise, or is a curve without a name, shrinks no error of the fit.
+more than noise is neither surer nor less sure than the fit; a curve without a name is no surer.
 """
 
 import itertools
@@ -216,12 +216,7 @@ def averages(
         kinds = {effect.kind for effect in each.fit.model.effects if not effect.form}
         more = each.fit.scatter is not None or found.unexplained < level
         if more or "unnamed" in kinds:
-            # The fit lacks what has a name: it may be sure of another number.
-            alone = more and kinds <= {"unnamed"}
-            own = {
-                name: _beside(value, none.get(name), more=more, alone=alone)
-                for name, value in own.items()
-            }
+            own = {name: _beside(value, none.get(name), more=more) for name, value in own.items()}
         numbers.append(own)
     return Quoted(
         {
@@ -251,15 +246,16 @@ def printed_by(fit: FitResult | None) -> Numbers:
     return {**numbers, "frequency": small_frequency(fit)}
 
 
-def _beside(value: Estimate, fitted: Estimate | None, *, more: bool, alone: bool) -> Estimate:
+def _beside(value: Estimate, fitted: Estimate | None, *, more: bool) -> Estimate:
     """Return a number of what explains nothing, no surer than the fit's.
 
-    Of a curve `alone` that leaves more than noise it is the surer of both; a curve, which follows
-    whatever there is, is as right as the fit.
+    Of what leaves `more` than noise and is less sure, it is the fit's, which has period and Q from
+    the turning points where its law misses; a curve, which follows whatever there is, is as right
+    as the fit.
     """
     if fitted is None or not math.isfinite(fitted.sd):
         return value
-    if alone and not value.sd < fitted.sd:
+    if more and not value.sd < fitted.sd:
         return fitted
     found = value if more else averaged([value, fitted], [1.0, 1.0])
     if not found.sd < fitted.sd:
