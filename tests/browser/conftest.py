@@ -63,7 +63,8 @@ def repeated(results: Path, home: Path, count: int) -> tuple[Path, list[str]]:
 def campaign(tmp_path_factory: pytest.TempPathFactory, make_example: Callable[..., Any]) -> Path:
     """The results of a campaign: three records with waveform, one of them amiss, one refused."""
     from pendpipe.figures.campaign import draw_fig04, draw_fig09
-    from pendpipe.figures.decays import draw_decay, read_decay
+    from pendpipe.figures.data import read_decay
+    from pendpipe.figures.decays import draw_decay
     from pendpipe.figures.style import save
     from pendpipe.files import write_json
 

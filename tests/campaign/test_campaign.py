@@ -1,6 +1,7 @@
 """Causes of what a campaign lacks, and the sentence about them."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
 
@@ -38,7 +39,8 @@ from pendpipe.campaign.fit import (
 from pendpipe.campaign.tank import Surface, by_depth, confined, told
 from pendpipe.configuration.load import load_campaign, read_configuration
 from pendpipe.estimate import Estimate
-from pendpipe.stages.results import RecordResult
+from pendpipe.files import write_json
+from pendpipe.stages.results import RecordResult, left_out
 from pendpipe.stages.separate import separate_campaign
 
 from .campaigns import ROOT, data, default
@@ -423,7 +425,9 @@ def test_a_record_that_disagrees_is_named_and_no_cause(record: str, percent: flo
 
 @pytest.mark.slow
 @pytest.mark.parametrize("record", ["air-03", "water-high-8"])
-def test_the_table_of_a_campaign_is_that_without_a_foreign_record(record: str) -> None:
+def test_the_table_of_a_campaign_is_that_without_a_foreign_record(
+    record: str, tmp_path: Path
+) -> None:
     """Twice its loss: it is named, by the words of the diagnosis, and no number is lost by it."""
     path = ROOT / "config/config.yaml"
     campaign = load_campaign(
@@ -437,7 +441,12 @@ def test_the_table_of_a_campaign_is_that_without_a_foreign_record(record: str) -
             for row, *reading in zip(campaign.records, *readings, strict=True)
             if row.record != without
         ]
-        return separate_campaign(campaign, results)
+        out = left_out(campaign, results)
+        # As a campaign's diagnosis writes it.
+        far = [{"record": name, "sigma": float(said.split()[-2])} for name, said in out.items()]
+        write_json(diagnosis := tmp_path / "campaign_diagnosis.json", {"left_out": far})
+        assert left_out(campaign, results, diagnosis) == out
+        return separate_campaign(campaign, results, out)
 
     found, sound = separated(100.0), separated(100.0, without=record)
     (reason,) = found["left_out"].values()

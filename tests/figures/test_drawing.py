@@ -25,17 +25,8 @@ from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.estimate import Estimate
 from pendpipe.figures import OF_A_DIAGNOSIS, diagnosis
-from pendpipe.figures.data import NothingToDrawError
-from pendpipe.figures.decays import (
-    Decay,
-    draw_decay,
-    draw_fig07,
-    draw_fig08,
-    draw_fit,
-    local_quality,
-    quality_with_band,
-    read_decay,
-)
+from pendpipe.figures.data import Decay, NothingToDrawError, local_quality, read_decay
+from pendpipe.figures.decays import draw_decay, draw_fig07, draw_fig08, draw_fit, quality_with_band
 from pendpipe.figures.diagnosis import Shown, draw_diagnosis, shown
 from pendpipe.figures.style import save
 from pendpipe.recording import Recording, read_plain

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from pendpipe.cli import main
 from pendpipe.figures.campaign import (
     draw_all,
     draw_fig03,
@@ -20,8 +21,8 @@ from pendpipe.figures.campaign import (
     draw_fig09,
     draw_fig10,
 )
-from pendpipe.figures.data import NothingToDrawError
-from pendpipe.figures.decays import draw_decay, draw_fig08, read_decay
+from pendpipe.figures.data import NothingToDrawError, read_decay
+from pendpipe.figures.decays import draw_decay, draw_fig08
 from pendpipe.figures.style import save
 from pendpipe.files import write_json
 from pendpipe.quantities import prefixed, with_error
@@ -40,25 +41,23 @@ def small(example: Any, tmp_path: Path) -> tuple[dict[str, Any], Path]:
 
 
 @pytest.mark.slow
-def test_every_figure_is_there_as_svg_and_png_however_many_processes_draw(
+def test_every_figure_is_there_as_svg_and_png(
     small: tuple[dict[str, Any], Path], tmp_path: Path, answer_of: Any
 ) -> None:
-    """The command draws the same by two processes, and says what it left out."""
+    """The command draws the same, and says what it left out."""
     content, folder = small
     alone = draw_all(content, folder, tmp_path / "one")
     assert alone.left_out == {"causes": "the records were not diagnosed together"}
     for name in (*PAPER, "walls"):
         assert ET.parse(tmp_path / f"one/{name}.svg").getroot().tag.endswith("svg")
         assert (tmp_path / f"one/{name}.png").read_bytes().startswith(b"\x89PNG")
-    for entry in content["records"]:
-        assert (folder / entry["record"] / "figures/decay.svg").is_file()
     drawn = [path for path in alone.files if path.stem != "fig03"]
     bytes_alone = [path.read_bytes() for path in drawn]
     write_json(folder / "c.json", {"results": folder.as_posix()})
     write_json(folder / "comparison.json", {**content, "calibration": None})
     out, comparison = folder.parent / "elsewhere", str(folder / "comparison.json")
     words = ["figures", "--campaign", str(folder / "c.json"), "--out", str(out), "--comparison"]
-    assert "fig03 is not drawn" in answer_of([*words, comparison, "--processes", "2"]).err
+    assert "fig03 is not drawn" in answer_of([*words, comparison]).err
     again = [out / path.name if path.parent == tmp_path / "one" else path for path in drawn]
     assert [path.read_bytes() for path in again] == bytes_alone
     # The workflow counts on figures 3 to 10: the reason stands in the place of figure 3.
@@ -105,20 +104,23 @@ def test_a_name_with_a_dollar_is_no_formula(example: Any, tmp_path: Path) -> Non
     assert "$\\frac{ & <b>" in "".join(ET.parse(svg).getroot().itertext())
 
 
-def test_recordings_of_others_have_their_decays_only(small: tuple[dict[str, Any], Path]) -> None:
+def test_recordings_of_others_have_no_figure_of_a_theory(small: tuple[Any, Path]) -> None:
     content, folder = small
-    bare = {
-        "records": [*content["records"], {"record": "gone", "refused": "gone.csv: no decay"}],
-        "has_theory": False,
-        "typical_record": None,
-        "calibration": None,
-    }
-    drawn = draw_all(bare, folder, folder / "figures")
-    assert not (folder / "figures").exists()
-    assert len(drawn.files) == len(bare["records"])
-    assert "refused" in drawn.left_out["gone, decay"]
-    in_its_place = ET.parse(folder / "gone/figures/decay.svg").getroot()
-    assert "refused" in "".join(in_its_place.itertext())
+    bare = {"records": content["records"], "typical_record": None, "calibration": None}
+    assert draw_all(bare, folder, folder / "figures").files == []
+
+
+@pytest.mark.parametrize(("name", "said"), [("water-low-7", "record"), ("gone", "refused")])
+def test_a_record_has_a_figure_of_its_decay_or_of_why_there_is_none(
+    name: str, said: str, small: tuple[Any, Path]
+) -> None:
+    home = small[1] / name
+    if name == "gone":
+        write_json(home / "fit.json", {"schema_version": 1, "refused": "no decay"})
+    words = ["--turning-points", str(home / "turning_points.csv"), "--out", str(home / "a.svg")]
+    assert main(["decay", str(home / "fit.json"), *words]) == 0
+    drawn = "".join(ET.parse(home / "a.svg").getroot().itertext())
+    assert ("Not drawn" in drawn) == (said == "refused") == (said in drawn)
 
 
 @pytest.mark.parametrize(

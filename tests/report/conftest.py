@@ -10,7 +10,8 @@ import pytest
 def example(tmp_path_factory: pytest.TempPathFactory, make_example: Callable[..., Any]) -> Any:
     """A finished campaign of 27 records with a figure drawn, and one record's decay."""
     from pendpipe.figures.campaign import draw_fig09
-    from pendpipe.figures.decays import draw_decay, read_decay
+    from pendpipe.figures.data import read_decay
+    from pendpipe.figures.decays import draw_decay
     from pendpipe.figures.style import save
 
     made = make_example(tmp_path_factory.mktemp("campaign"))

@@ -20,7 +20,7 @@ from pendpipe.stages.chunks import SMALL, STAGES, batch_for, split
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
-RECORDS_STAGES = ("acquire", "calibrate", "turning_points", "fit")
+RECORDS_STAGES = ("acquire", "calibrate", "turning_points", "fit", "decay")
 ORDER = [name.replace("_", "-") for name in RECORDS_STAGES]
 
 
@@ -107,7 +107,7 @@ def test_a_campaign_that_was_begun_runs_to_its_report(begun: Path) -> None:
     assert "1 of 3 records were refused" in lines[-1]
     alone = call(begun, "pendpipe", "campaign", "-n", "--record", "rod", "--", "--forcerun", "fit")
     files = {f"{name}_files_{number}": 1 for number, name in enumerate(RECORDS_STAGES)}
-    assert jobs(alone) == dict.fromkeys(RECORDS_STAGES, 1) | files | {"all": 1, "total": 9}
+    assert jobs(alone) == dict.fromkeys(RECORDS_STAGES, 1) | files | {"all": 1, "total": 11}
     assert not sprung.exists(), f"neither the run nor the plan uses them: {sprung.read_text()}"
 
 
@@ -141,7 +141,7 @@ rule all:
     records.write_text("record\tsource\nrod\trecordings/rod-pendulum.csv\n", encoding="utf-8")
     targets = ("results/rod/fit.json", "results/records.csv")
     ran = jobs(call(begun, "snakemake", "--cores", "2", *targets))
-    names = {f"pendpipe_{name}" for name in (*RECORDS_STAGES, "fit_files_3", "records")}
+    names = {f"pendpipe_{name}" for name in (*RECORDS_STAGES[:4], "fit_files_3", "records")}
     assert set(ran) == names | {"total"}
     fit, table = begun / "results/rod/fit.json", begun / "results/records.csv"
     before = (fit.read_bytes(), table.read_bytes())
@@ -305,11 +305,11 @@ def test_the_default_campaign_has_a_job_a_chunk_in_each_of_its_stages(tmp_path: 
     total = counted.pop("total")
     jobs_of_stage = chunks(ROOT / "config/records.tsv")
     assert jobs_of_stage >= 2, "a job a core"
-    for stage in ("acquire", "calibrate", "turning_points", "fit", "diagnose"):
+    for stage in (*RECORDS_STAGES, "diagnose"):
         assert counted.pop(stage) == jobs_of_stage
     assert set(counted.values()) == {1}, "the other stages are the campaign's"
     assert {"separate", "compare", "figures", "report"} <= set(counted)
-    assert total == 5 * jobs_of_stage + len(counted)
+    assert total == 6 * jobs_of_stage + len(counted)
 
 
 def test_a_source_of_any_name_stops_no_other_record(tmp_path: Path) -> None:
@@ -351,7 +351,7 @@ def test_a_record_of_many_has_its_files_when_they_are_asked_for(tmp_path: Path) 
     everything = jobs(call(tmp_path, *words))
     assert not any("files" in name for name in everything)
     one = jobs(call(tmp_path, *words, "--", "results/r7/fit.json"))
-    assert one == dict.fromkeys((*RECORDS_STAGES, "record_file"), 1) | {"total": 5}
+    assert one == dict.fromkeys((*RECORDS_STAGES[:4], "record_file"), 1) | {"total": 5}
 
 
 def test_a_faulty_configuration_stops_before_any_job(tmp_path: Path) -> None:

@@ -355,7 +355,7 @@ def test_damaged_results_are_named_and_made_again_and_nothing_else_is(
     assert not jobs_in(said), said
 
 
-STAGE_NAMES = ("acquire", "calibrate", "turning_points", "fit", "diagnose")
+STAGE_NAMES = ("acquire", "calibrate", "turning_points", "fit", "decay", "diagnose")
 OF_THE_CAMPAIGN = {
     *("separate", "compare", "diagnose_campaign", "records", "figures", "report", "all")
 }
@@ -384,7 +384,8 @@ def test_what_is_asked_for_is_planned_and_no_more(campaign: Campaign, tmp_path: 
     stages = dict.fromkeys(STAGE_NAMES, 1)
     assert rules_of(new.planned(*alone)) == stages | files | {"caliper": 1, "all": 1}
     # Of a finished campaign.
-    forced = dict.fromkeys(OF_THE_CAMPAIGN, 1) | {"fit": n, "fit_files": n}
+    forced = dict.fromkeys(OF_THE_CAMPAIGN, 1) | dict.fromkeys(("fit", "fit_files"), n)
+    forced |= dict.fromkeys(("decay", "decay_files"), n)
     for words in (("--forcerun", "fit"), ("-R", "fit")):
         assert rules_of(campaign.planned(*words)) == forced
     file = f"{campaign.results.name}/air-07/fit.json"

@@ -164,13 +164,6 @@ def figure_files():
     return expand(f"{RESULTS}/figures/{{name}}.{{form}}", name=names, form=FORMS)
 
 
-def decay_files():
-    """The figure of each record, or of a large campaign their archive."""
-    if not SMALL:
-        return [f"{RESULTS}/figures/{chunks.DECAYS}"]
-    return expand(f"{RESULTS}/{{record}}/figures/decay.svg", record=RECORDS)
-
-
 def doubled(number):
     """A resource, MB or minutes, that is doubled where a cluster ended the first attempt."""
     return lambda wildcards, attempt: number * attempt
@@ -196,7 +189,6 @@ def wanted():
         f"{RESULTS}/records.csv",
         f"{RESULTS}/figures/drawn.json",
         *figure_files(),
-        *decay_files(),
         *campaign_diagnosis(),
         *pendulum_diagnoses(),
         *records,

@@ -9,25 +9,21 @@ rule figures:
             category="Figures",
             caption="../report/figure.rst",
         ),
-        decays=decay_files(),
         drawn=f"{RESULTS}/figures/drawn.json",
     log:
         f"{RESULTS}/logs/figures.log",
     conda:
         ENVIRONMENT
-    threads: 2
     resources:
         mem_mb=doubled(3000),
         runtime=doubled(60),
         configuration=CONFIGURATION,
     params:
         folder=subpath(output.drawn, parent=True),
-        damages=history(
-            *figure_files(), *decay_files(), f"{RESULTS}/figures/drawn.json"
-        ),
+        damages=history(*figure_files(), f"{RESULTS}/figures/drawn.json"),
         code=code_version("pendpipe.commands.figures"),
     message:
         "figures 3 to 10"
     shell:
         "pendpipe figures --campaign {resources.configuration:q} --comparison {input.comparison:q}"
-        " --out {params.folder:q} --processes {threads} 2> {log:q}"
+        " --out {params.folder:q} 2> {log:q}"

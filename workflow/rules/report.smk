@@ -3,7 +3,7 @@ rule report:
         comparison=f"{RESULTS}/comparison.json",
         campaign=f"{RESULTS}/campaign.json",
         together=campaign_diagnosis(),
-        figures=[*figure_files(), *decay_files(), f"{RESULTS}/figures/drawn.json"],
+        figures=[*figure_files(), f"{RESULTS}/figures/drawn.json"],
         records=[path for stage in STAGES for path in of_stage(stage)],
     output:
         report(

@@ -1,6 +1,7 @@
 rule separate:
     input:
         of_all("calibrate", "fit"),
+        together=campaign_diagnosis(),
     output:
         f"{RESULTS}/separation.json",
     log:
@@ -12,10 +13,11 @@ rule separate:
         runtime=doubled(20),
         configuration=CONFIGURATION,
     params:
+        diagnosis=option("diagnosis", next(iter(campaign_diagnosis()), None)),
         depends=jobs.theory(CAMPAIGN),
         damages=history(f"{RESULTS}/separation.json"),
         code=code_version("pendpipe.stages.separate"),
     message:
         "hysteretic and viscous losses"
     shell:
-        "pendpipe separate --campaign {resources.configuration:q} --out {output:q} 2> {log:q}"
+        "pendpipe separate --campaign {resources.configuration:q} {params.diagnosis} --out {output:q} 2> {log:q}"

@@ -22,7 +22,7 @@ _LEAVE: Final = "no stage reads it: keep it, or move it elsewhere"
 _RUN: Final = "snakemake makes it again"
 _NAMES: Final = (
     *("recording.csv", "calibration.json", "turning_points.csv", "fit.json", "refused.json"),
-    *("diagnosis.json", "decay.svg", "record.html", "caliper.csv", "sensor.json", "records.zip"),
+    *("diagnosis.json", "decay.svg", "record.html", "caliper.csv", "sensor.json"),
     *("separation.json", "comparison.json", "campaign.json", "campaign_diagnosis.json"),
     *("report.html", "records.csv", "records.parquet", "drawn.json"),
 )

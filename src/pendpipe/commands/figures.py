@@ -1,4 +1,4 @@
-"""Draw figures 3 to 10 of a campaign, and the decay of each record.
+"""Draw figures 3 to 10 of a campaign.
 
 What has no data is left out, and said on standard error; in a campaign with an apparatus
 each of figures 3 to 10 is written all the same, with the reason in its place.
@@ -7,28 +7,16 @@ each of figures 3 to 10 is written all the same, with the reason in its place.
 from pathlib import Path
 
 from pendpipe.arguments import Arguments, command, tell
-from pendpipe.files import write_json, write_whole, writing
+from pendpipe.files import write_json, writing
 from pendpipe.options import OUTPUTS, flags
-from pendpipe.stages.archive import gathered, pack
-from pendpipe.stages.chunks import DECAYS, SMALL
+from pendpipe.stages.archive import gathered
 
 
 @command(
     flags("--campaign", "--comparison", required=True)
     | {
-        "--out": {
-            "required": True,
-            "type": Path,
-            "metavar": "FOLDER",
-            "help": "where figures 3 to 10 go; a record's goes to RESULTS/<record>/figures",
-        }
-        | OUTPUTS,
-        "--processes": {
-            "type": int,
-            "default": 1,
-            "metavar": "N",
-            "help": "how many may draw at once (1)",
-        },
+        "--out": {"required": True, "type": Path, "metavar": "FOLDER", "help": "where they go"}
+        | OUTPUTS
     }
 )
 def run(arguments: Arguments) -> None:
@@ -38,20 +26,14 @@ def run(arguments: Arguments) -> None:
 
     _, folder, comparison = read_compared(arguments.campaign, arguments.comparison)
     out: Path = arguments.out
-    with (
-        writing(inputs=[arguments.comparison]),
-        gathered(folder, "recording.csv", "turning_points.csv", "fit.json") as records,
-    ):
-        drawn = draw_all(comparison, folder, out, records=records, processes=arguments.processes)
-        decays = [path for path in drawn.files if path.is_relative_to(records)]
-        if len(comparison["records"]) > SMALL:
-            pack(out / DECAYS, records, decays, {})
-        elif records != folder:
-            for path in decays:
-                write_whole(folder / path.relative_to(records), path.read_bytes())
-    homes = (records, folder)
-    names = [next((p.relative_to(h) for h in homes if p.is_relative_to(h)), p) for p in drawn.files]
-    content = {"files": [name.as_posix() for name in names], "left_out": dict(drawn.left_out)}
+    typical = f"{comparison.get('typical_record')}/"
+    names = (typical + name for name in ("recording.csv", "turning_points.csv", "fit.json"))
+    with writing(inputs=[arguments.comparison]), gathered(folder, *names) as records:
+        drawn = draw_all(comparison, folder, out, records=records)
+    files = [
+        path.relative_to(folder) if path.is_relative_to(folder) else path for path in drawn.files
+    ]
+    content = {"files": [path.as_posix() for path in files], "left_out": dict(drawn.left_out)}
     write_json(out / "drawn.json", {"schema_version": 1, **content})
     for name, reason in drawn.left_out.items():
         tell(f"pendpipe: {name} is not drawn: {reason}")

@@ -44,8 +44,8 @@ def run(arguments: Arguments) -> None:
     from pendpipe.files import make_folder, read_json, write_whole, writing
     from pendpipe.report.page import OF_A_RECORD, OF_THE_CAMPAIGN, OWN_PAGE, render
     from pendpipe.report.tables import as_text, headline
-    from pendpipe.stages.archive import gather, unpack
-    from pendpipe.stages.chunks import DECAYS, SMALL
+    from pendpipe.stages.archive import gather
+    from pendpipe.stages.chunks import SMALL
 
     configuration, folder, comparison = read_compared(arguments.campaign, arguments.comparison)
     out: Path = arguments.out or folder / "report.html"
@@ -63,7 +63,6 @@ def run(arguments: Arguments) -> None:
             else:
                 beside, home = Path(place, way), Path(place, out.name)
             gather(folder, beside, (*OF_A_RECORD, "diagnosis/residual_map.svg"))
-            unpack(figures / DECAYS, beside)
             for name in filter(lambda name: (folder / name).is_file(), OF_THE_CAMPAIGN):
                 shutil.copy(folder / name, beside / name)
         page = render(

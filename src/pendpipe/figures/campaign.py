@@ -1,8 +1,8 @@
 """All the figures of a campaign, and which of them could not be drawn."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from operator import call, methodcaller
+from operator import methodcaller
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -17,12 +17,13 @@ from pendpipe.figures.data import (
     error,
     number,
     of_branch,
+    read_decay,
     series,
     theory,
     typical_record,
     used,
 )
-from pendpipe.figures.decays import draw_decay, draw_fig07, draw_fig08, read_decay
+from pendpipe.figures.decays import draw_fig07, draw_fig08
 from pendpipe.figures.style import (
     BLUE,
     BRANCHES,
@@ -49,15 +50,10 @@ from pendpipe.figures.style import (
 )
 from pendpipe.files import read_json
 from pendpipe.levels import FALSE_ALARM
-from pendpipe.process import in_order
 from pendpipe.quantities import axis_unit, with_error
 from pendpipe.recording import read_plain
 
 Comparison = Mapping[str, Any]
-
-
-DECAY: Final = "figures/decay.svg"
-"""A record's figure, in its folder; of one that was refused it says so."""
 
 
 class Drawn(NamedTuple):
@@ -73,9 +69,8 @@ def draw_all(
     out: Path,
     *,
     records: Path | None = None,
-    processes: int = 1,
 ) -> Drawn:
-    """Draw figures 3 to 10 and each record's decay.
+    """Draw figures 3 to 10.
 
     Parameters
     ----------
@@ -86,10 +81,8 @@ def draw_all(
     out
         Where the campaign's figures go.
     records
-        A folder with one for each record, of its results, where its figure goes; that of the
-        campaign unless it is another.
-    processes
-        How many draw at once.
+        A folder with that of the typical record's results; that of the campaign unless it is
+        another.
 
     Returns
     -------
@@ -115,36 +108,15 @@ def draw_all(
             "walls": partial(draw_walls, comparison),
         }
     together = (folder / "campaign_diagnosis.json").is_file()
-    tasks = [
-        partial(
-            _drawn, name, draw, out / name, keep_place=has_theory and (together or name != "causes")
-        )
-        for name, draw in sorted(draws.items())
-    ]
-    # (For the page: a record's drawing in pixels would take as long again.)
-    tasks += [
-        partial(
-            _drawn,
-            f"{entry['record']}, decay",
-            partial(_decay, records, entry),
-            records / entry["record"] / DECAY.removesuffix(".svg"),
-            keep_place=True,
-            forms=("svg",),
-        )
-        for entry in comparison["records"]
-    ]
-    parts = list(in_order(call, tasks, max(processes, 1)))
-    return Drawn(
-        [path for part in parts for path in part.files],
-        dict(reason for part in parts for reason in part.left_out.items()),
-    )
-
-
-def _decay(folder: Path, entry: Entry) -> Figure:
-    """Draw one record's decay."""
-    if entry.get("refused"):
-        raise NothingToDrawError("the record was refused")
-    return draw_decay(read_decay(folder, entry))
+    files, left_out = list[Path](), dict[str, str]()
+    for name, draw in sorted(draws.items()):
+        try:
+            files += save(draw(), out / name)
+        except NothingToDrawError as fault:
+            left_out[name] = str(fault)
+            if has_theory and (together or name != "causes"):
+                files += save(placeholder(str(fault)), out / name)
+    return Drawn(files, left_out)
 
 
 def _typical(comparison: Comparison) -> Entry:
@@ -168,23 +140,6 @@ def _typical_decay(comparison: Comparison, folder: Path) -> Figure:
 
 def _typical_quality(comparison: Comparison, folder: Path) -> Figure:
     return draw_fig08(read_decay(folder, _typical(comparison)))
-
-
-def _drawn(
-    name: str,
-    draw: Callable[[], Figure],
-    stem: Path,
-    *,
-    keep_place: bool = False,
-    forms: Sequence[str] = ("svg", "png"),
-) -> Drawn:
-    """Draw and save one figure, or note why not (and say it in the figure's place)."""
-    try:
-        return Drawn(save(draw(), stem, forms=forms), {})
-    except NothingToDrawError as fault:
-        reason = str(fault)
-    drawn = save(placeholder(reason), stem, forms=forms) if keep_place else []
-    return Drawn(drawn, {name: reason})
 
 
 @styled

@@ -3,26 +3,17 @@
 Each draws the law that was fitted, and names it in its key.
 """
 
-import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.interpolate import make_interp_spline
 
-from pendpipe import physics
 from pendpipe.analysis.fit.by_points import fit_envelope
 from pendpipe.analysis.fit.quality import period_of, relative_loss_sd
-from pendpipe.analysis.fit.result import FitResult, read_fit
-from pendpipe.analysis.turning_points import TurningPoints, read_turning_points
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics import Release, turning_points
-from pendpipe.errors import InputError
-from pendpipe.figures.data import Entry, NothingToDrawError
+from pendpipe.figures.data import Decay, local_quality, spans
 from pendpipe.figures.style import (
     BLUE,
     GREY,
@@ -46,117 +37,8 @@ from pendpipe.figures.style import (
     styled,
     words,
 )
-from pendpipe.files import without_folders
 from pendpipe.quantities import axis_unit, compact
 from pendpipe.recording import Recording
-
-
-@dataclass(frozen=True)
-class Decay:
-    """One record's turning points and fit.
-
-    Parameters
-    ----------
-    record
-        Its name.
-    points
-        The turning points, from the first that was fitted.
-    fit
-        The fit, whose time begins at the first of them.
-    """
-
-    record: str
-    points: TurningPoints
-    fit: FitResult
-
-    @property
-    def law_name(self) -> str:
-        """The fitted law's, for a key."""
-        return self.fit.equation.replace("the torque of ", "")
-
-    @property
-    def _too_high(self) -> float:
-        """By how much the turning points' level exceeds the one that the fit found."""
-        too_high = float(np.mean(self.points.level_rad)) - self.fit.value("offset")
-        return too_high if math.isfinite(too_high) else 0.0
-
-    @property
-    def level_rad(self) -> FloatArray:
-        """The fitted level, with the course of that of the turning points; shape (n,)."""
-        return self.points.level_rad - self._too_high
-
-    @property
-    def amplitude_rad(self) -> FloatArray:
-        """Angles without their alternating sign, about the level that the fit found.
-
-        A level too high by one lowers the signed angles by the table's ``level_coupling``.
-        """
-        # Signed, so that noise about zero stays noise about zero.
-        shift = self.points.level_coupling * self._too_high
-        return self.points.side * (self.points.angle_rad + shift)
-
-    @property
-    def elapsed_s(self) -> FloatArray:
-        """Time since the first turning point: the t of Eq. 14."""
-        return np.asarray(self.points.time_s - self.points.time_s[0])
-
-    @property
-    def residual_rad(self) -> FloatArray:
-        """Amplitudes less the fitted law's."""
-        return self.amplitude_rad - self.along(self.elapsed_s)[0]
-
-    def along(self, elapsed_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Amplitude and Q of the law that was fitted, at times since the first turning point.
-
-        Where that is no Eq. 14 (Q: Eq. 15), the amplitudes y are those at which the motion of
-        Eq. 8 turns, and Q is pi/ln(y'/y) from one to the next on the same side.
-        """
-        start, *rates = (self.fit.value(name) for name in ("amplitude", "a", "b", "c"))
-        frequency = self.fit.value("frequency")
-        if self.fit.equation == "Eq. 14":
-            y = physics.amplitude(elapsed_s, start, *rates)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                return y, physics.quality_factor(y, frequency, *rates)
-        if self.fit.method == "amplitudes":
-            y = self.fit.predict(self.points.time_s[0] + elapsed_s)
-            # Without a period there is no Q.
-            timeless = not math.isfinite(frequency)
-            q = [math.nan if timeless else self.fit.quality_factor(each).value for each in y]
-            return y, np.array(q)
-        until_s = float(elapsed_s[-1]) + 2.0 / frequency
-        turned = turning_points(self.fit.law, Release(0.0, start), until_s=until_s)
-        if len(turned.time_s) < 4:
-            raise NothingToDrawError("the fitted law stops within two cycles")
-        y = np.abs(turned.angle_rad)
-        quality = np.pi / np.log(y[:-2] / y[2:])
-        return (
-            np.interp(elapsed_s, turned.time_s, y),
-            make_interp_spline(turned.time_s[1:-1], quality, k=1)(elapsed_s),
-        )
-
-
-def read_decay(folder: Path, entry: Entry) -> Decay:
-    """Read a record's turning points and fit from its folder of the results.
-
-    Raises
-    ------
-    NothingToDrawError
-        If the files can't be used, as those of a refused record.
-    """
-    name = entry["record"]
-    try:
-        fit = read_fit(folder / name / "fit.json")
-        points = read_turning_points(folder / name / "turning_points.csv")
-    except InputError as fault:
-        raise NothingToDrawError(f"{name}: {without_folders(fault.problem)}") from None
-    # The fit counts its time from the first turning point that it kept.
-    low, high = entry.get("start_s", -math.inf), entry.get("stop_s", math.inf)
-    keep = (points.time_s >= low - 1e-9) & (points.time_s <= high + 1e-9)
-    if np.count_nonzero(keep) >= 3:
-        points = points.chosen(keep)
-    if len(points) < 3:
-        raise NothingToDrawError(f"{name} has fewer than three turning points")
-    return Decay(name, points, fit)
 
 
 @styled
@@ -318,47 +200,10 @@ def quality_with_band(decay: Decay, elapsed_s: FloatArray) -> tuple[FloatArray, 
     return quality, 1.96 * relative * quality
 
 
-FALL = 0.75
-"""A measured point spans turning points until the amplitude has fallen to this share."""
-
-
-def local_quality(decay: Decay) -> FloatArray:
-    """Q from the logarithmic decrement between turning points, without a model.
-
-    ``Q = pi n/ln(y1/y2)`` over n cycles in which the amplitude falls to `FALL`;
-    the error is that of the two amplitudes.
-
-    Returns
-    -------
-    FloatArray
-        Time, Q and its standard deviation, shape (3, n).
-    """
-    rows = []
-    time, y, sd = decay.points.time_s, decay.amplitude_rad, decay.points.angle_sd_rad
-    for first, last in _spans(decay):
-        decrement = np.log(y[first] / y[last])
-        half_cycles = decay.points.half_cycle[last] - decay.points.half_cycle[first]
-        value = 0.5 * np.pi * half_cycles / decrement
-        spread = value * np.hypot(sd[first] / y[first], sd[last] / y[last]) / decrement
-        rows.append((0.5 * (time[first] + time[last]), value, spread))
-    return np.array(rows, dtype=np.float64).reshape(-1, 3).T
-
-
-def _spans(decay: Decay) -> Iterator[tuple[int, int]]:
-    """First and last turning point of spans in which the amplitude falls to `FALL`."""
-    y, sd, first = decay.amplitude_rad, decay.points.angle_sd_rad, 0
-    for last in range(1, len(y)):
-        if min(y[first], y[last]) <= 10.0 * max(sd[first], sd[last]):
-            return
-        if y[last] <= FALL * y[first]:
-            yield first, last
-            first = last
-
-
 def local_period(decay: Decay) -> FloatArray:
     """Amplitude, mean period and its standard deviation in the spans of `local_quality`, (3, n)."""
     points, rows = decay.points, []
-    for first, last in _spans(decay):
+    for first, last in spans(decay):
         cycles = 0.5 * float(points.half_cycle[last] - points.half_cycle[first])
         lasts, sd = points.time_s[last] - points.time_s[first], points.time_sd_s[[first, last]]
         amplitude = float(np.mean(decay.amplitude_rad[first : last + 1]))

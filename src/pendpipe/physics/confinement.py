@@ -294,25 +294,24 @@ def _sent_back(
     rho = np.outer(sine, k)
     j0, j1 = special.j0(rho), special.j1(rho)
     j2 = 2.0 * j1 / np.maximum(rho, 1e-12) - j0
-    total = np.zeros((3 * cosine.size, 3 * order), dtype=np.complex128)
+    up, even, odd = (np.zeros((cosine.size, 3 * order), dtype=np.complex128) for _ in range(3))
     for distance, sign, waves in amplitudes:
         away = (distance - sign * cosine)[:, None]
         potential, vortical = np.exp(-away * k), np.exp(-away * gamma)
         # A wave from below (sign -1) decays upwards: dw/dz = -k w, so d = w.
-        for w, d, t, amplitude in zip(
-            (potential, k / gamma * vortical, 0.0),
-            (-sign * potential, -sign * vortical, 0.0),
-            (0.0, 0.0, vortical),
-            waves,
-            strict=True,
-        ):
-            along = ((t - d) * j0 + (t + d) * j2) / 2.0
-            around = ((t + d) * j2 - (t - d) * j0) / 2.0
-            upwards = w * j1
-            radial = along * sine[:, None] + upwards * cosine[:, None]
-            polar = along * cosine[:, None] - upwards * sine[:, None]
-            total += (np.concatenate([radial, polar, around]) * weight) @ amplitude
-    return total
+        flat, curled, across = (weight[:, None] * wave for wave in waves)
+        up += _sum(potential * j1, flat) + (k / gamma * vortical * j1) @ curled
+        flat, curled = sign * flat, sign * curled
+        even += (_sum(potential * j0, flat) + (vortical * j0) @ (curled + across)) / 2.0
+        odd += ((vortical * j2) @ (across - curled) - _sum(potential * j2, flat)) / 2.0
+    along, sine, cosine = even + odd, sine[:, None], cosine[:, None]
+    radial, polar = along * sine + up * cosine, along * cosine - up * sine
+    return np.concatenate([radial, polar, odd - even])
+
+
+def _sum(factors: FloatArray, waves: ComplexArray) -> ComplexArray:
+    """Their product: real factors times complex waves, without making these complex too."""
+    return (factors @ np.ascontiguousarray(waves).view(np.float64)).view(np.complex128)
 
 
 def _wave_numbers(gap: float) -> tuple[FloatArray, FloatArray]:

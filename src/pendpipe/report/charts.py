@@ -14,7 +14,7 @@ import numpy as np
 
 from pendpipe.arrays import AnyArray, FloatArray
 from pendpipe.cells import csv_rows
-from pendpipe.figures.decays import Decay, local_quality
+from pendpipe.figures.data import Decay, local_quality
 from pendpipe.quantities import axis_unit, pretty_unit
 from pendpipe.recording import Recording
 

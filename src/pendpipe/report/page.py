@@ -328,7 +328,7 @@ def _residual_map(folder: Path, line: Content, room: Room) -> Markup | None:
 
 def _drawings(folder: Path, entry: Content) -> dict[str, Chart]:
     """A record's waveform and Q against amplitude, where its results are there."""
-    from pendpipe.figures.decays import read_decay
+    from pendpipe.figures.data import read_decay
     from pendpipe.report.charts import quality_by_amplitude, waveform
 
     try:
@@ -419,7 +419,8 @@ def render_recording(
     str
         One HTML document that refers to nothing outside itself.
     """
-    from pendpipe.figures.decays import Decay, draw_residual, draw_sheet
+    from pendpipe.figures.data import Decay
+    from pendpipe.figures.decays import draw_residual, draw_sheet
 
     assert result.points is not None
     decay = Decay(name, result.points, result)

@@ -23,8 +23,6 @@ from pendpipe.stages.archive import FOLDER, archives, members, unpack
 SMALL: Final = 100
 """In campaigns of up to so many records each has a folder of its files (docs/scale.md): a folder
 that one can look through."""
-DECAYS: Final = "records.zip"
-"""Of larger ones the decays of all records, among the figures."""
 WHOLE: Final = "all"
 """Name of the chunk that was not split."""
 ALONE: Final = "record."
@@ -110,6 +108,7 @@ STAGES: Final = {
                 "seed": settings.seed,
             },
         ),
+        Stage("decay", ("fit.json", "turning_points.csv"), "figures/decay.svg"),
         Stage(
             "diagnose",
             ("recording.csv", "calibration.json", "turning_points.csv"),

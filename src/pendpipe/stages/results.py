@@ -82,18 +82,24 @@ def campaign_data(
     return design, measured(values, np.array([fit.covariance_of("frequency", "b") for fit in fits]))
 
 
-def left_out(campaign: Campaign, results: Sequence[RecordResult]) -> dict[str, str]:
+def left_out(
+    campaign: Campaign, results: Sequence[RecordResult], diagnosis: Path | None = None
+) -> dict[str, str]:
     """Records that disagree with all others, and by how much, as the campaign's diagnosis says.
 
-    The campaign's numbers are those without them.
+    Where there is none they are searched for. The campaign's numbers are those without them.
     """
-    from pendpipe.campaign.diagnose import off, search
+    from pendpipe.campaign.diagnose import Far, off, search
 
     together = campaign_data(campaign, results)
     if together is None or not enough(together[0]):
         return {}
-    found = search(*together, level=campaign.configuration.diagnose.level)
-    return {far.record: f"off the others: {off(far)}" for far in found.left_out}
+    found = (
+        [Far(**far) for far in read_json(diagnosis)["left_out"]]
+        if diagnosis
+        else search(*together, level=campaign.configuration.diagnose.level).left_out
+    )
+    return {far.record: f"off the others: {off(far)}" for far in found}
 
 
 def enough(design: Design) -> bool:

@@ -1,6 +1,6 @@
 """Separate the hysteretic from the viscous losses of a campaign (Fig. 4, Eq. 17)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,31 +13,42 @@ from pendpipe.campaign.values import WORST_LINE, Values, campaign_values
 from pendpipe.configuration.load import Campaign
 from pendpipe.estimate import Z95, Estimate
 from pendpipe.files import write_json
-from pendpipe.options import OUTPUT, flags
+from pendpipe.options import INPUT, OUTPUT, flags
 from pendpipe.stages.archive import gathered
 from pendpipe.stages.results import RecordResult, campaign_data, left_out, read_results
 
 
 @command(
     flags("--campaign", required=True)
-    | {"--out": {"type": Path, "required": True, "help": "the separation, JSON"} | OUTPUT}
+    | {
+        "--out": {"type": Path, "required": True, "help": "the separation, JSON"} | OUTPUT,
+        "--diagnosis": {
+            "type": Path,
+            "help": "campaign_diagnosis.json: says which records disagree with all others;"
+            " without it they are searched for",
+        }
+        | INPUT,
+    }
 )
 def run(arguments: Arguments) -> None:
     """Separate."""
     campaign = load(arguments.campaign)
     with gathered(campaign.folder, "fit.json", "calibration.json") as folder:
-        write_json(arguments.out, separate_campaign(campaign, read_results(campaign, folder)))
+        results = read_results(campaign, folder)
+    out = left_out(campaign, results, arguments.diagnosis)
+    write_json(arguments.out, separate_campaign(campaign, results, out))
 
 
-def separate_campaign(campaign: Campaign, results: Sequence[RecordResult]) -> dict[str, Any]:
+def separate_campaign(
+    campaign: Campaign, results: Sequence[RecordResult], out: Mapping[str, str]
+) -> dict[str, Any]:
     """Apply Eq. 17 to all records, with the loss torque of the joint fit; ``separation.json``.
 
     A campaign without records that swing in no fluid has no k, and nothing is separated; so it is
     where these contradict ``Q_h = k f^2 (I/I_0)^(1 - p)``. Records whose fitted law contradicts
-    the decay (a red light) are left out, and those that disagree with all others; `compare`
-    reports the reason.
+    the decay (a red light) are left out, and those that disagree with all others (`out`, with the
+    reasons that `compare` reports).
     """
-    out = left_out(campaign, results)
     together = campaign_data(campaign, results, out)
     values = together and campaign_values(*together)
     content: dict[str, Any] = {
