@@ -549,7 +549,8 @@ def test_scans_are_missing_where_the_arrivals_become_late_for_good(
     assert limit_s < 6.0
     assert len(delays) == found
     for delay in delays:
-        assert delay.begin <= 3000 <= delay.end
+        # Within a tenth of the recording: what lies beyond it keeps its times.
+        assert 3000 - 300 < delay.begin <= 3000 <= delay.end < 3000 + 300
         assert rise_s - 0.02 - 3.0 * (arrivals is wandering) < delay.late_s < rise_s + 0.02
 
 

@@ -19,7 +19,7 @@ from pendpipe.figures.data import error, number, typical_record
 from pendpipe.files import without_folders
 from pendpipe.quantities import with_error
 from pendpipe.recording import Recording
-from pendpipe.report.charts import extremes, line, pack
+from pendpipe.report.charts import Axis, extremes, line, pack
 from pendpipe.report.page import BUDGET_BYTES, inline_svg, render
 from pendpipe.report.tables import (
     STATES,
@@ -258,8 +258,9 @@ def test_the_command_writes_the_page_whole_or_not_at_all(
     ]
     assert answer_of([*words, str(tmp_path / "missing.json")], 2).err.count("\n") == 1
     assert not out.exists()
-    assert main([*words, str(example.summary)]) == 0
+    said = answer_of([*words, str(example.summary)]).err
     Outline(out.read_text(encoding="utf-8"))
+    assert f"{out}: {out.stat().st_size / 1e6:.1f} MB" in said
 
 
 def test_the_configuration_alone_is_enough_for_the_command(example: Any, tmp_path: Path) -> None:
@@ -477,7 +478,10 @@ def test_angles_and_lengths_in_one_table_carry_their_own_units() -> None:
     columns, lines = table_of_records([entry(c=lengths), entry(c=angles)], has_theory=True)
     column = [c.quantity for c in columns].index("c")
     assert columns[column].unit == ""
-    assert [line["cells"][column].text for line in lines] == ["1.00(10) m/s", "2.00(10) rad/s"]
+    cells = [line["cells"][column] for line in lines]
+    assert [cell.text for cell in cells] == ["1.00(10) m/s", "2.00(10) rad/s"]
+    # What can be saved has all digits.
+    assert [(cell.value, cell.sd) for cell in cells] == [("1.0", "0.1"), ("2.0", "0.1")]
 
 
 def test_what_eq_17_leaves_of_nothing_is_not_printed() -> None:
@@ -579,8 +583,32 @@ def test_the_band_of_a_pure_decay_falls_as_the_decay(periods_a_bucket: float, fa
     """Buckets of 1.6 s on a swing of 2 s would show notches that look like beats."""
     time = np.linspace(0.0, 400.0, 40_001)
     swing = np.exp(-0.004 * time) * np.cos(np.pi * time)
-    _, _, high = extremes(time, swing, int(200 / periods_a_bucket))
+    middle, _, high = extremes(time, swing, int(200 / periods_a_bucket))
     assert bool(np.all(np.diff(high) < 0.0)) is falls
+    # The middles of buckets: evenly spaced, half a bucket from either end.
+    assert middle == pytest.approx((np.arange(len(middle)) + 0.5) * 400.0 / len(middle))
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "logarithmic", "numbers"),
+    [
+        (0.0, 10.0, False, ["0", "2", "4", "6", "8", "10"]),
+        (0.9, 110.0, True, ["1", "2", "5", "10", "20", "50", "100"]),
+        (-4.0, 4.0, False, ["\N{MINUS SIGN}4", "\N{MINUS SIGN}2", "0", "2", "4"]),
+        (2.0, 6.0, True, ["2", "3", "4", "5", "6"]),
+    ],
+)
+def test_an_axis_has_round_numbers_where_they_lie(
+    low: float, high: float, logarithmic: bool, numbers: list[str]
+) -> None:
+    """By 1, 2, 5 over more than a decade of a logarithmic axis; evenly else."""
+    axis = Axis(low, high, 100.0, 300.0, "", logarithmic)
+    places, texts = zip(*axis.ticks(), strict=True)
+    assert list(texts) == numbers
+    values = np.array([float(text.replace("\N{MINUS SIGN}", "-")) for text in texts])
+    turned = [np.log(each) if logarithmic else each for each in (values, low, high)]
+    expected = 100.0 + 200.0 * (turned[0] - turned[1]) / (turned[2] - turned[1])
+    assert places == pytest.approx(expected, abs=0.05)
 
 
 def test_a_gap_interrupts_the_line() -> None:

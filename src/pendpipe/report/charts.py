@@ -51,7 +51,7 @@ class Axis:
         from matplotlib.ticker import LogLocator, MaxNLocator
 
         wide = self.logarithmic and self.high > 10.0 * self.low
-        locator = LogLocator(subs=(1.0, 2.0, 5.0)) if wide else MaxNLocator(5)
+        locator = LogLocator(subs=(1.0, 2.0, 5.0)) if wide else MaxNLocator(5, steps=[1, 2, 5, 10])
         ticks = [v for v in locator.tick_values(self.low, self.high) if self.low <= v <= self.high]
         return [(round(float(self(v)), 1), f"{v:.6g}".replace("-", "−")) for v in ticks]
 
