@@ -492,7 +492,11 @@ def read_text(path: str | Path, remedy: str, *, absent: str = "file", form: str 
 
 
 def digest(content: Any) -> str:
-    """Hash any JSON-like content, the same on every machine."""
+    """Hash any JSON-like content, the same on every machine and in any order of its keys.
+
+    >>> digest({"a": 1, "b": [2, 3]}) == digest({"b": [2, 3], "a": 1}) != digest({"a": 1})
+    True
+    """
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()
 
 
