@@ -122,6 +122,18 @@ def test_one_recording_does_not_tell_hysteretic_from_viscous() -> None:
     assert abs(b.value - TRUTH["b"]) < 4.0 * b.sd
 
 
+def test_a_loss_that_is_not_told_from_others_is_no_more_than_their_sum() -> None:
+    """Of forty swings with noise of a hundredth the sum is known, and no part of it."""
+    law = Eq8(OMEGA, hysteretic=0.001, viscous=0.001)
+    time = np.arange(0.0, 40.0 / 0.516, 0.1)
+    recording = Recording(time, noisy(sample(law, START, time), 7e-4), "angle_rad")
+    result = fit_recording(recording, restoring="linear", method="waveform")
+    y = result.value("amplitude")
+    whole = result.value("a") * y + result.value("b") + result.value("c") / y
+    for name, part in (("a", y), ("b", 1.0), ("c", 1.0 / y)):
+        assert 0.3 * whole < part * result[name].sd < 1.01 * whole
+
+
 def test_an_absent_loss_stays_at_its_bound() -> None:
     model = Eq8(OMEGA, quadratic=0.45, viscous=0.0119)
     results = [fitted(model, seed) for seed in range(12)]

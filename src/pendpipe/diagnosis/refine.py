@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendpipe.analysis.fit.waveform import SHARES
 from pendpipe.arrays import FloatArray, scaled_qr
 from pendpipe.diagnosis.unwrapped import unwrapped
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.baseline import OMEGA, SHARE, SHARE_MEAN, SHARE_SD, B, share_by_b
+from pendpipe.effects.baseline import OMEGA, SHARE, B, share_by_b
 from pendpipe.effects.model import Evaluated, Model, jacobian
-from pendpipe.solve import Bounds, NoStartError, Priors, Problem, Search, Squares
+from pendpipe.solve import Bounds, NoStartError, Problem, Search, Squares
 
 if TYPE_CHECKING:
     from pendpipe.diagnosis.data import Data
@@ -28,8 +29,6 @@ _LARGEST_RATIO: Final = 1.5
 """By which a scale (a time, a speed, a length) may change in one step."""
 _LARGEST_CHANGE: Final = 0.05
 """Of the frequency in one step."""
-_SHARES: Final = Priors(np.array([SHARE]), np.array([SHARE_MEAN]), np.array([SHARE_SD]))
-"""The hysteretic share of b, as normal about its mean."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ class Evaluation(Squares):
         """The Jacobian."""
         columns = np.empty((len(self.residual), self.model.size))
         columns[:-1] = self.noise.whiten(jacobian(self.model, self.value, self.at))
-        columns[-1:] = _SHARES.rows(self.model.size)
+        columns[-1:] = SHARES.rows(self.model.size)
         # If one part of b is held, changing b changes the share.
         columns[:, B] += share_by_b(self.value, self.model.held_parts()) * columns[:, SHARE]
         return columns
@@ -272,7 +271,7 @@ def searching(
         except NoMotionError:
             return None
         difference, slip = unwrapped(data, there)
-        residual = np.append(noise.whiten(difference), _SHARES.residual(value))
+        residual = np.append(noise.whiten(difference), SHARES.residual(value))
         found = Evaluation(value, residual, there, slip, model, noise)
         return found if math.isfinite(found.chi2) else None
 

@@ -1,7 +1,7 @@
 """Eq. 8 on all the readings of a free decay: the search, its laws and the result.
 
-`start` says where it begins, `waveform` has chi^2 with the engine's exact derivatives, and `share`
-averages over how b divides into its two parts.
+`start` says where it begins, and `waveform` has chi^2 with the engine's exact derivatives. How b
+divides into its two parts is a parameter with a prior.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness, combined, judge
 from pendpipe.analysis.fit.result import FitResult, result_of
 from pendpipe.analysis.fit.rounding import best_noise
-from pendpipe.analysis.fit.share import Marginal, marginalised
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
 from pendpipe.analysis.fit.waveform import DRIFT, Seen, Waveform
 from pendpipe.analysis.torque import Apart
@@ -34,6 +33,7 @@ from pendpipe.solve import (
     Bounds,
     Minimum,
     NoStartError,
+    Quadratic,
     Summed,
     covariance,
     intervals95,
@@ -46,12 +46,8 @@ _TOLERANCE: Final = 1e-2
 """Of chi^2: a last step of a tenth of a standard deviation, which leaves far less."""
 _ROUNDS: Final = 2
 """Times that the noise before rounding and the fit follow each other."""
-_SAME: Final = 1.01
-"""Of a noise: within, errors are the same."""
-_SETTLED: Final = 0.1
-"""Standard deviations by which the mean share may change when the others have followed it."""
 _MOST: Final = 12
-"""Minima at most until noise, rounding and share are their own."""
+"""Minima at most until the noise is their own."""
 _OTHER: Final = 0.9
 """Of the noise that was weighed with: below, the minimum was not looked for closely enough."""
 _DRIFTS: Final = 1e-4
@@ -74,15 +70,12 @@ class Fitted:
         Indices that were not fitted.
     start
         Where the search began.
-    marginal
-        The average over b's share there, where it was taken.
     """
 
     problem: Waveform
     minimum: Minimum[Summed]
     held: tuple[int, ...]
     start: Start
-    marginal: Marginal | None = None
 
     @property
     def value(self) -> FloatArray:
@@ -128,13 +121,12 @@ class Fitted:
         value[OMEGA] *= math.pi / apart.pace if linear else apart.pace / math.pi
         return self.rival(value, restoring=restoring)
 
-    def marginal_for(self, goodness: Goodness | None = None) -> Marginal:
-        """Over the share; for the noise that a test of fit found, and what enlarges it."""
+    def quadratic(self, goodness: Goodness | None = None) -> Quadratic:
+        """Chi^2 there, for the noise that a test of fit found, and what enlarges it."""
         noise = goodness.noise_rms if goodness else self.noise_rms
         enlarged = goodness.enlarged if goodness else 1.0
-        if self.marginal is not None and enlarged == 1.0 and noise < _SAME * self.noise_rms:
-            return self.marginal
-        return marginalised(self.problem, self.value, self.held, noise, enlarged)
+        quadratic = self.minimum.point.quadratic
+        return self.problem.weighed(self.value, quadratic, noise, enlarged)
 
     def chi2_between(self, first_s: float, last_s: float) -> float:
         """Chi^2 of the readings of a span."""
@@ -188,8 +180,7 @@ def fitted_waveform(
     -----
     The motion is started at a turning point before the first reading, so that every reading
     counts; with sin x and a large amplitude at the first turning point, since there may be none
-    before it below pi. b is one parameter; how it divides into hysteretic and viscous is
-    marginalised, the roots of both as likely beforehand.
+    before it below pi. b is one parameter, and its hysteretic share another, with a prior.
     """
     fixed_values = Held(fixed or {}, baseline, points.apparent_frequency_hz)
     held = fixed_values.places
@@ -214,7 +205,7 @@ def fitted_waveform(
     drifting = _settled(_fitted(problem, found.value, held, start), samples)
     if not drifting.minimum.converged:
         return forms
-    sd = math.sqrt(drifting.marginal_for().covariance[DRIFT, DRIFT])
+    sd = math.sqrt(covariance(drifting.quadratic().normal, held)[DRIFT, DRIFT])
     is_clear = abs(float(drifting.value[DRIFT])) > _CLEAR_DRIFT * sd
     return _with_drag(drifting, samples, points) if is_clear else forms
 
@@ -242,7 +233,7 @@ def _fitted(
     start: Start,
     bar: float | None = None,
 ) -> Fitted:
-    """Minimise chi^2 from a value on: at its share, or with the share free beside a rival's.
+    """Minimise chi^2 from a value on, as far as it may be better than a rival's.
 
     A release that is a half period earlier would be another turning point.
     """
@@ -252,7 +243,7 @@ def _fitted(
         minimum = minimise(
             replace(problem.problem, bounds=Bounds(low, high)),
             value,
-            held=(*held, SHARE) if bar is None else held,
+            held=held,
             tolerance=_TOLERANCE,
             trust=AS_PROMISED,
             useful=math.inf if bar is None else bar,
@@ -263,41 +254,16 @@ def _fitted(
 
 
 def _settled(found: Fitted, samples: Samples) -> Fitted:
-    """Minimise until noise, rounding and share are those of the minimum."""
-    settled = SHARE in found.held
+    """Minimise until noise and rounding are those of the minimum."""
     for _ in range(_MOST):
         problem = found.problem
         if not math.isfinite(found.chi2):
             return found
-        if found.noise_rms < _OTHER * problem.noise_rms:
-            problem = replace(problem, noise_rms=found.noise_rms)
-        elif settled:
+        if not found.noise_rms < _OTHER * problem.noise_rms:
             break
-        else:
-            found = _at_mean_share(found)
-            if settled := found.marginal is not None:
-                continue
+        problem = replace(problem, noise_rms=found.noise_rms)
         found = _fitted(problem, found.value, found.held, found.start)
-        settled = SHARE in found.held
     return _rounded(found, samples)
-
-
-def _at_mean_share(found: Fitted) -> Fitted:
-    """Move to where the share is what the readings expect of it.
-
-    Without `marginal` where chi^2 is not as expected there: it is to be minimised from there.
-    """
-    minimum, problem, marginal = found.minimum, found.problem, found.marginal_for()
-    step = marginal.value - minimum.value
-    if abs(step[SHARE]) <= _SETTLED * math.sqrt(marginal.covariance[SHARE, SHARE]):
-        return replace(found, marginal=marginal)
-    at = problem.bounds.clip(problem.curved(minimum.value, step))
-    expected = minimum.chi2 + marginal.chi2
-    there = problem.at(at)
-    settled = minimum.converged and there and abs(there.chi2 - expected) < AS_PROMISED
-    point = Summed(at, expected, problem.evaluate)
-    minimum = Minimum(point, minimum.converged)
-    return replace(found, minimum=minimum, marginal=marginal if settled else None)
 
 
 def _judged(fitted: Fitted, samples: Samples, points: TurningPoints) -> Goodness:
@@ -398,9 +364,9 @@ def _numbers(
     fitted: Fitted, goodness: Goodness, start_s: float
 ) -> tuple[FloatArray, FloatArray, list[tuple[float, float]], float]:
     """The seven parameters, their covariance, the intervals of a, b, c, and the drift's error."""
-    value, held, marginal = fitted.value, fitted.held, fitted.marginal_for(goodness)
-    own, gradient = marginal.covariance, marginal.gradient
-    normal = covariance(own, held)
+    value, held = fitted.value, fitted.held
+    _, gradient, normal = fitted.quadratic(goodness)
+    own = covariance(normal, held)
     (amplitude, phase), jacobian = _first_turning_point(fitted, start_s)
     frequency = 0.5 * value[OMEGA] / math.pi
     numbers = np.array([*value[:3], frequency, amplitude, phase, value[OFFSET]])

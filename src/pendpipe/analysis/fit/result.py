@@ -66,7 +66,7 @@ class FitResult(Fitted):
         >>> import pendpipe as pp
         >>> fit = pp.fit("examples/rod-pendulum.csv")
         >>> print(fit["period"], fit["Q"], sep="; ")
-        (1.1454712 ± 0.0000028) s; 169.76 ± 0.57
+        (1.1454712 ± 0.0000027) s; 169.76 ± 0.57
         """
         if name == "Q":
             return released_quality(self)

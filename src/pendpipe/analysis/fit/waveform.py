@@ -17,6 +17,8 @@ from pendpipe.dynamics.eq8 import (
     OFFSET,
     OMEGA,
     SHARE,
+    SHARE_MEAN,
+    SHARE_SD,
     START,
     TIME,
     A,
@@ -26,7 +28,7 @@ from pendpipe.dynamics.eq8 import (
     Restoring,
     share_of,
 )
-from pendpipe.solve import Bounds, Problem, Quadratic, Summed
+from pendpipe.solve import Bounds, Priors, Problem, Quadratic, Summed
 
 Seen = Literal["angle", "rate", "position"]
 
@@ -36,6 +38,8 @@ BOUNDS: Final = Bounds(
     np.array([0.0, 0.0, 0.0, 0.0, 1e-12, -np.inf, -np.inf, -np.inf, -np.inf]),
     np.array([np.inf] * 3 + [1.0] + [np.inf] * 5),
 )
+SHARES: Final = Priors(np.array([SHARE]), np.array([SHARE_MEAN]), np.array([SHARE_SD]))
+"""The hysteretic share of b, as normal about its mean: one recording hardly tells it."""
 _PIECE: Final = 1 << 18
 """Readings whose Jacobian is in memory at a time: 16 MB."""
 _BY_SHARE: Final = 0.5 - 4.0 / 3.0 + math.pi**2 / 8.0
@@ -44,10 +48,23 @@ _BY_SHARE: Final = 0.5 - 4.0 / 3.0 + math.pi**2 / 8.0
 _BESIDE: Final = 2e-3
 """Phase between the two motions that tell the velocity: 1e-13 of it is lost in the sixth power."""
 
+_LEAST: Final = 1e-100
+"""Of a loss that is divided by."""
+
+
+def most_of_each(value: FloatArray) -> FloatArray:
+    """What a, b and c may be at most: no loss is more than the whole at the start.
+
+    It counts as the standard deviation of each beforehand where readings tell the sum alone.
+    """
+    y = abs(float(value[START]))
+    by_rate = np.array([y, 1.0, 1.0 / y])
+    return np.asarray(max(float(by_rate @ value[[A, B, C]]), _LEAST) / by_rate)
+
 
 @dataclass(frozen=True)
 class Waveform:
-    """chi^2 of the readings against Eq. 8.
+    """chi^2 of the readings against Eq. 8, with that of the share's prior.
 
     Parameters
     ----------
@@ -56,8 +73,7 @@ class Waveform:
     noise_rms
         Standard deviation of one.
     held_parts
-        The parts of b that are held: ``"hysteretic"`` or ``"viscous"`` with its rate (1/s); empty
-        when the share is marginalised.
+        The parts of b that are held: ``"hysteretic"`` or ``"viscous"`` with its rate (1/s).
     step
         The step of readings whose rounding is not random (see `rounding`); `noise_rms` is
         then that before the rounding. Zero: the readings scatter as `noise_rms` says.
@@ -78,9 +94,6 @@ class Waveform:
     drag: Drag = "energy"
     seen: Seen = "angle"
     length_m: float = 1.0
-    _last: list[tuple[FloatArray, FloatArray, FloatArray]] = field(
-        default_factory=list, init=False, repr=False, compare=False
-    )
     _residuals: list[tuple[FloatArray, FloatArray]] = field(
         default_factory=list, init=False, repr=False, compare=False
     )
@@ -155,7 +168,7 @@ class Waveform:
             chi2 = self.deviance(self.residual(value)) if self._has_motion(value) else math.inf
         except ValueError:
             return None
-        count = len(self.values)
+        count, chi2 = len(self.values), chi2 + float(np.sum(SHARES.residual(value) ** 2))
         return Summed(value, chi2, self.evaluate, count) if math.isfinite(chi2) else None
 
     def deviance(self, residual: FloatArray) -> float:
@@ -215,23 +228,24 @@ class Waveform:
             normal += jacobian.T @ weighted
         unit = self.noise_rms**-2 if self.step == 0.0 else 1.0
         chi2, slope, normal = unit * chi2, unit * slope, unit * normal
-        self._last[:] = [(value.copy(), slope, normal)]
-        change = self.change(value)
-        return Quadratic(chi2, change.T @ slope, change.T @ normal @ change)
+        change, prior, row = self.change(value), SHARES.residual(value), SHARES.rows(len(value))
+        slope, normal = change.T @ slope, change.T @ normal @ change
+        return Quadratic(chi2 + float(prior @ prior), slope + row.T @ prior, normal + row.T @ row)
 
-    def by_parts(self, value: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Gradient and normal matrix by the engine's parameters, the two parts of b among them.
+    def weighed(
+        self, value: FloatArray, at: Quadratic, noise_rms: float, enlarged: float
+    ) -> Quadratic:
+        """The same chi^2 with another noise, by whose variance errors are enlarged besides.
 
-        The readings are as good as linear in these, however far the share goes.
+        Of rounded readings the likelihood has its own noise. What is known of the share beforehand
+        is as it was, and that no loss is more than the whole.
         """
-        at, gradient, normal = self._last[0]
-        return gradient - normal @ (self.parts(value) - self.parts(at)), normal
-
-    def parts(self, value: FloatArray) -> FloatArray:
-        """Return a, both parts of b, c, omega, the start's angle and time, offset and drift."""
-        law, release = self.model(value)
-        start = release.angle_rad, release.time_s, value[OFFSET], value[DRIFT]
-        return np.array([*law.rates(), law.angular_frequency, *start])
+        scale = (1.0 if self.step else (self.noise_rms / noise_rms) ** 2) / enlarged
+        of_share, of_losses = SHARES.rows(len(value)), np.zeros(len(value))
+        of_losses[[A, B, C]] = most_of_each(value) ** -2.0
+        known = of_share.T @ of_share
+        normal = scale * (at.normal - known) + known + np.diag(of_losses)
+        return Quadratic(scale * at.chi2, scale * at.gradient, normal)
 
     def parts_of_b(self, share: float) -> tuple[float, float]:
         """How a change of b goes to its parts: what is held of one leaves it to the other."""
