@@ -31,7 +31,7 @@ report: .venv/installed
 	$(RUN) snakemake --report results/snakemake-report.html
 
 bench: .venv/installed-bench
-	$(RUN) python -m benchmarks speed --campaign
+	$(RUN) python -m benchmarks speed
 
 evidence: .venv/installed-bench
 	$(RUN) python -m benchmarks judge

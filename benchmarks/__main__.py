@@ -14,7 +14,7 @@ import subprocess
 import sys
 
 GROUPS = {
-    "speed": ("speed",),
+    "speed": ("speed", "workflow"),
     "judge": (
         *("consistency", "null_families --number 15", "known_physics", "campaign_challenge"),
         *("apparatus", "numbers", "acquisition faults"),

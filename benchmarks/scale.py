@@ -72,8 +72,8 @@ def write_campaign(folder: Path, records: int, *, diagnosed: bool) -> None:
     (folder / "records.tsv").write_text("record\tsource\n" + "".join(lines), encoding="utf-8")
 
 
-def cost(folder: Path, *words: str) -> Cost:
-    """Run `pendpipe campaign` in a process that measures its own children."""
+def cost(folder: Path, *words: str, command: str = "campaign") -> Cost:
+    """Run `pendpipe campaign`, or another command, in a process that measures its children."""
     code = (
         "import resource, subprocess, sys\n"
         "status = subprocess.run(sys.argv[1:]).returncode\n"
@@ -81,10 +81,9 @@ def cost(folder: Path, *words: str) -> Cost:
         "print('used', used.ru_utime + used.ru_stime, used.ru_maxrss / 1024)\n"
         "sys.exit(status)"
     )
-    command = [sys.executable, "-m", "pendpipe", "campaign", *words]
     began = time.perf_counter()
     done = subprocess.run(
-        [sys.executable, "-c", code, *command],
+        [sys.executable, "-c", code, sys.executable, "-m", "pendpipe", command, *words],
         cwd=folder,
         env=os.environ | {"PYTHONPATH": str(ROOT / "src")},
         capture_output=True,

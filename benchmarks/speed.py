@@ -1,18 +1,15 @@
-"""What engine, fit, diagnosis and campaign cost in CPU time, as ratios where others do the same.
+"""What engine, fit and diagnosis cost in CPU time, as ratios where others do the same.
 
-    python -m benchmarks.speed [--number 15] [--campaign]
+    python -m benchmarks.speed [--number 15]
 
 The reference record: f 0.516 Hz, y0 0.068 rad, b 0.01192 1/s (half hysteretic, half viscous),
 a 0.45 1/(rad s), c 1.4e-6 rad/s, 32,768 readings over 300 s, noise 0.1 mrad. Contenders take turns,
-and the lower quartiles are compared, since others at work on the machine only add. The default
-campaign is planned, run and planned again where it is asked for.
+and the lower quartiles are compared, since others at work on the machine only add.
 """
 
 from __future__ import annotations
 
 import math
-import os
-import tempfile
 import time
 from collections.abc import Callable
 from itertools import cycle, islice
@@ -22,8 +19,7 @@ from typing import Final
 import numpy as np
 
 import pendpipe as pp
-from benchmarks.journal import ROOT, judge_parser
-from benchmarks.scale import cost
+from benchmarks.journal import judge_parser
 from benchmarks.table import head, table_row
 from pendpipe.arrays import FloatArray as Array
 from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian, turning_points
@@ -164,28 +160,13 @@ def rows(rounds: int) -> list[tuple[str, str, str, bool]]:
     ]
 
 
-def campaign() -> None:
-    """Print what the default campaign costs, run from nothing."""
-    with tempfile.TemporaryDirectory() as results:
-        for what, words in (("plan", ["-n"]), ("run", []), ("plan when done", ["-n"])):
-            where = ("--", "--nolock", "--config", f"results={results}")
-            spent = cost(ROOT, "--cores", "2", *words, *where)
-            print(
-                f"{what}: {spent.cpu_s:.1f} s of CPU, {spent.clock_s:.0f} s by the clock at load"
-                f" {os.getloadavg()[0]:.0f}, {spent.memory_mb:.0f} MB in the largest process"
-            )
-
-
 def main() -> None:
     """Measure and print."""
     parser = judge_parser(__doc__, "speed", 15)
-    parser.add_argument("--campaign", action="store_true", help="the default campaign too")
     arguments = parser.parse_args()
     print(head("what", "measured", "bound", "kept"))
     for what, *cells, kept in rows(arguments.number):
         print(table_row(what, [*cells, "yes" if kept else "**no**"]))
-    if arguments.campaign:
-        campaign()
 
 
 if __name__ == "__main__":
