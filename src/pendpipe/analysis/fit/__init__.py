@@ -275,7 +275,7 @@ def _waveform(
     if forms is None:
         return result(fitted(restoring=second), second)
     own, other, odds = forms.fitted, None, _SURE
-    if own.minimum.converged and forms.goodness.enlarged == 1.0:
+    if own.minimum.converged and forms.goodness.misfit == 1.0:
         # What fits to the noise tells by itself how far off the other is.
         apart = told_apart(points, len(samples), forms.goodness.noise_rms)
         odds = 0.5 * apart.chi2

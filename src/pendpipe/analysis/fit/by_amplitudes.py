@@ -136,7 +136,7 @@ def fit_amplitudes(
     spread = turning * period.sd / period.value if period else math.nan
     times = Period(turning, points.start_s, np.diag([spread**2, 0.0]), math.nan, np.empty(0))
     value, matrix, intervals = _averaged(
-        [numbers_of(points, each, times, 1.0) for _, each in fits],
+        [numbers_of(points, each, times) for _, each in fits],
         np.exp(-0.5 * np.array([_misfit(each) - _misfit(envelope) for _, each in fits])),
     )
     phase = PARAMETERS.index("phase")

@@ -259,13 +259,13 @@ def fit_points(
     envelope, period = envelope_and_period(points, held, restoring)
     freedom = max(len(points) - 4.0, 1.0)
     p_value = tail(envelope.chi2_per_dof, freedom, 1e9)
-    stretched = envelope.chi2_per_dof if p_value < REFUTED else 1.0
+    misfit = max(envelope.chi2_per_dof, 1.0) if p_value < REFUTED else 1.0
     late = (
         "the period changes along the record as Eq. 8's does not (chi^2 of the times is"
         f" {period.chi2_per_dof:.3g} per point): the frequency is a mean"
     )
     return result_of(
-        *numbers_of(points, envelope, period, stretched),
+        *numbers_of(points, envelope, period),
         envelope.held,
         points,
         held.law(period.angular_frequency, envelope.value[:3].tolist(), restoring),
@@ -273,7 +273,7 @@ def fit_points(
             points.noise_rms_rad,
             envelope.chi2_per_dof,
             (p_value, tail(period.chi2_per_dof / _LATE, freedom, 1e9)),
-            max(stretched, 1.0),
+            misfit,
             bent,
         ),
         said=[late] if period.chi2_per_dof > _LATE else [],
@@ -288,17 +288,13 @@ def fit_points(
 
 
 def numbers_of(
-    points: TurningPoints,
-    envelope: EnvelopeFit,
-    period: Period,
-    stretched: float,
+    points: TurningPoints, envelope: EnvelopeFit, period: Period
 ) -> tuple[FloatArray, FloatArray, list[tuple[float, float]]]:
     """Return the seven parameters, their covariance, and the intervals of a, b, c.
 
     Amplitudes and times are independent.
     """
     _, gradient, normal = envelope.quadratic
-    gradient, normal = gradient / stretched, normal / stretched
     rates = covariance(normal, envelope.held)
     matrix = np.zeros((7, 7))
     # a, b, c, amplitude, and the level, which is what was used less its error.

@@ -122,11 +122,9 @@ class Fitted:
         return self.rival(value, restoring=restoring)
 
     def quadratic(self, goodness: Goodness | None = None) -> Quadratic:
-        """Chi^2 there, for the noise that a test of fit found, and what enlarges it."""
+        """Chi^2 there, for the noise that a test of fit found."""
         noise = goodness.noise_rms if goodness else self.noise_rms
-        enlarged = goodness.enlarged if goodness else 1.0
-        quadratic = self.minimum.point.quadratic
-        return self.problem.weighed(self.value, quadratic, noise, enlarged)
+        return self.problem.weighed(self.value, self.minimum.point.quadratic, noise)
 
     def chi2_between(self, first_s: float, last_s: float) -> float:
         """Chi^2 of the readings of a span."""
@@ -213,7 +211,7 @@ def fitted_waveform(
 def _with_drag(found: Fitted, samples: Samples, points: TurningPoints) -> Forms:
     """Ask for the other form of the drag: a step from the first one's minimum tells how likely."""
     goodness = _judged(found, samples, points)
-    without, plain = found.value[A] <= 0.0, goodness.enlarged == 1.0
+    without, plain = found.value[A] <= 0.0, goodness.misfit == 1.0
     if A in found.held or not found.minimum.converged or (without and plain):
         return Forms(found, goodness, None)
     speed = found.rival(found.start.value if without else found.value, drag="speed")
@@ -332,6 +330,7 @@ def waveform_result(
     inside = (points.time_s >= times[0]) & (points.time_s <= times[-1])
     drift, said = None, [*fitted.start.warnings]
     if DRIFT not in fitted.held:
+        drift_sd *= math.sqrt(goodness.misfit)
         drift = Estimate(float(fitted.value[DRIFT]), drift_sd, f"{samples.unit}/s")
         per = with_error(drift.value, drift.sd, drift.unit, short=True)
         said.append(f"the zero drifts by {per}; it is followed by a line")

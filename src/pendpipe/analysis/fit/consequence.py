@@ -44,30 +44,35 @@ _SAME: Final = 0.01
 """Part of the best known change of a, b, c below which the backbone does not tell one."""
 
 
-def judged(result: Fit, points: TurningPoints, law: Eq8, *, enlarged: float) -> Fit:
+def judged(result: Fit, points: TurningPoints, law: Eq8, *, misfit: float) -> Fit:
     """Light a fit; where its law is refuted, measure the backbone and let the errors cover it.
+
+    Without one they are those of a noise as large as what is left.
 
     Parameters
     ----------
     result
-        A fit with its ``decrement_check``, whose variances were enlarged.
+        A fit with its ``decrement_check``, and with the errors of its noise.
     points, law
         What was fitted.
-    enlarged
-        By what the variances were multiplied.
+    misfit
+        Variance of what is left over that of the noise (`goodness.Goodness.misfit`).
     """
+    shown = None
     if result.refuted and not any(check.contradicts for check in result.decrement_check):
         # Of a law that contradicts the decay nothing is quoted, and another may be tried.
         shown = backbone_of(points, law, result.bent)
-        if shown is not None:
-            result = replace(_spread(result, shown, enlarged), shown=shown)
+    if shown is not None:
+        result = replace(_spread(result, shown), shown=shown)
+    elif misfit > 1.0:
+        result = _with_errors(result, misfit * result.covariance)
     clear = int(np.sum(points.amplitude_rad > CLEAR * points.angle_sd_rad))
     quotable, problems = _quotable(result, clear)
     light, reason = _light(result, problems)
     return replace(result, light=light, light_reason=reason, quotable=quotable)
 
 
-def _spread(result: Fit, shown: Backbone, enlarged: float) -> Fit:
+def _spread(result: Fit, shown: Backbone) -> Fit:
     """Give the numbers of a law the errors that the backbone asks for.
 
     They are those of the noise, as the turning points scatter; and what a, b, c and the frequency
@@ -75,7 +80,7 @@ def _spread(result: Fit, shown: Backbone, enlarged: float) -> Fit:
     """
     order = PARAMETERS
     times = [name in ("frequency", "phase") for name in order]
-    root = np.sqrt(np.where(times, shown.period_scatter, shown.decrement_scatter) / enlarged)
+    root = np.sqrt(np.where(times, shown.period_scatter, shown.decrement_scatter))
     covariance = result.covariance * root[:, None] * root
     own = [order.index(name) for name in "abc"]
     by_loss = _asked(result, shown, covariance[np.ix_(own, own)])
@@ -84,12 +89,20 @@ def _spread(result: Fit, shown: Backbone, enlarged: float) -> Fit:
     if math.isfinite(small.value):
         frequency, off = result.value("frequency"), 1.0 / small.value
         covariance[place, place] += (off - frequency) ** 2 + (small.sd * off**2) ** 2
+    return _with_errors(result, covariance)
+
+
+def _with_errors(result: Fit, covariance: FloatArray) -> Fit:
+    """Give the parameters the errors of a covariance.
+
+    A law that is refuted knows no better on which side of a value the truth lies.
+    """
     parameters = dict(result.parameters)
-    for name, variance in zip(order, np.diag(covariance).tolist(), strict=True):
-        sd = math.sqrt(max(variance, 0.0))
-        found = parameters[name]
-        factor = sd / found.sd if found.sd > 0.0 else 1.0
-        parameters[name] = replace(scaled(found, factor, name), sd=sd)
+    for name, sd in zip(PARAMETERS, np.sqrt(np.diag(covariance).clip(0.0)).tolist(), strict=True):
+        found = replace(parameters[name], sd=sd, interval95=None)
+        low, high = found.bounds95
+        least = min(0.0, found.value) if name in "abc" else -math.inf
+        parameters[name] = replace(found, interval95=(max(low, least), high))
     return replace(result, parameters=parameters, covariance=covariance)
 
 

@@ -53,8 +53,9 @@ class Goodness(NamedTuple):
     """Of the residual against that noise."""
     p_values: tuple[float, ...]
     """Of each question."""
-    enlarged: float
-    """By what variances are multiplied: 1 where noise explains the residual."""
+    misfit: float
+    """Variance of what is left over that of the noise, at the motion's own frequency if more: 1
+    where noise explains it."""
     bent: FloatArray | None = None
     """Third harmonic of the residual in phase with the first of the motion, over the largest
     amplitude Y: a constant, and by (y/Y)^3; shape (2,)."""

@@ -331,18 +331,18 @@ def result_of(
         bent=goodness.bent,
         **rest,
     )
-    result = judged(result, points, law, enlarged=goodness.enlarged)
-    return replace(result, warnings=(*points.notes, *_warnings(result, goodness.enlarged), *said))
+    result = judged(result, points, law, misfit=goodness.misfit)
+    return replace(result, warnings=(*points.notes, *_warnings(result, goodness.misfit), *said))
 
 
-def _warnings(result: FitResult, stretched: float) -> list[str]:
+def _warnings(result: FitResult, misfit: float) -> list[str]:
     """What the reader of these numbers should know, a clause each."""
     a, b, c = (result.parameters[name] for name in ("a", "b", "c"))
     y0 = result.parameters["amplitude"].value
     rate = a.value * y0 + b.value + c.value / y0
     matrix = result.covariance_of("a", "b")
     mixed = matrix[0, 1] < -_MIXED * a.sd * b.sd if a.sd > 0.0 and b.sd > 0.0 else False
-    slow = result.chi2_per_dof <= 0.9 * stretched
+    slow = result.chi2_per_dof <= 0.9 * misfit
     seen = "the half cycles scatter, in the square," if slow else "chi^2 of the readings is"
     unit = result.parameters["amplitude"].unit
     warnings = (
@@ -359,8 +359,8 @@ def _warnings(result: FitResult, stretched: float) -> list[str]:
             "quality_factor_limit has no finite value, since b = 0",
         ),
         (
-            stretched > 1.0,
-            f"{seen} {stretched:.3g} times what the noise explains: period and Q are those of the"
+            misfit > 1.0,
+            f"{seen} {misfit:.3g} times what the noise explains: period and Q are those of the"
             " turning points, and a, b, c carry what the law is off by; see pendpipe diagnose",
         ),
         (

@@ -232,15 +232,13 @@ class Waveform:
         slope, normal = change.T @ slope, change.T @ normal @ change
         return Quadratic(chi2 + float(prior @ prior), slope + row.T @ prior, normal + row.T @ row)
 
-    def weighed(
-        self, value: FloatArray, at: Quadratic, noise_rms: float, enlarged: float
-    ) -> Quadratic:
-        """The same chi^2 with another noise, by whose variance errors are enlarged besides.
+    def weighed(self, value: FloatArray, at: Quadratic, noise_rms: float) -> Quadratic:
+        """The same chi^2 with another noise.
 
         Of rounded readings the likelihood has its own noise. What is known of the share beforehand
         is as it was, and that no loss is more than the whole.
         """
-        scale = (1.0 if self.step else (self.noise_rms / noise_rms) ** 2) / enlarged
+        scale = 1.0 if self.step else (self.noise_rms / noise_rms) ** 2
         of_share, of_losses = SHARES.rows(len(value)), np.zeros(len(value))
         of_losses[[A, B, C]] = most_of_each(value) ** -2.0
         known = of_share.T @ of_share
