@@ -21,9 +21,9 @@ from pendpipe.analysis.angles import as_pendulum
 from pendpipe.analysis.coarse import HARDLY, between
 from pendpipe.analysis.half_cycles import (
     LEAST_HALF_CYCLES,
-    SEEN,
     HalfCycles,
     half_cycles,
+    least_swing,
     usual_half_period,
 )
 from pendpipe.analysis.noise import noise_rms
@@ -459,7 +459,7 @@ def _looked_at(
     noise = noise_rms(values, recording.resolution, quieter=0.1)
     if (fine := between(time, values, HARDLY)) is not None:
         time, values, noise = fine.time_s, fine.values, fine.noise_rms
-    least = max(SEEN * noise, 1.6 * (recording.resolution or 0.0))
+    least = least_swing(noise, recording.resolution)
     half_period = usual_half_period(time, values)
     # Noise alone spans about `least`. What hardly exceeds it many half cycles can prove.
     if half_period is None or span < 1.5 * least:

@@ -107,8 +107,15 @@ def _find_extremes(values: FloatArray, least: float, found: IntArray) -> int:
 
 SEEN: Final = deviations(1e8)
 """Standard deviations of the noise from which a swing is seen: the largest of 10^8 readings."""
+_STEPS: Final = 1.6
+"""Steps of the readings from which a swing is seen: at rest between two they swing by one."""
 _SMALL: Final = 0.15
 """Of both neighbours: a swing below is a ripple."""
+
+
+def least_swing(noise: float, step: float | None) -> float:
+    """The least swing that is seen over the noise of a reading, and over its step."""
+    return max(SEEN * noise, _STEPS * (step or 0.0))
 
 
 def without_ripples(values: FloatArray, turns: IntArray) -> IntArray:

@@ -15,7 +15,12 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.coarse import Between, between
-from pendpipe.analysis.half_cycles import LEAST_HALF_CYCLES, half_cycles, usual_half_period
+from pendpipe.analysis.half_cycles import (
+    LEAST_HALF_CYCLES,
+    half_cycles,
+    least_swing,
+    usual_half_period,
+)
 from pendpipe.analysis.noise import quantisation_rms, undithered_rms
 from pendpipe.analysis.turning_points.harmonics import far_points, mean_square, odd_harmonics
 from pendpipe.analysis.turning_points.long_records import follow
@@ -47,6 +52,8 @@ _WIDEST: Final = 80
 """Half cycles whose times are smoothed together at most, by a parabola."""
 _GAP: Final = 0.4
 """Half periods without a reading from which a turning point may be lost in them."""
+_COUNT: Final = 20.0
+"""Noises of an encoder's count in its width (`measure.prepare`)."""
 _EDGE: Final = 0.05
 """Half periods from the first reading within which an extreme may be that reading alone."""
 
@@ -60,18 +67,16 @@ class Rough(NamedTuple):
     level: float
 
 
-def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
-    """Find and number the extremes of a decay.
+def numbered(samples: Samples) -> tuple[Rough, int]:
+    """Number the extremes of a decay.
 
     Returns
     -------
     rough, stride
         The extremes, and the stride between readings that is enough for a first look.
     """
-    least = max(7.0 * samples.noise_rms, 1.5 * (samples.step or 0.0))
-    if samples.counts:
-        least = 40.0 * samples.noise_rms
-    piece = samples.values[:_LOOK]
+    piece, counts = samples.values[:_LOOK], samples.counts
+    least = least_swing(samples.noise_rms, _COUNT * samples.noise_rms if counts else samples.step)
     half_period = usual_half_period(samples.time_s[:_LOOK], piece)
     time, value, index, stride = np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.int64), 1
     if half_period is not None:
@@ -83,7 +88,7 @@ def rough_half_cycles(samples: Samples) -> tuple[Rough, int]:
         time, value = cycles.turn_time_s[turned], cycles.turn[turned]
         index = np.searchsorted(since_s, time - 1e-9 * half_period)
         time = samples.time_s[0] + time
-    if len(index) > _ENOUGH and not samples.counts:
+    if len(index) > _ENOUGH and not counts:
         stride = max(1, int(np.median(np.diff(index))) // _ENOUGH)
     side = np.sign(np.diff(value, prepend=value[1:2])).astype(np.int64)
     if len(index) >= LEAST_HALF_CYCLES:
@@ -373,7 +378,7 @@ def _of_few(samples: Samples, fine: Between, place: str | Path) -> TurningPoints
 
 def _measured(samples: Samples, place: str | Path) -> TurningPoints:
     """Measure half cycle by half cycle."""
-    rough, stride = rough_half_cycles(samples)
+    rough, stride = numbered(samples)
     _refuse_few(samples, len(rough.number), place)
     gaps = np.diff(samples.time_s) > _GAP * float(np.median(np.diff(rough.time_s)))
     refuse_if(

@@ -32,6 +32,7 @@ from pendpipe.dynamics.kernel import IntMatrix, Matrix, Stack, kernel
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.readings import decimal_step, find_step, motion_of
 from pendpipe.recording import Recording
+from pendpipe.solve import Bounds, bounded_step
 
 FITTED: Final = 4
 """Readings of a half cycle from which its amplitude, phase and level are told, and one is left."""
@@ -91,8 +92,14 @@ def shape_error(
     return 1.5 * third + 0.1 * losses * linear / angular_frequency, third
 
 
+_LOSSES: Final = Bounds(np.array([0.0, 0.0, 0.0, -np.inf]), np.full(4, np.inf))
+"""Of a, b, c, and of the amplitude from which they act."""
+
+
 def loss_rates(time_s: FloatArray, amplitude: FloatArray, sd: FloatArray) -> FloatArray:
-    """Rates of Eq. 13 in one linear step, by its integral: y0 - y = a S y^2 + b S y + c t.
+    """Rates of Eq. 13, none below zero, in one linear step by its integral.
+
+    That is y0 - y = a S y^2 + b S y + c t.
 
     The integrals come from the amplitudes by Simpson-like cubic sums, so this is a start
     and a shape, not an estimate; the fit of Eq. 14 is `pendpipe.analysis.fit`.
@@ -112,16 +119,7 @@ def loss_rates(time_s: FloatArray, amplitude: FloatArray, sd: FloatArray) -> Flo
     weight = 1.0 / np.hypot(sd, 3e-4 * y[0])
     weighted = columns * weight[:, None]
     normal, right = weighted.T @ weighted, weighted.T @ (y * weight)
-    scale = 1.0 / np.sqrt(np.diag(normal))
-    normal = normal * scale[:, None] * scale + 1e-13 * np.eye(4)
-    for held in ((), (2,), (0,), (0, 2)):
-        free = [j for j in range(4) if j not in held]
-        rates = np.zeros(4)
-        rates[free] = np.linalg.solve(normal[np.ix_(free, free)], (right * scale)[free])
-        rates *= scale
-        if np.all(rates[:3] >= 0.0):
-            break
-    return np.maximum(rates[:3], 0.0)
+    return bounded_step(normal, right, _LOSSES)[:3]
 
 
 def _integral(t: FloatArray, f: FloatArray) -> FloatArray:
