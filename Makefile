@@ -1,7 +1,7 @@
 # Everything lives in .venv/; nothing else is installed. The README has the same steps for
 # a machine without make.
 .DELETE_ON_ERROR:
-.PHONY: campaign test quick docs report bench evidence integrity proof check clean wheel
+.PHONY: campaign test quick docs report published bench evidence integrity proof check clean wheel
 
 SHELL := bash
 PYTHON ?= python3
@@ -29,6 +29,12 @@ docs: .venv/installed-docs
 report: .venv/installed
 	$(RUN) snakemake --cores $(CORES)
 	$(RUN) snakemake --report results/snakemake-report.html
+
+# Campaigns in print since 1786 (docs/published.md), with a figure each in results/published/.
+published: .venv/installed
+	mkdir -p results/published
+	$(RUN) bash -c 'for each in examples/published/*/; do \
+		pendpipe published --figure "results/published/$$(basename $$each).svg" $$each; echo; done'
 
 bench: .venv/installed-bench
 	$(RUN) python -m benchmarks speed

@@ -159,7 +159,7 @@ def global_p_value(
 
 
 def search(
-    design: Design, data: Measured, level: float = FALSE_ALARM, base: JointFit | None = None
+    design: Any, data: Measured, level: float = FALSE_ALARM, base: JointFit | None = None
 ) -> CampaignSearch:
     """Look for what the model lacks, and for records that disagree with all others.
 
@@ -210,7 +210,8 @@ def farthest(fit: JointFit) -> Far | None:
         if abs(pulls[number]) <= FAR_SIGMA:
             break
         record = fit.design.runs[number].record
-        sigma = float(_sigma(fit.chi2 - _without(fit, record, fit.added).chi2))
+        fall = fit.chi2 - _without(fit, record, fit.added).chi2
+        sigma = float(_sigma(fall, fit.data.values.shape[-1]))
         if sigma > FAR_SIGMA:
             return Far(record, math.copysign(sigma, pulls[number]))
     return None
@@ -222,8 +223,10 @@ def _without(fit: JointFit, record: str, added: Sequence[Candidate] = ()) -> Joi
     return joint_fit(*only(fit.design, fit.data, keep), added)
 
 
-def _sigma(fall: FloatArray | float) -> FloatArray:
-    """The sigma of a fall of chi^2 by frequency and b, two degrees of freedom."""
+def _sigma(fall: FloatArray | float, readings: int) -> FloatArray:
+    """The sigma of a fall of chi^2 by frequency and b, two degrees of freedom, or by n, one."""
+    if readings == 1:
+        return np.sqrt(np.maximum(fall, 0.0))
     return np.asarray(-ndtri_exp(-0.5 * np.maximum(fall, 0.0) - math.log(2.0)))
 
 
@@ -321,7 +324,7 @@ def held_out(fit: JointFit) -> tuple[FloatArray, FloatArray]:
     volume = 2.0 * np.sum(np.log(left, where=predicted, out=np.zeros_like(left)), axis=-1)
     volume += np.linalg.slogdet(whitening @ whitening.mT)[1]
     densities = 0.5 * (volume - fall - rows * math.log(2.0 * math.pi))
-    return densities, -np.copysign(_sigma(fall), (own @ rest)[:, -1])
+    return densities, -np.copysign(_sigma(fall, rows), (own @ rest)[:, -1])
 
 
 _CLAMPED_ANEW_M: Final = 1e-9

@@ -20,7 +20,7 @@ from pendpipe.campaign.tank import DEPTHS, Surface, confined
 from pendpipe.effects.effect import Parameter
 
 Acts = Callable[..., Any]
-Shapes = Sequence[Any] | Callable[[Design], Sequence[Any]]
+Shapes = Sequence[Any] | Callable[[Any], Sequence[Any]]
 
 
 @dataclass(frozen=True)
@@ -52,11 +52,11 @@ class CampaignEffect:
     acts: Acts
     shapes: Shapes = (None,)
 
-    def shapes_in(self, design: Design) -> Sequence[Any]:
+    def shapes_in(self, design: Any) -> Sequence[Any]:
         """Return the shapes that are tried in a design."""
         return self.shapes(design) if callable(self.shapes) else self.shapes
 
-    def put(self, what: Any, size: FloatArray, design: Design, shape: Any) -> Any:
+    def put(self, what: Any, size: FloatArray, design: Any, shape: Any) -> Any:
         """Return inputs or terms with the effect in them."""
         given = {"design": design, "shape": shape}
         asked = {name: given[name] for name in given if name in signature(self.acts).parameters}

@@ -6,7 +6,7 @@ What these say of k, the drag and the added mass stands beside the numbers of th
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, singledispatch
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -41,8 +41,9 @@ class Candidate(NamedTuple):
         return low / self.effect.expected, high / self.effect.expected
 
 
-def candidates(design: Design) -> list[Candidate]:
-    """The whole catalogue with its shapes."""
+@singledispatch
+def candidates(design: Any) -> list[Candidate]:
+    """The whole catalogue with its shapes; a table of published numbers has its own."""
     return [
         Candidate(each, shape) for each in CATALOGUE.values() for shape in each.shapes_in(design)
     ]
@@ -96,8 +97,12 @@ def terms_with(design: Design, added: Sequence[Candidate], unknowns: FloatArray)
     return terms
 
 
-def predict(design: Design, added: Sequence[Candidate], unknowns: FloatArray) -> FloatArray:
-    """Frequency and b, shape (..., records, 2), for the unknowns of `terms_with`."""
+@singledispatch
+def predict(design: Any, added: Sequence[Candidate], unknowns: FloatArray) -> FloatArray:
+    """Frequency and b, shape (..., records, 2), for the unknowns of `terms_with`.
+
+    Of a table of published numbers n, shape (..., records, 1).
+    """
     return solve(design, terms_with(design, added, unknowns))
 
 
@@ -108,7 +113,7 @@ class JointFit:
     Parameters
     ----------
     design, data, added
-        The model: the design with these effects.
+        The model: the design (or a table of published numbers) with these effects.
     unknowns
         As in `predict`.
     residuals
@@ -117,7 +122,7 @@ class JointFit:
         Of the residuals.
     """
 
-    design: Design
+    design: Any
     data: Measured
     added: tuple[Candidate, ...]
     unknowns: FloatArray
@@ -193,7 +198,7 @@ class JointFit:
 
 
 def joint_fit(
-    design: Design,
+    design: Any,
     data: Measured,
     added: Sequence[Candidate] = (),
     start: FloatArray | None = None,
@@ -230,7 +235,7 @@ def joint_fit(
 
 
 def _weighted(
-    design: Design, data: Measured, added: Sequence[Candidate], unknowns: FloatArray
+    design: Any, data: Measured, added: Sequence[Candidate], unknowns: FloatArray
 ) -> Weighted:
     return Weighted(
         unknowns,
@@ -239,14 +244,14 @@ def _weighted(
     )
 
 
-def _bounds(design: Design, added: Sequence[Candidate]) -> Bounds:
+def _bounds(design: Any, added: Sequence[Candidate]) -> Bounds:
     """Least and largest values of the unknowns, of which the effects' sizes alone are bound."""
     nuisances = [(-np.inf, np.inf)] * len(design.nuisances)
     return Bounds(*np.array([*nuisances, *(one.bounds for one in added)]).T)
 
 
 def chi2_near(
-    design: Design, data: Measured, added: Sequence[Candidate], unknowns: FloatArray
+    design: Any, data: Measured, added: Sequence[Candidate], unknowns: FloatArray
 ) -> float:
     """Least chi^2 of the model that is linear about some unknowns."""
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
@@ -257,13 +262,14 @@ def chi2_near(
 
 
 def _residuals(
-    design: Design, data: Measured, added: Sequence[Candidate], unknowns: FloatArray
+    design: Any, data: Measured, added: Sequence[Candidate], unknowns: FloatArray
 ) -> FloatArray:
     """Whitened data, then priors; shape (..., rows)."""
     found = predict(design, added, unknowns)
     off = found - data.values
-    # As f^2, which is linear in where the weights are, however near they are to balance.
-    off[..., 0] *= 0.5 * (1.0 + found[..., 0] / data.values[:, 0])
+    if isinstance(design, Design):
+        # As f^2, which is linear in where the weights are, however near they are to balance.
+        off[..., 0] *= 0.5 * (1.0 + found[..., 0] / data.values[:, 0])
     white = np.einsum("rij,...rj->...ri", data.whitening, off)
     white = white.reshape(*white.shape[:-2], -1)
     priors = unknowns[..., : len(design.nuisances)][..., design.has_prior]
@@ -273,7 +279,7 @@ def _residuals(
 
 
 def _derivatives(
-    design: Design, data: Measured, added: Sequence[Candidate], unknowns: FloatArray
+    design: Any, data: Measured, added: Sequence[Candidate], unknowns: FloatArray
 ) -> FloatArray:
     """Central differences of the residuals, all at once; shape (rows, unknowns)."""
     steps = STEP * np.eye(len(unknowns))

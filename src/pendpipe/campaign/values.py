@@ -121,7 +121,8 @@ class Values:
     @property
     def design(self) -> Design:
         """Of all records."""
-        return self.fit.design
+        design: Design = self.fit.design
+        return design
 
     @cached_property
     def wet(self) -> list[int]:

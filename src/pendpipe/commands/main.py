@@ -35,6 +35,7 @@ COMMANDS: Final = {
     "page": "write an HTML page about recordings",
     "init": "begin a campaign of your own recordings in a folder",
     "campaign": "run a campaign, every recording of a table, by Snakemake",
+    "published": "diagnose a table of published numbers as a campaign",
     "decay": "draw the decay of a campaign's record",
     "figures": "draw figures 3 to 10 of a campaign",
     "report": "write one self-contained page about a campaign",

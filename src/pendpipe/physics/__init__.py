@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pendpipe.physics.fluid import (
         POTENTIAL_FLOW_ADDED_MASS,
         added_mass_coefficient,
+        cylinder_added_mass_coefficient,
         cylinder_drag,
         free_decay_root,
         harmonic_drag,
@@ -93,6 +94,7 @@ __all__ = [
     "amplitude_of_largest_quality_factor",
     "amplitude_rate",
     "bearing_friction_rate",
+    "cylinder_added_mass_coefficient",
     "cylinder_drag",
     "damping_coefficient",
     "decay_rates",

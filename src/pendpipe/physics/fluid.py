@@ -5,7 +5,7 @@ L the distance from the axis to its centre, I the moment of inertia, delta the
 penetration depth (not the logarithmic decrement of Eq. 5).
 """
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -336,10 +336,42 @@ def cylinder_drag(
     FloatArray
         In N s/m^2, in phase with the velocity that it opposes.
     """
+    force = _cylinder_force(radius_m, angular_frequency_per_s * density_kg_per_m3 / viscosity_pa_s)
+    displaced = np.pi * density_kg_per_m3 * radius_m**2
+    return displaced * angular_frequency_per_s * -np.imag(force)
+
+
+@equation
+def cylinder_added_mass_coefficient(
+    radius_m: Numbers,
+    angular_frequency_per_s: Numbers,
+    viscosity_pa_s: Numbers,
+    density_kg_per_m3: Numbers,
+) -> FloatArray:
+    """Fluid that swings with a rod across its axis, in units of the displaced fluid.
+
+    ``Re[1 + 4 K1(z)/(z K0(z))]``, z = (1 + i) b/delta: Stokes's k of a cylinder (1850), 1 without
+    viscosity; `cylinder_drag` has the other part of the same force.
+
+    Parameters
+    ----------
+    radius_m, angular_frequency_per_s, viscosity_pa_s, density_kg_per_m3
+        b in m, omega in rad/s, eta in Pa s, rho in kg/m^3; broadcast.
+
+    Returns
+    -------
+    FloatArray
+        Added mass over the mass of the displaced fluid, a pure number.
+    """
+    return 1.0 + np.real(
+        _cylinder_force(radius_m, angular_frequency_per_s * density_kg_per_m3 / viscosity_pa_s)
+    )
+
+
+def _cylinder_force(radius_m: Any, rate: Any) -> Any:
+    """``4 K1(z)/(z K0(z))`` with z = b sqrt(i omega/nu)."""
     from scipy.special import kve
 
-    argument = radius_m * np.sqrt(1j * angular_frequency_per_s * density_kg_per_m3 / viscosity_pa_s)
+    argument = radius_m * np.sqrt(1j * rate)
     # Both times exp(z), which cancels in the ratio.
-    ratio = kve(1, argument) / kve(0, argument)
-    displaced = np.pi * density_kg_per_m3 * radius_m**2
-    return displaced * angular_frequency_per_s * np.real(4.0j * ratio / argument)
+    return 4.0 * kve(1, argument) / kve(0, argument) / argument
