@@ -320,7 +320,7 @@ def test_a_step_taken_on_trust_ends_at_the_optimum() -> None:
     for seed in range(60):
         values = noisy(sample(FIG_8, START, fine), 10.0 ** (-4.5 + 0.01 * seed), seed)
         points = turning_points_of(prepare(Recording(fine, values, "angle_rad"), "record"))
-        problem = Waveform(fine, values, points.noise_rms_rad, {})
+        problem = Waveform(fine, values, points.noise_rms_rad)
         first = start_values(points, Held({}, "eq8", 1.0)).value
         soon = minimise(problem.problem, first, trust=0.03, rounds=2)
         if not soon.converged:
@@ -340,7 +340,7 @@ def test_a_trial_of_more_half_cycles_than_readings_can_show_is_refused(
     omega: float, time_s: float
 ) -> None:
     """Without a loss the engine would follow it for ever."""
-    problem = Waveform(TIME, np.zeros_like(TIME), 1e-4, {})
+    problem = Waveform(TIME, np.zeros_like(TIME), 1e-4)
     trial = np.array([0.0, 0.0, 0.0, 0.5, omega, 0.07, time_s, 0.0])
     assert problem.at(trial) is None
 
@@ -350,11 +350,11 @@ def test_a_long_step_of_the_share_of_b_keeps_the_period_that_its_derivative_prom
     quadratic: float,
 ) -> None:
     """The period is a parabola in the hysteretic share; omega takes up what bends it."""
-    problem = Waveform(TIME, np.zeros_like(TIME), 1e-4, {})
+    problem = Waveform(TIME, np.zeros_like(TIME), 1e-4)
     begin = np.array([quadratic, 0.1, 0.0, 0.5, OMEGA, 0.3, -0.3, 0.0])
 
     def period(value: FloatArray) -> float:
-        return float(turning_points(*problem.model(value), count=3).time_s[2])
+        return float(turning_points(*problem.motion_of(value), count=3).time_s[2])
 
     tiny = np.zeros(8)
     tiny[3], tiny[4] = 1e-4, 1e-9

@@ -19,7 +19,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data, gather
 from pendpipe.diagnosis.unwrapped import anchored
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.dynamics.eq8 import Drag, Restoring
+from pendpipe.dynamics.eq8_model import Eq8Model, Seen
 from pendpipe.effects.baseline import (
     BASELINE,
     OFFSET,
@@ -32,7 +32,6 @@ from pendpipe.effects.baseline import (
     C,
     pendulum_of,
     values_of,
-    with_parts,
 )
 from pendpipe.effects.catalogue import CATALOGUE
 from pendpipe.effects.effect import Start
@@ -84,34 +83,32 @@ def begin(
 ) -> Beginning:
     """Choose the readings that are compared, and the start values of the search.
 
-    It begins with the law that `fit` has, its torque and form of drag; with its numbers unless its
-    light is red, for then they have lost the motion. `stated` is whether it is known that the
-    readings are angles.
+    It begins with the model that `fit` has and its values; where its light is red, which has lost
+    the motion, with its torque alone. `stated` is whether it is known that the readings are angles.
     """
     held = Held(fixed, baseline, points.apparent_frequency_hz)
     angles, _ = as_angles(points)
     beats = not fixed and bool(points.beats)
-    torque: Restoring = fit.restoring if fit else restoring_of(angles, stated=stated)
-    if beats:
-        torque = "linear"
-    drag: Drag = "energy"
+    seen: Seen = "rate" if samples.unit == "rad/s" else "angle"
+    law, span = Eq8Model(seen=seen, parts=held.parts), slice(None)
     starts: tuple[Start, ...] = ()
-    if fit is not None and fit.motion is not None and fit.light != "red":
-        law, release = fit.motion
-        drag, value = law.drag, values_of(law, release, fit.value("offset"))
-        span = usable_span(samples, angles, value, at_release=release.time_s >= samples.time_s[0])
+    if fit is not None and fit.model and fit.values is not None and fit.light != "red":
+        law, value, at_release = fit.model, fit.values, fit.values[TIME] >= samples.time_s[0]
     else:
-        start = start_values(angles, held, torque, samples=samples)
-        value = start.value[: len(BASELINE)].copy()
-        span = usable_span(samples, angles, value, at_release=start.before == 0)
+        torque = fit.restoring if fit else restoring_of(angles, stated=stated)
+        law = replace(law, restoring="linear" if beats else torque)
+        start = start_values(angles, held, law.restoring, samples=samples)
+        value, at_release = start.value[: len(BASELINE)], start.before == 0
     if beats:
         # The turning points of a beat tell nothing of either mode.
-        span = slice(None)
         readings = samples.time_s, samples.values, 2.0 * math.pi / float(value[OMEGA])
         starts = tuple(each for effect in CATALOGUE if (each := effect.start(*readings)))
         value = values_of(starts[0].law, starts[0].release, float(value[OFFSET]))
+    else:
+        span = usable_span(samples, angles, value, at_release=at_release)
     omega, angle = float(value[OMEGA]), float(value[START])
-    own = replace(pendulum_of(value), restoring=torque, drag=drag)
+    value = law.settled(value)
+    own = replace(pendulum_of(value), restoring=law.restoring, drag=law.drag)
     data = gather(
         samples.time_s[span],
         samples.values[span],
@@ -121,11 +118,10 @@ def begin(
         period_s=2.0 * math.pi / omega,
         noise_rms=points.noise_rms_rad,
         friction_jump=2.0 * abs(float(own.friction(value[START], *np.array([0.0, 1.0])))),
-        third=abs(angle) ** 3 / 192.0 if torque == "sine" else 0.0,
+        third=abs(angle) ** 3 / 192.0 if law.restoring == "sine" else 0.0,
     )
     row = span.indices(len(samples.time_s))[0]
     data = replace(data, row=row, turn_s=float(angles.time_s[0]))
-    value = with_parts(value, held.parts)
     data = _far_from_the_stop(data, value)
     is_angle = samples.unit in ("rad", "rad/s")
     model = Model(
@@ -134,11 +130,8 @@ def begin(
         order=order_for(abs(angle), "rad" if is_angle else samples.unit),
         fold=data.fold,
         first_s=float(data.time_s[0]),
-        parts=held.parts,
         scale=1.0 if is_angle else abs(angle),
-        restoring=torque,
-        drag=drag,
-        seen="rate" if samples.unit == "rad/s" else "angle",
+        **vars(law),
     )
     data, model, at = _before_the_stop(data, model, value)
     if not np.ptp(at.reading) < _FAR_BEYOND * np.ptp(data.values):

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.waveform import SHARES
 from pendpipe.arrays import FloatArray, scaled_qr
 from pendpipe.diagnosis.unwrapped import unwrapped
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.baseline import OMEGA, SHARE, B, share_by_b
+from pendpipe.dynamics.eq8_model import SHARES
+from pendpipe.effects.baseline import OMEGA, SHARE, B
 from pendpipe.effects.model import Evaluated, Model, jacobian
 from pendpipe.solve import Bounds, NoStartError, Problem, Search, Squares
 
@@ -62,7 +62,7 @@ class Evaluation(Squares):
         columns[:-1] = self.noise.whiten(jacobian(self.model, self.value, self.at))
         columns[-1:] = SHARES.rows(self.model.size)
         # If one part of b is held, changing b changes the share.
-        columns[:, B] += share_by_b(self.value, self.model.held_parts()) * columns[:, SHARE]
+        columns[:, B] += self.model.share_by_b(self.value) * columns[:, SHARE]
         return columns
 
 

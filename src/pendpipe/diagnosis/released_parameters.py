@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import PLACES, SHARE, B
-from pendpipe.effects.baseline import HYSTERETIC, VISCOUS, share_by_b
+from pendpipe.effects.baseline import HYSTERETIC, VISCOUS
 from pendpipe.effects.effect import Effect
 
 if TYPE_CHECKING:
@@ -58,5 +58,5 @@ class ReleasedParameter(Effect):
             return fit.jacobian[:, SHARE]
         share = float(value[SHARE])
         by_part = (1.0 - share if self.frees == HYSTERETIC else -share) / float(value[B])
-        along = by_part - share_by_b(value, parts)
+        along = by_part - fit.model.share_by_b(value)
         return fit.jacobian[:, B] + along * fit.jacobian[:, SHARE]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
-from typing import Any, Final, Literal, Self
+from typing import Any, Final, Self
 
 import numpy as np
 
@@ -25,11 +25,9 @@ from pendpipe.dynamics.any_law import (
     sample_motion,
     sample_pieces,
 )
-from pendpipe.dynamics.eq8 import Drag, Restoring
+from pendpipe.dynamics.eq8_model import LOWER, UPPER, Eq8Model
 from pendpipe.effects.baseline import (
     BASELINE,
-    HIGH,
-    LOW,
     OFFSET,
     OMEGA,
     SHARE,
@@ -39,9 +37,7 @@ from pendpipe.effects.baseline import (
     B,
     C,
     closed_form,
-    held_indices,
     pendulum_of,
-    with_parts,
 )
 from pendpipe.effects.curves import Curve
 from pendpipe.effects.effect import Effect, Kick, Pendulum, Span
@@ -155,14 +151,12 @@ class Part:
         return responses(effect, changes, self.at, self.model.pendulum(self.value))
 
 
-Seen = Literal["angle", "rate"]
-"""What of the motion is read."""
 _MORE: Final = (1.0, 1.02, 1.12, 1.28)
 """Half cycles that are tried, over those that omega makes: a pendulum may be quicker."""
 
 
 @dataclass(frozen=True)
-class Model:
+class Model(Eq8Model):
     """Eq. 8 with effects.
 
     Parameters
@@ -183,14 +177,12 @@ class Model:
         When the first reading was taken, where the start is a virtual turning point before the
         release: the pendulum was let go at the last turning point before it. By default, at
         the start.
-    parts
-        The parts of b that are held (``"hysteretic"``, ``"viscous"``), with their rates in 1/s.
     scale
         The amplitude where readings are no angles: what effects are bounded by is for 1 rad.
-    restoring, drag
-        The forms of Eq. 8, which an effect may change (`Effect.form`).
-    seen
-        What is read: the angle, or its rate (rad/s).
+
+    Notes
+    -----
+    An effect may change the forms of Eq. 8 (`Effect.form`), and set a held part of b free.
     """
 
     time_s: FloatArray
@@ -200,11 +192,7 @@ class Model:
     half_cycles: int | None = None
     fold: int = 1
     first_s: float = -math.inf
-    parts: Mapping[str, float] = field(default_factory=dict)
     scale: float = 1.0
-    restoring: Restoring = "linear"
-    drag: Drag = "energy"
-    seen: Seen = "angle"
     _last: dict[str, Motion] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -254,23 +242,20 @@ class Model:
         """Lowest and highest values."""
         duration = float(self.time_s[-1] - self.time_s[0])
         limits = [effect.limits(duration, self.scale) for effect in self.effects]
-        low, high = np.concatenate([np.transpose([LOW, HIGH]), *limits]).T.copy()
+        low, high = np.concatenate([np.transpose([LOWER, UPPER]), *limits]).T.copy()
         low[B] = sum(self.held_parts().values())
         return low, high
 
     def held(self) -> list[int]:
         """Indices that are never fitted: sizes of switches, and what held parts of b settle."""
         switches = [place.start for effect, place in self.places() if effect.parameter_free]
-        return [*switches, *held_indices(self.held_parts())]
+        # With one part, b moves the share.
+        return [*switches, *([], [SHARE], [B, SHARE])[len(self.held_parts())]]
 
     def held_parts(self) -> dict[str, float]:
         """The parts of b that are held, without those that an effect sets free."""
         free = {effect.frees for effect in self.effects}
         return {part: rate for part, rate in self.parts.items() if part not in free}
-
-    def settled(self, value: FloatArray) -> FloatArray:
-        """The values with what follows from held parts of b."""
-        return with_parts(value, self.held_parts())
 
     def pendulum(self, value: FloatArray) -> Pendulum:
         """Eq. 8 in its forms, and when the first reading was taken."""

@@ -19,13 +19,14 @@ from pendpipe.analysis.fit.goodness import Goodness, combined, judge
 from pendpipe.analysis.fit.result import FitResult, result_of
 from pendpipe.analysis.fit.rounding import best_noise
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
-from pendpipe.analysis.fit.waveform import DRIFT, Seen, Waveform
+from pendpipe.analysis.fit.waveform import DRIFT, Waveform
 from pendpipe.analysis.torque import Apart
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import turning_points_with_jacobian
-from pendpipe.dynamics.eq8 import OFFSET, OMEGA, SHARE, TIME, A, B, C, Restoring
+from pendpipe.dynamics.eq8 import BASELINE, OFFSET, OMEGA, SHARE, TIME, A, B, C, Restoring
+from pendpipe.dynamics.eq8_model import Seen
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import with_error
 from pendpipe.solve import (
@@ -189,7 +190,7 @@ def fitted_waveform(
         samples.time_s[span],
         samples.values[span],
         points.noise_rms_rad,
-        fixed_values.parts,
+        parts=fixed_values.parts,
         restoring=restoring,
         seen=seen,
         length_m=length_m or 1.0,
@@ -280,7 +281,7 @@ def _judged(fitted: Fitted, samples: Samples, points: TurningPoints) -> Goodness
         points.half_cycle + first,
         fitted=free,
         lines=lines,
-        amplitude=points.amplitude_rad * problem.scale(value),
+        amplitude=points.amplitude_rad * problem.amplitude_scale(value),
         step=samples.step,
         floor=1e-15 * largest,
     )
@@ -340,7 +341,7 @@ def waveform_result(
         ends,
         fitted.held,
         points.chosen(inside),
-        problem.model(fitted.value)[0],
+        problem.motion_of(fitted.value)[0],
         goodness=goodness,
         said=said,
         fixed=fixed,
@@ -355,7 +356,8 @@ def waveform_result(
         and (OMEGA in fitted.held or matrix[3, 3] > 0.0),
         drag_form=form,
         zero_drift=drift,
-        motion=problem.model(fitted.value),
+        model=problem.eq8,
+        values=fitted.value[: len(BASELINE)].copy(),
     )
 
 
@@ -384,10 +386,10 @@ def _first_turning_point(fitted: Fitted, start_s: float) -> tuple[tuple[float, f
         Of the seven parameters of the result by ours, shape (7, 9).
     """
     value = fitted.value
-    model, release = fitted.problem.model(value)
+    model, release = fitted.problem.motion_of(value)
     count = fitted.start.before + 1
     turning, by_time, by_angle = turning_points_with_jacobian(model, release, count)
-    change = fitted.problem.change(value)
+    change = fitted.problem.engine_by_values(value)
     late, high = by_time[-1] @ change[:8, :8], by_angle[-1] @ change[:8, :8]
     time, side = float(turning.time_s[-1]), math.copysign(1.0, release.angle_rad)
     side *= -1.0 if fitted.start.before % 2 else 1.0

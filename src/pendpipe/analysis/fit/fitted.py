@@ -14,8 +14,9 @@ from pendpipe.analysis.fit.backbone import Backbone, backbone_of
 from pendpipe.analysis.fit.decrement import Check, Light
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics import Eq8, Release
+from pendpipe.dynamics import Eq8
 from pendpipe.dynamics.eq8 import Restoring
+from pendpipe.dynamics.eq8_model import Eq8Model
 from pendpipe.estimate import Estimate, quality_of_rate
 from pendpipe.levels import REFUTED
 
@@ -132,9 +133,9 @@ class Fitted:
         Of a simple pendulum, where it was given: the other of the two is a number of the fit.
     name
         Of the file that was fitted.
-    motion
-        The waveform's law at its minimum, where b has its parts, and the turning point from which
-        it moves; None where the fit was read from a file.
+    model, values
+        Eq. 8 in its form with its sensor, and its values at the minimum; None where the fit was
+        read from a file, or is none of the readings.
     bent
         Third harmonic that the law does not have (`goodness.Goodness.bent`).
     points, decay
@@ -178,7 +179,8 @@ class Fitted:
     length: Estimate | None = None
     gravity: Estimate | None = None
     name: str = field(default="", compare=False, metadata=_APART)
-    motion: tuple[Eq8, Release] | None = field(default=None, compare=False, metadata=_APART)
+    model: Eq8Model | None = field(default=None, compare=False, metadata=_APART)
+    values: FloatArray | None = field(default=None, compare=False, metadata=_APART)
     bent: FloatArray | None = field(default=None, compare=False, metadata=_APART)
     points: TurningPoints | None = field(default=None, compare=False, metadata=_APART)
     decay: Recording | None = field(default=None, compare=False, metadata=_APART)

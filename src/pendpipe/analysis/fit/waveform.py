@@ -3,51 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Final, Literal
+from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 
 from pendpipe.analysis.fit.rounding import rounded
 from pendpipe.analysis.torque import TOP
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian
-from pendpipe.dynamics.eq8 import (
-    OFFSET,
-    OMEGA,
-    SHARE,
-    SHARE_MEAN,
-    SHARE_SD,
-    START,
-    TIME,
-    A,
-    B,
-    C,
-    Drag,
-    Restoring,
-    share_of,
-)
-from pendpipe.solve import Bounds, Priors, Problem, Quadratic, Summed
+from pendpipe.dynamics.eq8 import BASELINE, START, TIME, A, B, C
+from pendpipe.dynamics.eq8_model import LOWER, SHARES, UPPER, Eq8Model
+from pendpipe.solve import Bounds, Problem, Quadratic, Summed
 
-Seen = Literal["angle", "rate", "position"]
-
-DRIFT: Final = 8
-"""Behind the engine's eight: by how much the zero rises in a second."""
-BOUNDS: Final = Bounds(
-    np.array([0.0, 0.0, 0.0, 0.0, 1e-12, -np.inf, -np.inf, -np.inf, -np.inf]),
-    np.array([np.inf] * 3 + [1.0] + [np.inf] * 5),
-)
-SHARES: Final = Priors(np.array([SHARE]), np.array([SHARE_MEAN]), np.array([SHARE_SD]))
-"""The hysteretic share of b, as normal about its mean: one recording hardly tells it."""
+DRIFT: Final = len(BASELINE)
+"""Behind the model's eight values: by how much the zero rises in a second."""
 _PIECE: Final = 1 << 18
 """Readings whose Jacobian is in memory at a time: 16 MB."""
-_BY_SHARE: Final = 0.5 - 4.0 / 3.0 + math.pi**2 / 8.0
-"""(omega/b)^2 times the relative lengthening of the period by the square of b's hysteretic share
-(`by_points.period_excess`)."""
-_BESIDE: Final = 2e-3
-"""Phase between the two motions that tell the velocity: 1e-13 of it is lost in the sixth power."""
-
 _LEAST: Final = 1e-100
 """Of a loss that is divided by."""
 
@@ -63,7 +34,7 @@ def most_of_each(value: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Waveform:
+class Waveform(Eq8Model):
     """chi^2 of the readings against Eq. 8, with that of the share's prior.
 
     Parameters
@@ -72,61 +43,34 @@ class Waveform:
         The readings, shape (n,).
     noise_rms
         Standard deviation of one.
-    held_parts
-        The parts of b that are held: ``"hysteretic"`` or ``"viscous"`` with its rate (1/s).
     step
         The step of readings whose rounding is not random (see `rounding`); `noise_rms` is
         then that before the rounding. Zero: the readings scatter as `noise_rms` says.
-    restoring, drag
-        The law's restoring torque, and the form of its drag.
-    seen
-        What is read: the angle, its rate, or a position L sin x.
-    length_m
-        L of a position.
     """
 
     time_s: FloatArray
     values: FloatArray
     noise_rms: float
-    held_parts: Mapping[str, float]
     step: float = 0.0
-    restoring: Restoring = "linear"
-    drag: Drag = "energy"
-    seen: Seen = "angle"
-    length_m: float = 1.0
     _residuals: list[tuple[FloatArray, FloatArray]] = field(
         default_factory=list, init=False, repr=False, compare=False
     )
 
-    def model(self, value: FloatArray) -> tuple[Eq8, Release]:
-        """What moves, and from where, for a set of parameters."""
-        a, b, c, share, omega, angle, time, offset = value[:DRIFT].tolist()
-        known = share_of(self.held_parts, b)
-        share = share if known is None else known
-        law = Eq8(omega, a, share * b, (1.0 - share) * b, c, self.restoring, self.drag)
-        return law, Release(time, angle, offset if self.seen == "angle" else 0.0)
-
     @property
     def bounds(self) -> Bounds:
         """Of the nine parameters: the start is before all readings, with sin x below the top."""
-        low, high = BOUNDS.lower.copy(), BOUNDS.upper.copy()
+        low, high = np.append(LOWER, -np.inf), np.append(UPPER, np.inf)
         high[TIME] = self.time_s[0]
         if self.restoring == "sine":
             low[START], high[START] = -TOP, TOP
         return Bounds(low, high)
 
-    def scale(self, value: FloatArray) -> float:
-        """Amplitude of the readings over that of a small angle."""
-        return {"angle": 1.0, "rate": float(value[OMEGA]), "position": self.length_m}[self.seen]
-
     def _late(self, time_s: FloatArray) -> FloatArray:
         """Time since the middle of the readings: what the drift is multiplied by."""
         return np.asarray(time_s - 0.5 * (self.time_s[0] + self.time_s[-1]))
 
-    def _zero(self, value: FloatArray, time_s: FloatArray) -> FloatArray | float:
-        """What the zero adds beyond the engine's offset."""
-        drift = value[DRIFT] * self._late(time_s) if value[DRIFT] != 0.0 else 0.0
-        return drift if self.seen == "angle" else drift + value[OFFSET]
+    def _drifted(self, value: FloatArray, time_s: FloatArray) -> FloatArray | float:
+        return value[DRIFT] * self._late(time_s) if value[DRIFT] != 0.0 else 0.0
 
     def residual(self, value: FloatArray) -> FloatArray:
         """Readings less model, shape (n,)."""
@@ -135,26 +79,24 @@ class Waveform:
         return self._residuals[0][1]
 
     def _residual(self, value: FloatArray) -> FloatArray:
-        model, release = self.model(value)
-        if self.seen == "rate":
+        if self.seen != "rate":
+            found = self.readings(value, self.time_s)
+        else:
+            # A rate takes the derivatives, which fill the memory.
             pieces = range(0, len(self.time_s), _PIECE)
             times = [self.time_s[first : first + _PIECE] for first in pieces]
-            found = np.concatenate([self.read(value, each)[0] for each in times])
-            return np.asarray(self.values - found)
-        # Before it is let go it is held; a search that got there is no minimum, but has a residual.
-        angle = sample(model, release, np.maximum(self.time_s, release.time_s))
-        read = self.length_m * np.sin(angle) if self.seen == "position" else angle
-        return np.asarray(self.values - read - self._zero(value, self.time_s))
+            found = np.concatenate([self.readings(value, each) for each in times])
+        return np.asarray(self.values - found - self._drifted(value, self.time_s))
 
     def _has_motion(self, value: FloatArray) -> bool:
         """Whether there is a motion from before the readings on, and one that they can show."""
         try:
-            model, release = self.model(value)
+            law, release = self.motion_of(value)
         except ValueError:
             return False
-        turns = model.angular_frequency * (self.time_s[-1] - release.time_s) / np.pi
+        turns = law.angular_frequency * (self.time_s[-1] - release.time_s) / np.pi
         # Of more half cycles than two a reading nothing is seen, and they would never end.
-        seen = turns < 2.0 * len(self.values) and bool(np.isfinite(model.stop_rad))
+        seen = turns < 2.0 * len(self.values) and bool(np.isfinite(law.stop_rad))
         return seen and release.time_s <= self.time_s[0]
 
     @property
@@ -179,36 +121,10 @@ class Waveform:
         return float(rounded(residual, 0.5 * self.step, self.noise_rms, *unused))
 
     def read(self, value: FloatArray, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Readings of the law, shape (n,), and their derivatives by the engine's and the drift.
-
-        The motion depends on the time since its release alone, so that its rate is the derivative
-        by the release's time, with the other sign.
-        """
-        model, release = self.model(value)
-        if self.seen == "rate":
-            beside = _BESIDE / model.angular_frequency
-            earlier = replace(release, time_s=release.time_s - beside)
-            later = replace(release, time_s=release.time_s + beside)
-            after, by_after = sample_with_jacobian(model, earlier, time_s, more=1)
-            before, by_before = sample_with_jacobian(model, later, time_s, more=1)
-            jacobian = (by_after - by_before) / (2.0 * beside)
-            # Both means of the rate miss it by its second derivative, one by three times the other.
-            mean = -0.5 * (by_after[:, TIME] + by_before[:, TIME])
-            reading = 1.5 * (after - before) / (2.0 * beside) - 0.5 * mean
-        else:
-            reading, jacobian = sample_with_jacobian(model, release, time_s, more=1)
-        if self.seen == "position":
-            jacobian = jacobian * (self.length_m * np.cos(reading))[:, None]
-            reading = self.length_m * np.sin(reading)
-        jacobian[:, OFFSET], jacobian[:, DRIFT] = 1.0, self._late(time_s)
-        return reading + self._zero(value, time_s), jacobian
-
-    def curved(self, value: FloatArray, step: FloatArray) -> FloatArray:
-        """Return where a step ends: omega makes up for the square of what b's share changes."""
-        end = value + step
-        if step[OMEGA] != 0.0:  # else it is held
-            end[OMEGA] += _BY_SHARE * value[B] ** 2 / value[OMEGA] * step[SHARE] ** 2
-        return end
+        """Readings, shape (n,), and their derivatives by the engine's parameters and the drift."""
+        reading, jacobian = self.readings_with_jacobian(value, time_s, more=1)
+        jacobian[:, DRIFT] = self._late(time_s)
+        return reading + self._drifted(value, time_s), jacobian
 
     def evaluate(self, value: FloatArray) -> Quadratic:
         """chi^2, gradient and normal matrix, summed over pieces of the record."""
@@ -228,7 +144,11 @@ class Waveform:
             normal += jacobian.T @ weighted
         unit = self.noise_rms**-2 if self.step == 0.0 else 1.0
         chi2, slope, normal = unit * chi2, unit * slope, unit * normal
-        change, prior, row = self.change(value), SHARES.residual(value), SHARES.rows(len(value))
+        change, prior, row = (
+            self.engine_by_values(value),
+            SHARES.residual(value),
+            SHARES.rows(len(value)),
+        )
         slope, normal = change.T @ slope, change.T @ normal @ change
         return Quadratic(chi2 + float(prior @ prior), slope + row.T @ prior, normal + row.T @ row)
 
@@ -244,18 +164,3 @@ class Waveform:
         known = of_share.T @ of_share
         normal = scale * (at.normal - known) + known + np.diag(of_losses)
         return Quadratic(scale * at.chi2, scale * at.gradient, normal)
-
-    def parts_of_b(self, share: float) -> tuple[float, float]:
-        """How a change of b goes to its parts: what is held of one leaves it to the other."""
-        if self.held_parts:
-            share = float("viscous" in self.held_parts)
-        return share, 1.0 - share
-
-    def change(self, value: FloatArray) -> FloatArray:
-        """Derivative of the engine's parameters by ours, shape (9, 9)."""
-        by_share = 0.0 if self.held_parts else float(value[B])
-        change = np.zeros((9, 9))
-        change[[0, 3, 4, 5, 6, 7, 8], [A, C, OMEGA, START, TIME, OFFSET, DRIFT]] = 1.0
-        change[1:3, B] = self.parts_of_b(float(value[SHARE]))
-        change[1:3, SHARE] = by_share, -by_share
-        return change

@@ -1,0 +1,181 @@
+"""Eq. 8 and the sensor that reads it: one vector of parameters for the fit and the diagnosis.
+
+Of b = b_h + b_v one part, or both, may be held: then the share, or b as well, is not free.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Final, Literal
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.eq8 import (
+    BASELINE,
+    OFFSET,
+    OMEGA,
+    SHARE,
+    SHARE_MEAN,
+    SHARE_SD,
+    TIME,
+    A,
+    B,
+    C,
+    Drag,
+    Eq8,
+    Release,
+    Restoring,
+    sample,
+    sample_with_jacobian,
+    share_of,
+)
+from pendpipe.solve import Priors
+
+Seen = Literal["angle", "rate", "position"]
+"""What of the motion is read: the angle, its rate, or a position L sin x."""
+HYSTERETIC, VISCOUS = "hysteretic", "viscous"
+LOWER: Final = np.array([0.0, 0.0, 0.0, 0.0, 1e-12, -np.inf, -np.inf, -np.inf])
+UPPER: Final = np.array([np.inf, np.inf, np.inf, 1.0, np.inf, np.inf, np.inf, np.inf])
+"""Least and greatest values, in the order of `BASELINE`."""
+SHARES: Final = Priors(np.array([SHARE]), np.array([SHARE_MEAN]), np.array([SHARE_SD]))
+"""The hysteretic share of b, as normal about its mean: one recording hardly tells it."""
+_BY_SHARE: Final = 0.5 - 4.0 / 3.0 + math.pi**2 / 8.0
+"""(omega/b)^2 times the relative lengthening of the period by the square of b's hysteretic share
+(`torque.period_excess`)."""
+_BESIDE: Final = 2e-3
+"""Phase between the two motions that tell the velocity: 1e-13 of it is lost in the sixth power."""
+
+
+def values_of(law: Eq8, release: Release, offset: float = 0.0) -> FloatArray:
+    """The values of a law that moves from a turning point."""
+    losses = law.quadratic, law.hysteretic + law.viscous, law.coulomb, law.share
+    return np.array([*losses, law.angular_frequency, release.angle_rad, release.time_s, offset])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Eq8Model:
+    """Eq. 8 in one of its forms, and what of its motion is read.
+
+    Its values are the eight of `BASELINE`; what a user of it adds follows behind.
+
+    Parameters
+    ----------
+    restoring, drag
+        The forms of the torque and of the quadratic loss.
+    seen
+        What is read: the angle, its rate (rad/s), or a position L sin x.
+    length_m
+        L of a position.
+    parts
+        The parts of b that are held (``"hysteretic"``, ``"viscous"``), with their rates in 1/s.
+    """
+
+    restoring: Restoring = "linear"
+    drag: Drag = "energy"
+    seen: Seen = "angle"
+    length_m: float = 1.0
+    parts: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def eq8(self) -> Eq8Model:
+        """The law and sensor alone, of a model with more."""
+        return Eq8Model(**{each.name: getattr(self, each.name) for each in fields(Eq8Model)})
+
+    def held_parts(self) -> Mapping[str, float]:
+        """The parts of b that are held."""
+        return self.parts
+
+    def settled(self, value: FloatArray) -> FloatArray:
+        """The values with the share (and, if both parts of b are held, the b) that these make."""
+        parts = self.held_parts()
+        if not parts:
+            return value
+        value, least = value.copy(), sum(parts.values())
+        value[B] = least if len(parts) == 2 else max(float(value[B]), least)
+        share = share_of(parts, float(value[B]))
+        value[SHARE] = value[SHARE] if share is None else share
+        return value
+
+    def share_by_b(self, value: FloatArray) -> float:
+        """Derivative of the share by b where one part of b is held; else b has it for itself."""
+        parts = self.held_parts()
+        if len(parts) != 1 or value[B] <= 0.0:
+            return 0.0
+        return float(-value[SHARE] if HYSTERETIC in parts else 1.0 - value[SHARE]) / float(value[B])
+
+    def motion_of(self, value: FloatArray) -> tuple[Eq8, Release]:
+        """What moves, and from where."""
+        a, b, c, share, omega, angle, time, offset = value[: len(BASELINE)].tolist()
+        known = share_of(self.held_parts(), b)
+        share = share if known is None else known
+        law = Eq8(omega, a, share * b, (1.0 - share) * b, c, self.restoring, self.drag)
+        return law, Release(time, angle, offset if self.seen == "angle" else 0.0)
+
+    def amplitude_scale(self, value: FloatArray) -> float:
+        """Amplitude of the readings over that of a small angle."""
+        return {"angle": 1.0, "rate": float(value[OMEGA]), "position": self.length_m}[self.seen]
+
+    def readings(self, value: FloatArray, time_s: FloatArray) -> FloatArray:
+        """What the sensor reads, shape (n,)."""
+        if self.seen == "rate":
+            return self.readings_with_jacobian(value, time_s)[0]
+        law, release = self.motion_of(value)
+        # Before it is let go it is held; a search that got there is no minimum, but has a residual.
+        angle = sample(law, release, np.maximum(time_s, release.time_s))
+        if self.seen == "position":
+            return np.asarray(self.length_m * np.sin(angle) + value[OFFSET])
+        return angle
+
+    def readings_with_jacobian(
+        self, value: FloatArray, time_s: FloatArray, *, more: int = 0
+    ) -> tuple[FloatArray, FloatArray]:
+        """Readings, shape (n,), and their derivatives by the engine's parameters, (n, 8 + more).
+
+        The motion depends on the time since its release alone, so that its rate is the derivative
+        by the release's time, with the other sign.
+        """
+        law, release = self.motion_of(value)
+        if self.seen == "rate":
+            beside = _BESIDE / law.angular_frequency
+            earlier = replace(release, time_s=release.time_s - beside)
+            later = replace(release, time_s=release.time_s + beside)
+            after, by_after = sample_with_jacobian(law, earlier, time_s, more=more)
+            before, by_before = sample_with_jacobian(law, later, time_s, more=more)
+            jacobian = (by_after - by_before) / (2.0 * beside)
+            # Both means of the rate miss it by its second derivative, one by three times the other.
+            mean = -0.5 * (by_after[:, TIME] + by_before[:, TIME])
+            reading = 1.5 * (after - before) / (2.0 * beside) - 0.5 * mean
+        else:
+            reading, jacobian = sample_with_jacobian(law, release, time_s, more=more)
+        if self.seen == "position":
+            jacobian = jacobian * (self.length_m * np.cos(reading))[:, None]
+            reading = self.length_m * np.sin(reading)
+        jacobian[:, OFFSET] = 1.0
+        return reading if self.seen == "angle" else reading + value[OFFSET], jacobian
+
+    def curved(self, value: FloatArray, step: FloatArray) -> FloatArray:
+        """Return where a step ends: omega makes up for the square of what b's share changes."""
+        end = value + step
+        if step[OMEGA] != 0.0:  # else it is held
+            end[OMEGA] += _BY_SHARE * value[B] ** 2 / value[OMEGA] * step[SHARE] ** 2
+        return end
+
+    def parts_of_b(self, share: float) -> tuple[float, float]:
+        """How a change of b goes to its parts: what is held of one leaves it to the other."""
+        if self.parts:
+            share = float(VISCOUS in self.parts)
+        return share, 1.0 - share
+
+    def engine_by_values(self, value: FloatArray) -> FloatArray:
+        """Derivative of the engine's parameters by ours, and by any behind: square."""
+        by_share = 0.0 if self.parts else float(value[B])
+        change = np.zeros((len(value), len(value)))
+        change[0, A] = change[3, C] = 1.0
+        behind = np.arange(OMEGA, len(value))
+        change[behind, behind] = 1.0
+        change[1:3, B] = self.parts_of_b(float(value[SHARE]))
+        change[1:3, SHARE] = by_share, -by_share
+        return change
