@@ -17,7 +17,7 @@ from pendpipe.diagnosis.found import Finding
 from pendpipe.diagnosis.noise import Noise, white_noise
 from pendpipe.diagnosis.noise_estimate import estimate_noise
 from pendpipe.diagnosis.refine import Fit, refine
-from pendpipe.effects.baseline import OMEGA
+from pendpipe.dynamics.eq8 import OMEGA
 from pendpipe.effects.model import Model
 from pendpipe.readings import find_step
 

@@ -20,8 +20,7 @@ from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.unwrapped import alignment, anchored, unwrapped
 from pendpipe.dynamics import Eq8, Release, sample
-from pendpipe.dynamics.eq8 import Restoring
-from pendpipe.effects.baseline import OMEGA, START, TIME, B
+from pendpipe.dynamics.eq8 import OMEGA, START, TIME, B, Restoring
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
 from pendpipe.estimate import Estimate

@@ -23,7 +23,7 @@ from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.rivals import NO_SCAN
 from pendpipe.diagnosis.run import diagnose_recording
-from pendpipe.effects.baseline import OMEGA
+from pendpipe.dynamics.eq8 import OMEGA
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording

@@ -21,8 +21,7 @@ from pendpipe.diagnosis.forensics.sampling_times import gap_note
 from pendpipe.diagnosis.hypothesis import first_noise
 from pendpipe.diagnosis.location import beat_of
 from pendpipe.diagnosis.refine import Fit, fit_in_growing_window
-from pendpipe.dynamics.eq8 import Restoring
-from pendpipe.effects.baseline import A, C
+from pendpipe.dynamics.eq8 import A, C, Restoring
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.formats import read
 from pendpipe.readings import motion_of

@@ -33,18 +33,8 @@ from pendpipe.diagnosis.rivals import (
     useful_chi2,
 )
 from pendpipe.diagnosis.values import effect_parameters
-from pendpipe.effects.baseline import (
-    HYSTERETIC,
-    OFFSET,
-    OMEGA,
-    SHARE,
-    START,
-    TIME,
-    VISCOUS,
-    A,
-    B,
-    C,
-)
+from pendpipe.dynamics.eq8 import OFFSET, OMEGA, SHARE, START, TIME, A, B, C
+from pendpipe.dynamics.eq8_model import HYSTERETIC, VISCOUS
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.effects.model import Evaluated, Model

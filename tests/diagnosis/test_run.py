@@ -14,10 +14,9 @@ from pendpipe.diagnosis.cycles import SmallSwings, small_swings
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.run import diagnose_decay, diagnose_recording
 from pendpipe.dynamics import Eq8, Release, sample
-from pendpipe.dynamics.eq8 import Restoring
-from pendpipe.effects.baseline import A, B, C, pendulum_of
+from pendpipe.dynamics.eq8 import A, B, C, Restoring
 from pendpipe.effects.catalogue import by_identifier
-from pendpipe.effects.model import Model
+from pendpipe.effects.model import Model, pendulum_of
 from pendpipe.errors import InputError
 from pendpipe.recording import Recording
 from pendpipe.simulation.model import read_model, simulate

@@ -11,7 +11,7 @@ import pytest
 import pendpipe as pp
 from pendpipe.cli import main
 from pendpipe.diagnosis.result import Diagnosis
-from pendpipe.effects.baseline import A as QUADRATIC, B as LINEAR, C as FRICTION
+from pendpipe.dynamics.eq8 import A as QUADRATIC, B as LINEAR, C as FRICTION
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model, jacobian
 from pendpipe.effects.stack import Differs, Stack

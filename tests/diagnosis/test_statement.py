@@ -22,7 +22,7 @@ from pendpipe.diagnosis.rivals import near_harmonic_by_chance
 from pendpipe.diagnosis.summary import Change, Summary, numbers_of
 from pendpipe.diagnosis.values import constants_of, curve_values
 from pendpipe.diagnosis.weighing import curve_of
-from pendpipe.effects.baseline import OMEGA, TIME, A, B, C
+from pendpipe.dynamics.eq8 import OMEGA, TIME, A, B, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import (
     CURVES,

@@ -33,8 +33,8 @@ from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.rivals import Rival, Scale, class_width, evidence, probabilities
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.weighing import Weighed, fault_named, weigh, with_likelier
+from pendpipe.dynamics.eq8 import B
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import B
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import CURVES
 from pendpipe.effects.model import Model

@@ -10,12 +10,12 @@ import pytest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.commands.small import catalogue_manual as manual
+from pendpipe.dynamics.eq8 import OFFSET, OMEGA, START, TIME, A, B, C
 from pendpipe.effects import Effect, catalogue
-from pendpipe.effects.baseline import OFFSET, OMEGA, START, TIME, A, B, C, pendulum_of
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
 from pendpipe.effects.effect import Span, enters
-from pendpipe.effects.model import Model, jacobian, responses
+from pendpipe.effects.model import Model, jacobian, pendulum_of, responses
 from pendpipe.errors import InputError
 
 from .pendulums import VALUES, baseline, times

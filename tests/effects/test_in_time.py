@@ -12,10 +12,11 @@ from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import refine
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.baseline import HYSTERETIC, SHARE, TIME as TIME_S, VISCOUS, B, pendulum_of
+from pendpipe.dynamics.eq8 import SHARE, TIME as TIME_S, B
+from pendpipe.dynamics.eq8_model import HYSTERETIC, VISCOUS
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.effect import STRAIGHT_S, Span
-from pendpipe.effects.model import Model
+from pendpipe.effects.model import Model, pendulum_of
 from pendpipe.effects.two_modes import two_modes
 from pendpipe.recording import Recording
 

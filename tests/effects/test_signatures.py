@@ -9,13 +9,12 @@ import pytest
 from scipy.special import ellipj
 
 from pendpipe.arrays import FloatArray
-from pendpipe.effects.baseline import pendulum_of
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.catalogue.reading import SoftClipping
 from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN
 from pendpipe.effects.curves import usual_loss_rate
 from pendpipe.effects.effect import STRAIGHT_S, Span
-from pendpipe.effects.model import Model
+from pendpipe.effects.model import Model, pendulum_of
 from pendpipe.physics import STANDARD_GRAVITY_M_PER_S2
 
 from .lock_in import Lines, lock_in, windows

@@ -19,23 +19,11 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data, gather
 from pendpipe.diagnosis.unwrapped import anchored
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.dynamics.eq8_model import Eq8Model, Seen
-from pendpipe.effects.baseline import (
-    BASELINE,
-    OFFSET,
-    OMEGA,
-    SHARE,
-    START,
-    TIME,
-    A,
-    B,
-    C,
-    pendulum_of,
-    values_of,
-)
+from pendpipe.dynamics.eq8 import BASELINE, OFFSET, OMEGA, SHARE, START, TIME, A, B, C
+from pendpipe.dynamics.eq8_model import Eq8Model, Seen, values_of
 from pendpipe.effects.catalogue import CATALOGUE
 from pendpipe.effects.effect import Start
-from pendpipe.effects.model import Evaluated, Model
+from pendpipe.effects.model import Evaluated, Model, pendulum_of
 from pendpipe.physics.decay import time_at
 
 _FEWEST_READINGS: Final = 24

@@ -24,8 +24,8 @@ from pendpipe.diagnosis.projection import local_p_values, tangent_basis, whitene
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.spectrum import Band, ToneScan, tone_scan
+from pendpipe.dynamics.eq8 import OMEGA
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue.in_time import plane_band_hz
 from pendpipe.effects.curves import Curve
 from pendpipe.effects.effect import Span

@@ -22,9 +22,8 @@ from pendpipe.diagnosis.noise_estimate import estimate_noise
 from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR, Fit, best_fit, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import INCOMPLETE, Remainder, remainder_of
-from pendpipe.dynamics.eq8 import Restoring
+from pendpipe.dynamics.eq8 import OMEGA, Restoring
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.catalogue.reading import SoftClipping
 from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN, circular_error
 from pendpipe.effects.curves import CURVES, Curve

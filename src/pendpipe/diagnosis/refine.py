@@ -14,8 +14,8 @@ import numpy as np
 from pendpipe.arrays import FloatArray, scaled_qr
 from pendpipe.diagnosis.unwrapped import unwrapped
 from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.dynamics.eq8 import OMEGA, SHARE, B
 from pendpipe.dynamics.eq8_model import SHARES
-from pendpipe.effects.baseline import OMEGA, SHARE, B
 from pendpipe.effects.model import Evaluated, Model, jacobian
 from pendpipe.solve import Bounds, NoStartError, Problem, Search, Squares
 

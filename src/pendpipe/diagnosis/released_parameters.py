@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import PLACES, SHARE, B
-from pendpipe.effects.baseline import HYSTERETIC, VISCOUS
+from pendpipe.dynamics.eq8_model import HYSTERETIC, VISCOUS
 from pendpipe.effects.effect import Effect
 
 if TYPE_CHECKING:

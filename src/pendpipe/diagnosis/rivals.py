@@ -26,8 +26,8 @@ from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.spectrum import OFF_HARMONIC
 from pendpipe.diagnosis.values import last_in
 from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.dynamics.eq8 import OMEGA
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import OMEGA
 from pendpipe.effects.curves import Curve
 from pendpipe.estimate import Estimate
 from pendpipe.solve import Search

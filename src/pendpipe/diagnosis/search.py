@@ -34,7 +34,7 @@ from pendpipe.diagnosis.rivals import NO_SCAN, Rival, Scale
 from pendpipe.diagnosis.summary import BASELINES
 from pendpipe.diagnosis.weighing import Weighed, weigh, with_likelier
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.effects.baseline import C
+from pendpipe.dynamics.eq8 import C
 
 LESS_FRICTION: Final = (1.0, 0.9, 0.7, 0.4)
 """Fractions of the Coulomb friction to try if the baseline stops before the last reading."""

@@ -45,9 +45,8 @@ from pendpipe.diagnosis.summary import DOUBTFUL
 from pendpipe.diagnosis.values import constants_of
 from pendpipe.diagnosis.weighing import Weighed, effect_named
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.dynamics.eq8 import Restoring
+from pendpipe.dynamics.eq8 import BASELINE, C, Restoring
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import BASELINE, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model, jacobian
 from pendpipe.effects.stack import MAY_DIFFER, Differs, Stack

@@ -14,8 +14,8 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.dynamics.any_law import Motion, NoMotionError
+from pendpipe.dynamics.eq8 import OFFSET, OMEGA, TIME, A, B, C
 from pendpipe.effects import Effect
-from pendpipe.effects.baseline import OFFSET, OMEGA, TIME, A, B, C
 from pendpipe.effects.curves import Curve, damping_curve
 from pendpipe.effects.model import Evaluated
 from pendpipe.estimate import Estimate, over

@@ -16,7 +16,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics.any_law import NoMotionError, Sampled
-from pendpipe.effects.baseline import BASELINE, OFFSET, OMEGA, START, TIME, A, B, C
+from pendpipe.dynamics.eq8 import BASELINE, OFFSET, OMEGA, START, TIME, A, B, C
 from pendpipe.effects.effect import Effect, Parameter, Span
 from pendpipe.effects.model import Evaluated, Model, Part
 

@@ -24,7 +24,7 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.diagnosis.result import Diagnosis
-from pendpipe.effects.baseline import OMEGA
+from pendpipe.dynamics.eq8 import OMEGA
 from pendpipe.effects.model import Evaluated
 from pendpipe.figures.data import NothingToDrawError
 from pendpipe.figures.style import (

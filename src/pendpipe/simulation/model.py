@@ -19,8 +19,8 @@ from pendpipe.configuration.load import as_input_error
 from pendpipe.configuration.models import NotNegative, Positive, Section, Sensor
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.any_law import Motion, NoMotionError, sample_pieces
-from pendpipe.dynamics.eq8 import Drag, Restoring
-from pendpipe.effects.baseline import TIME, values_of
+from pendpipe.dynamics.eq8 import TIME, Drag, Restoring
+from pendpipe.dynamics.eq8_model import values_of
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.effect import Effect, Parameter
 from pendpipe.effects.model import Model as EffectsModel
