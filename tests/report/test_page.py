@@ -19,7 +19,7 @@ from pendpipe.figures.data import error, number, typical_record
 from pendpipe.files import without_folders
 from pendpipe.quantities import with_error
 from pendpipe.recording import Recording
-from pendpipe.report.charts import Axis, extremes, line, pack
+from pendpipe.report.charts import Axis, Chart, areas, extremes, line, pack
 from pendpipe.report.page import BUDGET_BYTES, inline_svg, render
 from pendpipe.report.tables import (
     STATES,
@@ -614,3 +614,18 @@ def test_an_axis_has_round_numbers_where_they_lie(
 def test_a_gap_interrupts_the_line() -> None:
     path = line(np.arange(5.0), np.array([1.0, 2.0, np.nan, 3.0, 4.0]))
     assert path == "M0.0,1.0L1.0,2.0M3.0,3.0L4.0,4.0"
+
+
+def test_a_band_is_a_closed_area_for_each_stretch_without_a_gap() -> None:
+    low = np.array([0.0, 0.0, np.nan, 1.0, 1.0, 1.0])
+    found = list(areas(np.arange(6.0), low, low + 2.0))
+    assert found == [
+        "M0.0,2.0L1.0,2.0L1.0,0.0L0.0,0.0Z",
+        "M3.0,3.0L4.0,3.0L5.0,3.0L5.0,1.0L4.0,1.0L3.0,1.0Z",
+    ]
+
+
+def test_a_chart_takes_the_bytes_of_its_table_and_of_its_paths() -> None:
+    axis = Axis(0.0, 1.0, 0.0, 1.0, "")
+    empty = Chart(axis, axis, []).size
+    assert Chart(axis, axis, [("law", "M0,0"), ("dots", "M1,1L2")], csv="a,b").size == empty + 13

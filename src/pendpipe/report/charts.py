@@ -130,7 +130,7 @@ def waveform(recording: Recording, decay: Decay, volts_per_radian: float) -> Cha
     buckets = min(RIGHT - LEFT, periods) if periods > _FEW_PERIODS else RIGHT - LEFT
     middle, least, most = extremes(time, values, buckets)
     if periods > _FEW_PERIODS:
-        readings = "".join(_areas(x(middle), y(least), y(most)))
+        readings = "".join(areas(x(middle), y(least), y(most)))
     else:
         readings = line(np.repeat(x(middle), 2), y(np.column_stack([least, most]).ravel()))
     paths = [("band" if periods > _FEW_PERIODS else "thin", readings)]
@@ -146,7 +146,7 @@ def waveform(recording: Recording, decay: Decay, volts_per_radian: float) -> Cha
     return Chart(x, y, paths, shaded, packed=pack(recording, factor * scale))
 
 
-def _areas(x: FloatArray, low: FloatArray, high: FloatArray) -> Iterator[str]:
+def areas(x: FloatArray, low: FloatArray, high: FloatArray) -> Iterator[str]:
     """The band between two curves, a closed path for each stretch without a gap."""
     filled = np.flatnonzero(np.isfinite(low))
     for run in np.split(filled, np.flatnonzero(np.diff(filled) > 1) + 1):
