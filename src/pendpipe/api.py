@@ -388,7 +388,7 @@ def diagnose(
         found = diagnose_recording(motion, length=length, **common)
     else:
         decay = motion.between(points.start_s, points.stop_s)
-        found = diagnose_decay(decay, points, whole=motion, **common)
+        found = diagnose_decay(decay, points, length=length, whole=motion, **common)
     return replace(found, drawn_by=_FIGURES_OF_A_DIAGNOSIS)
 
 

@@ -300,6 +300,9 @@ def test_a_length_by_another_g_is_no_cubic_torque() -> None:
     recording = Recording(time, position + noise, "displacement_m")
     assert pp.diagnose(recording, restoring="sine").verdict == "consistent"
     assert pp.diagnose(recording, length_m=0.6).verdict == "consistent"
+    # Its turning points may have been measured before: a campaign's stages do so.
+    points = pp.turning_points(recording)
+    assert pp.diagnose(recording, points=points, restoring="sine").verdict == "consistent"
 
 
 @pytest.mark.parametrize("amplitude", [0.15, 0.35, 1.5])
@@ -323,9 +326,10 @@ def test_a_rate_is_that_of_a_pendulum(amplitude: float) -> None:
         low, high = result[name].bounds95
         assert low - result[name].sd <= value <= high + result[name].sd
     assert result.noise_rms_rad == pytest.approx(1e-3, rel=0.05)
-    # Its length tells g as that of an angle does.
+    # Its length tells g as that of an angle does: within three standard deviations of the truth.
     g = pendulum_of(replace(result, length=Estimate(0.4, 0.0, "m")))["g"].value
     assert g == pytest.approx(0.4 * (2.0 * math.pi * result["frequency"].value) ** 2, rel=1e-12)
+    assert g == pytest.approx(0.4 * OMEGA**2, rel=12.0 * result["frequency"].sd * math.pi / OMEGA)
 
 
 def test_g_of_a_linear_fit_is_that_of_small_swings() -> None:

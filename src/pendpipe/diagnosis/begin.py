@@ -88,7 +88,8 @@ def begin(
         start = start_values(angles, held, law.restoring, samples=samples)
         value, at_release = start.value[: len(BASELINE)], start.before == 0
     if beats:
-        # The turning points of a beat tell nothing of either mode.
+        # The turning points of a beat tell nothing of either mode, nor of the torque.
+        law = replace(law, restoring="linear")
         readings = samples.time_s, samples.values, 2.0 * math.pi / float(value[OMEGA])
         starts = tuple(each for effect in CATALOGUE if (each := effect.start(*readings)))
         value = values_of(starts[0].law, starts[0].release, float(value[OFFSET]))

@@ -117,9 +117,6 @@ def diagnose_recording(
     progress("finding the free decay and its turning points")
     motion = motion_of(recording, place=place)
     points, part = measure_recording(motion, place, length_m=length.value if length else None)
-    if restoring == "sine" and part.unit == "m":
-        angles, part = measure_recording(_angle_of(part, points, length, place), place)
-        points = replace(angles, cuts=points.cuts)
     refuse_if(
         points.mostly_cut,
         place,
@@ -137,6 +134,7 @@ def diagnose_recording(
         seed=seed,
         level=level,
         restoring=restoring,
+        length=length,
         place=place,
         provenance=provenance,
         progress=progress,
@@ -175,6 +173,7 @@ def diagnose_decay(
     seed: int = 0,
     level: float = FALSE_ALARM,
     restoring: Restoring | None = None,
+    length: Estimate | None = None,
     place: str | Path = "recording",
     provenance: Mapping[str, Any] | None = None,
     progress: Progress = silent,
@@ -186,7 +185,7 @@ def diagnose_decay(
     ----------
     part, points
         The free decay, and its turning points.
-    baseline, fixed, seed, level, restoring, place, provenance, progress
+    baseline, fixed, seed, level, restoring, length, place, provenance, progress
         As for `diagnose_recording`.
     whole
         The recording that the decay was cut from; only its time stamps are used.
@@ -196,8 +195,14 @@ def diagnose_decay(
     InputError
         If a parameter can't be held, or the decay can't be analysed.
     """
+    from pendpipe.analysis.free_decay import measure_recording
+
     fixed = fixed or {}
     check_fixed(fixed, baseline)
+    if restoring == "sine" and part.unit == "m":
+        # The search reads angles, whoever has measured the position.
+        angles, part = measure_recording(_angle_of(part, points, length, place), place)
+        points = replace(angles, cuts=points.cuts)
     samples = with_true_step(points.readings or prepare(part, place))
     progress("fitting Eq. 8 to all readings")
     fit = _fit_of(part, points, baseline, fixed, restoring, place)
