@@ -82,7 +82,7 @@ def test_air_that_is_off_leads_in_baily_s_rods() -> None:
     assert 14.6 * np.exp(size) == pytest.approx(8.68, rel=0.05)
 
 
-def test_less_water_than_half_the_sphere_swings_along_in_dubuat_s() -> None:
+def test_in_dubuat_s_water_a_smaller_viscosity_explains_a_part() -> None:
     """The constant explains a part; of the small spheres n is lower than any viscosity allows."""
     stokes, today, small = ask(PUBLISHED / "dubuat-1786")[1]
     assert first(stokes)[0] == "viscosity-temperature"
@@ -147,6 +147,10 @@ def test_errors_that_nobody_tells_are_the_scatter_of_repeated_rows() -> None:
     [
         ("body", "cube", "line 2: the body 'cube' is unknown; give sphere or rod or printed"),
         ("fluid", "mercury", "line 2: the fluid 'mercury' is unknown; give air"),
+        ("radius_m", "", "line 2: radius_m is no positive number; a rod needs it"),
+        ("period_s", "-2", "line 2: period_s is no positive number; a rod needs it"),
+        ("n", "", "line 2: n is no positive number; a rod needs it"),
+        ("sd", "0", "line 2: sd is no positive number; leave it empty where none is printed"),
         ("n", "2,29", "line 2: could not convert string to float: '2,29'; give a number"),
     ],
 )
@@ -160,6 +164,16 @@ def test_a_cell_that_is_wrong_is_refused_in_a_line(
     with pytest.raises(InputError) as refused:
         read_table(path, {"air": 1e-5}, 0.1)
     assert str(refused.value) == f"{path}, {said}"
+
+
+def test_a_folder_without_a_table_is_refused_in_a_line(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="there is no such configuration"):
+        ask(tmp_path)
+    (tmp_path / "published.yaml").write_bytes(
+        (PUBLISHED / "baily-1832-rods/published.yaml").read_bytes()
+    )
+    with pytest.raises(InputError, match="there is no such table"):
+        ask(tmp_path)
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ or else what the best cause leaves.
 """
 
 import csv
+import io
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -38,8 +39,9 @@ from pendpipe.campaign.fit import (
 from pendpipe.configuration.load import as_input_error, read_configuration
 from pendpipe.configuration.models import Section
 from pendpipe.effects.effect import Parameter
-from pendpipe.errors import InputError
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import LISTED, chi_square_p_value
+from pendpipe.files import read_text
 from pendpipe.levels import FALSE_ALARM
 from pendpipe.quantities import with_error
 
@@ -59,6 +61,12 @@ COLUMNS: Final = (
 )
 """``more`` is what a vessel was held to add to n, ``then`` what was calculated at the time."""
 _WORDS: Final = ("row", "group", "body", "fluid")
+_ASKED: Final = {
+    "sphere": ("radius_m", "period_s"),
+    "rod": ("radius_m", "period_s"),
+    "printed": ("then",),
+}
+"""What the theory of each body needs."""
 FEWEST_REPLICATES: Final = 3
 """Degrees of freedom from which a scatter is known to 40 %, better than a choice of the cause."""
 NORMAL_MEDIAN: Final = 0.6745
@@ -68,7 +76,7 @@ DIGIT: Final = 1e-3 / math.sqrt(12.0)
 
 
 class Row(NamedTuple):
-    """One printed number. The names are those of `COLUMNS`; SI units, NaN where nothing is told."""
+    """One printed number, its name and the other `COLUMNS`; NaN where nothing is told."""
 
     record: str
     group: str
@@ -299,10 +307,10 @@ def read_table(path: Path, viscosity_m2_per_s: dict[str, float], relative_sd: fl
     InputError
         A column is missing, a cell is no number, or a body or fluid is unknown.
     """
-    with path.open(encoding="utf-8", newline="") as stream:
-        lines = list(csv.DictReader(stream, delimiter="\t"))
-    if not lines or (lost := [name for name in COLUMNS if name not in lines[0]]):
-        what = f"it lacks the column {lost[0]}" if lines else "it has no row"
+    text = read_text(path, "see docs/published.md", absent="table")
+    lines = list(csv.DictReader(io.StringIO(text, newline=""), delimiter="\t"))
+    if not lines or (missing := [name for name in COLUMNS if name not in lines[0]]):
+        what = f"it lacks the column {missing[0]}" if lines else "it has no row"
         raise InputError(path, what, f"give the columns {', '.join(COLUMNS)}")
     rows = []
     for number, line in enumerate(lines, 2):
@@ -312,12 +320,15 @@ def read_table(path: Path, viscosity_m2_per_s: dict[str, float], relative_sd: fl
             ]
         except ValueError as fault:
             raise InputError(f"{path}, line {number}", f"{fault}", "give a number") from None
-        row = Row._make(cells)
-        known = {"body": BODIES, "fluid": tuple(viscosity_m2_per_s)}
-        for name, names in known.items():
-            if getattr(row, name) not in names:
-                unknown = f"the {name} {getattr(row, name)!r} is unknown"
-                raise InputError(f"{path}, line {number}", unknown, f"give {' or '.join(names)}")
+        row, where = Row._make(cells), f"{path}, line {number}"
+        for name, names in {"body": BODIES, "fluid": tuple(viscosity_m2_per_s)}.items():
+            unknown = f"the {name} {getattr(row, name)!r} is unknown"
+            refuse_if(getattr(row, name) not in names, where, unknown, f"give {' or '.join(names)}")
+        for name in ("n", *_ASKED[row.body]):
+            lost = not 0.0 < getattr(row, name) < math.inf
+            refuse_if(lost, where, f"{name} is no positive number", f"a {row.body} needs it")
+        wrong = not (math.isnan(row.sd) or 0.0 < row.sd < math.inf)
+        refuse_if(wrong, where, "sd is no positive number", "leave it empty where none is printed")
         rows.append(row)
     return Table(tuple(rows), viscosity_m2_per_s, relative_sd)
 
@@ -385,13 +396,17 @@ def next_rows(found: Found) -> list[tuple[str, float]]:
 
 
 def diagnose_table(table: Table, level: float = FALSE_ALARM) -> tuple[CampaignSearch, Errors]:
-    """Search for what the theory lacks, as in a campaign of records."""
-    left_out: tuple[str, ...] | None = None
-    again: tuple[str, ...] = ()
-    while again != left_out and len(again) < MOST_LEFT_OUT:
-        left_out, errors = again, errors_of(table, again)
+    """Search for what the theory lacks, as in a campaign of records.
+
+    Where errors come from the rows, those that disagree with the rest are kept out of them.
+    """
+    left_out: tuple[str, ...] = ()
+    for _ in range(MOST_LEFT_OUT):
+        errors = errors_of(table, left_out)
         found = search(table, measured_with(table, errors.sd), level)
-        again = tuple(far.record for far in found.left_out)
+        before, left_out = left_out, tuple(far.record for far in found.left_out)
+        if left_out == before:
+            break
     return found, errors
 
 

@@ -33,7 +33,7 @@ def _panel(one: "Asked") -> Panel:
             curve(place, left, GREEN, "", marker="s", markersize=3.5, label="with the cause")
         )
     then = n - table.column("then")
-    marks.append(curve(place, then, GREY, "", marker="_", markersize=7, label="then"))
+    marks.append(curve(place, then, GREY, "", marker="_", markersize=7, label="at the time"))
     middles = [place[[row.group == group for row in table.runs]].mean() for group in groups]
     marks.append(
         methodcaller(
