@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +14,8 @@ from pendpipe.configuration.jobs import prepare_environment
 from pendpipe.configuration.load import load_campaign, read_configuration, read_records
 from pendpipe.project import SNAKEFILE
 from pendpipe.stages.chunks import SMALL, STAGES, batch_for, split
+
+from .plans import jobs_in, planned, snakemake
 
 # The workflow runs in any folder: begun by `init`, run by `campaign`, or used as a module.
 
@@ -37,8 +38,7 @@ def call(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
 
 def jobs(done: subprocess.CompletedProcess[str]) -> dict[str, int]:
     assert done.returncode == 0, done.stdout + done.stderr
-    table = re.findall(r"^(\w+) +(\d+)$", done.stdout + done.stderr, flags=re.MULTILINE)
-    return {name: int(count) for name, count in table}
+    return jobs_in(done.stdout + done.stderr)
 
 
 @pytest.fixture
@@ -279,18 +279,9 @@ def test_a_row_says_how_its_file_is_read(begun: Path, monkeypatch: pytest.Monkey
 # `snakemake -n` on a clean checkout: no port, no recordings, the campaign's jobs counted.
 
 
-def dry_run(
-    results: Path, *arguments: str, override: str = "seed=1"
-) -> subprocess.CompletedProcess[str]:
-    """Ask Snakemake what it would do, with an empty folder of results."""
-    command = [sys.executable, "-m", "snakemake", "-n", "--nolock", *arguments]
-    return subprocess.run(
-        [*command, "--config", f"results={results.as_posix()}", override],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def empty(results: Path, override: str = "seed=1") -> list[str]:
+    """The plan of this repository's campaign with an empty folder of results."""
+    return ["--config", f"results={results.as_posix()}", override]
 
 
 def chunks(table: Path) -> int:
@@ -300,8 +291,7 @@ def chunks(table: Path) -> int:
 
 
 def test_the_default_campaign_has_a_job_a_chunk_in_each_of_its_stages(tmp_path: Path) -> None:
-    done = dry_run(tmp_path / "results")
-    counted = jobs(done)
+    counted = planned(ROOT, *empty(tmp_path / "results"))
     total = counted.pop("total")
     jobs_of_stage = chunks(ROOT / "config/records.tsv")
     assert jobs_of_stage >= 2, "a job a core"
@@ -330,7 +320,8 @@ def test_a_source_of_any_name_stops_no_other_record(tmp_path: Path) -> None:
         f"title: Odd\nrecords: {table.as_posix()}\nresults: x\napparatus: null\n"
         "calibration: null\nsimulated: null\ntypical_record: null\n"
     )
-    counted = jobs(dry_run(tmp_path / "results", "--configfile", str(configuration)))
+    words = ("--configfile", str(configuration))
+    counted = planned(ROOT, *words, *empty(tmp_path / "results"))
     assert counted["acquire"] == chunks(table)
     assert counted["diagnose_pendulum"] == 1
 
@@ -338,7 +329,7 @@ def test_a_source_of_any_name_stops_no_other_record(tmp_path: Path) -> None:
 def test_recordings_of_others_need_no_file_for_a_plan(tmp_path: Path) -> None:
     """On a clean checkout there is no ../shared; the records are then refused, one by one."""
     words = ("--configfile", str(ROOT / "benchmarks/shared_recordings.yaml"))
-    counted = jobs(dry_run(tmp_path / "results", *words))
+    counted = planned(ROOT, *words, *empty(tmp_path / "results"))
     assert counted["acquire"] == chunks(ROOT / "benchmarks/shared_recordings.tsv")
 
 
@@ -347,16 +338,16 @@ def test_a_record_of_many_has_its_files_when_they_are_asked_for(tmp_path: Path) 
     rows = "".join(f"r{number}\tdecay.csv\n" for number in range(SMALL + 1))
     (tmp_path / "records.tsv").write_text(f"record\tsource\n{rows}", encoding="utf-8")
     (tmp_path / "config.yaml").write_text("title: Many\nrecords: records.tsv\n", encoding="utf-8")
-    words = ("snakemake", "-n", "--snakefile", str(SNAKEFILE), "--configfile", "config.yaml")
-    everything = jobs(call(tmp_path, *words))
+    words = ("--snakefile", str(SNAKEFILE), "--configfile", "config.yaml")
+    everything = planned(tmp_path, *words)
     assert not any("files" in name for name in everything)
-    one = jobs(call(tmp_path, *words, "--", "results/r7/fit.json"))
+    one = planned(tmp_path, *words, "--", "results/r7/fit.json")
     assert one == dict.fromkeys((*RECORDS_STAGES[:4], "record_file"), 1) | {"total": 5}
 
 
 def test_a_faulty_configuration_stops_before_any_job(tmp_path: Path) -> None:
-    done = dry_run(tmp_path / "results", override="simulated={drag_facto: 1}")
-    assert done.returncode != 0
-    lines = (done.stdout + done.stderr).splitlines()
-    assert any("did you mean 'drag_factor'?" in line for line in lines), lines
-    assert not any("Traceback" in line for line in lines)
+    words = empty(tmp_path / "results", override="simulated={drag_facto: 1}")
+    status, said = snakemake(ROOT, "-n", *words)
+    assert status
+    assert any("did you mean 'drag_factor'?" in line for line in said.splitlines()), said
+    assert "Traceback" not in said

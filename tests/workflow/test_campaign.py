@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,14 @@ import yaml
 from snakemake.utils import update_config
 
 import pendpipe
+from pendpipe import provenance
 from pendpipe.cli import main
 from pendpipe.configuration.load import read_records
 from pendpipe.files import check_output
 from pendpipe.project import SNAKEFILE
 from pendpipe.stages.chunks import split
+
+from .plans import jobs_in, snakemake
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
@@ -28,12 +31,6 @@ LIBRARY = Path(pendpipe.__file__).parents[1]
 """What is tested, wherever it is installed."""
 SMALL = ROOT / "tests/workflow/small"
 NO_DECAY = Path("tests/workflow/small/no-decay.csv")
-
-
-def jobs_in(said: str) -> dict[str, int]:
-    """The table of jobs of Snakemake's plan."""
-    table = re.findall(r"^(\w+) +(\d+)$", said, flags=re.MULTILINE)
-    return {name: int(count) for name, count in table}
 
 
 class Campaign:
@@ -56,13 +53,13 @@ class Campaign:
         self.configuration.parent.mkdir()
         self.configuration.write_text(yaml.safe_dump(content), encoding="utf-8")
 
-    def snakemake(self, *arguments: str, library: Path | None = None) -> str:
-        """Run Snakemake, with another copy of the library if one is given; it must end well."""
+    def run(self) -> str:
+        """Run Snakemake, which must end well."""
         command = [sys.executable, "-m", "snakemake", "--cores", "2", "--snakefile", str(SNAKEFILE)]
         done = subprocess.run(
-            [*command, *arguments],
+            command,
             cwd=self.folder,
-            env=os.environ | {"PYTHONPATH": str(library or LIBRARY)},
+            env=os.environ | {"PYTHONPATH": str(LIBRARY)},
             capture_output=True,
             text=True,
             check=False,
@@ -70,9 +67,15 @@ class Campaign:
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout + done.stderr
 
-    def planned(self, *arguments: str, library: Path | None = None) -> dict[str, int]:
+    def ask(self, *arguments: str) -> str:
+        """What Snakemake says without a job."""
+        status, said = snakemake(self.folder, "--snakefile", str(SNAKEFILE), *arguments)
+        assert status == 0, said
+        return said
+
+    def planned(self, *arguments: str) -> dict[str, int]:
         """Count the jobs that Snakemake would run."""
-        return jobs_in(self.snakemake("-n", *arguments, library=library))
+        return jobs_in(self.ask("-n", "--nolock", *arguments))
 
     @property
     def chunks(self) -> int:
@@ -89,14 +92,21 @@ class Campaign:
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     """The small campaign, run once."""
     campaign = Campaign(tmp_path_factory.mktemp("campaign"))
-    campaign.snakemake()
+    campaign.run()
     return campaign
 
 
-def copied_library(folder: Path) -> Path:
-    """A copy of the library, for a run of its own."""
-    shutil.copytree(LIBRARY / "pendpipe", folder / "src/pendpipe")
-    return folder / "src"
+@pytest.fixture
+def library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A copy of the library, whose source the rules are said to run."""
+    copy = shutil.copytree(provenance.PACKAGE, tmp_path / "src/pendpipe")
+    caches = (provenance._files, provenance._imports)
+    monkeypatch.setattr(provenance, "PACKAGE", copy)
+    for each in caches:
+        each.cache_clear()
+    yield copy
+    for each in caches:
+        each.cache_clear()
 
 
 def pull(number: dict[str, float], truth: float) -> float:
@@ -282,18 +292,17 @@ def test_a_campaign_of_refused_records_ends_with_its_figures_places(
 
 
 def test_an_added_row_and_a_changed_library_rerun_what_they_concern(
-    campaign: Campaign, tmp_path: Path
+    campaign: Campaign, library: Path
 ) -> None:
     """A row its chunk and the campaign's jobs; a change of the fit all fits and what follows."""
-    library = copied_library(tmp_path)
-    with (library / "pendpipe/analysis/fit/by_waveform.py").open("a") as source:
+    with (library / "analysis/fit/by_waveform.py").open("a") as source:
         source.write("# changed\n")
     before = campaign.records.read_text(encoding="utf-8")
     row = "water-high-3\tsimulated\twater\thigh\thigh-3\t\t\t\t\t20.0\n"
     unsplit = campaign.chunks
     campaign.records.write_text(before + row, encoding="utf-8")
     try:
-        planned, chunks = campaign.planned(library=library), campaign.chunks
+        planned, chunks = campaign.planned(), campaign.chunks
     finally:
         campaign.records.write_text(before, encoding="utf-8")
     for stage in ("acquire", "calibrate", "turning_points"):
@@ -319,7 +328,7 @@ def damage(path: Path, change: Callable[[bytes], bytes]) -> None:
 
 
 def test_damaged_results_are_named_and_made_again_and_nothing_else_is(
-    campaign: Campaign, tmp_path: Path
+    campaign: Campaign, library: Path
 ) -> None:
     """Torn, emptied, lost, altered with their old times: the next run ends as the first."""
     damages: dict[str, Callable[[bytes], bytes]] = {
@@ -337,11 +346,11 @@ def test_damaged_results_are_named_and_made_again_and_nothing_else_is(
         damage(campaign.results / name, change)
     for name in lost:
         (campaign.results / name).unlink()
-    planned = campaign.snakemake("-n")
+    planned = campaign.ask("-n")
     assert not list(campaign.results.rglob("*.damaged-*")), "a dry run moves nothing"
     assert jobs_in(planned)["fit"] == 1
     assert not {"acquire", "diagnose"} & jobs_in(planned).keys()
-    ran = campaign.snakemake()
+    ran = campaign.run()
     for name in damages:
         assert f"{campaign.results.name}/{name}: " in planned
         assert f"{campaign.results.name}/{name}: " in ran
@@ -351,7 +360,7 @@ def test_damaged_results_are_named_and_made_again_and_nothing_else_is(
         assert (campaign.results / name).read_bytes() == content or name.endswith(".zip")
     assert (source.read_bytes(), source.stat().st_mtime_ns) == source_before
     # A copy of the library is the same library.
-    said = campaign.snakemake("-n", library=copied_library(tmp_path))
+    said = campaign.ask("-n")
     assert not jobs_in(said), said
 
 
@@ -394,7 +403,7 @@ def test_what_is_asked_for_is_planned_and_no_more(campaign: Campaign, tmp_path: 
 
 def test_snakemake_knows_every_file_of_a_finished_campaign(campaign: Campaign) -> None:
     """But its configuration, and damaged results that were kept."""
-    listed = campaign.snakemake("--list-untracked").splitlines()
+    listed = campaign.ask("--list-untracked").splitlines()
     unknown = [line for line in listed if line.startswith(f"{campaign.results.name}/")]
     assert [name for name in unknown if ".damaged-" not in name] == []
     assert "config/config.yaml" in listed, "so it does list"
