@@ -13,6 +13,7 @@ from pendpipe.physics import (
     QualityFactors,
     amplitude,
     amplitude_and_gradient,
+    amplitude_halfway,
     amplitude_of_largest_quality_factor,
     amplitude_rate,
     damping_coefficient,
@@ -32,6 +33,7 @@ from pendpipe.physics import (
     stopping_time,
     structural_quality_factor,
     time_at,
+    time_by_powers,
     universal_acceleration,
     viscous_acceleration,
     viscous_frequency_shift,
@@ -632,3 +634,19 @@ def test_no_hysteresis_and_nothing_else() -> None:
     assert without_hysteresis(136.0, np.inf) == pytest.approx(136.0, rel=1e-14)
     assert without_hysteresis(136.0, 136.0) == np.inf
     assert without_hysteresis(136.0, 130.0) < 0.0
+
+
+@given(
+    a=st.floats(0.0, 1.0), b=st.floats(0.01, 1.0), c=st.floats(0.0, 1.0), fall=st.floats(1e-3, 0.99)
+)
+def test_powers_0_1_and_2_are_eq_13(a: float, b: float, c: float, fall: float) -> None:
+    found = time_by_powers(fall, 1.0, {0.0: c, 1.0: b, 2.0: a})
+    assert found == pytest.approx(float(time_at(fall, 1.0, a, b, c)), rel=1e-6)
+
+
+@given(power=st.floats(0.0, 3.0), fall=st.floats(0.1, 0.99))
+def test_of_one_power_y_to_one_less_it_changes_steadily(power: float, fall: float) -> None:
+    assume(abs(power - 1.0) > 1e-2)
+    middle = amplitude_halfway(fall, 1.0, {power: 0.3})
+    expected = (0.5 * (1.0 + fall ** (1.0 - power))) ** (1.0 / (1.0 - power))
+    assert middle == pytest.approx(expected, rel=1e-9)

@@ -1,19 +1,14 @@
-"""A campaign as a table of published numbers: bodies in a fluid, and what was printed of them.
+"""A campaign as a table of published numbers: its errors, what is missing, and the answer.
 
-A row is a body (sphere, rod, or one whose theory was printed), a fluid, a period and n, by which
-buoyancy must be multiplied to be the whole effect of the fluid on the period: ``n = 1 + k``, k the
-added mass over the displaced mass (Stokes 1850; `pendpipe.physics`). The rows enter the joint fit
-and the search of campaigns where records have frequency and b. What a table can't know of itself
-it says: where no errors are printed, they are the scatter of rows that the law holds to be equal,
-or else what the best cause leaves.
+The rows (`pendpipe.campaign.table`) are fitted and searched by the code of a campaign of records.
+What a table can't know of itself it says: where no errors are printed, they are the scatter of rows
+that the law holds to be equal, or else what the best cause leaves.
 """
 
-import csv
-import io
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
+from itertools import compress
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -21,52 +16,18 @@ import numpy as np
 from pydantic import Field, ValidationError
 from scipy.special import ndtri, stdtr
 
-from pendpipe import physics
 from pendpipe.answer import Answer, percent, printed
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.campaign.design import Nuisance
 from pendpipe.campaign.diagnose import MOST_LEFT_OUT, CampaignSearch, Found, off, search
-from pendpipe.campaign.effects import CATALOGUE, CampaignEffect
-from pendpipe.campaign.fit import (
-    Candidate,
-    JointFit,
-    Measured,
-    candidates,
-    chi2_near,
-    joint_fit,
-    predict,
-)
+from pendpipe.campaign.fit import JointFit, Measured, candidates, chi2_near, joint_fit, predict
+from pendpipe.campaign.table import QUANTITIES, Row, Table, read_table
 from pendpipe.configuration.load import as_input_error, read_configuration
 from pendpipe.configuration.models import Section
-from pendpipe.effects.effect import Parameter
-from pendpipe.errors import InputError, refuse_if
+from pendpipe.errors import refuse_if
 from pendpipe.estimate import LISTED, chi_square_p_value
-from pendpipe.files import read_text
 from pendpipe.levels import FALSE_ALARM
-from pendpipe.quantities import with_error
+from pendpipe.quantities import compact, with_error
 
-BODIES: Final = ("sphere", "rod", "printed")
-"""Of a printed one the theory is what the table says was calculated: its size was not printed."""
-COLUMNS: Final = (
-    "row",
-    "group",
-    "body",
-    "radius_m",
-    "fluid",
-    "period_s",
-    "n",
-    "sd",
-    "more",
-    "then",
-)
-"""``more`` is what a vessel was held to add to n, ``then`` what was calculated at the time."""
-_WORDS: Final = ("row", "group", "body", "fluid")
-_ASKED: Final = {
-    "sphere": ("radius_m", "period_s"),
-    "rod": ("radius_m", "period_s"),
-    "printed": ("then",),
-}
-"""What the theory of each body needs."""
 FEWEST_REPLICATES: Final = 3
 """Degrees of freedom from which a scatter is known to 40 %, better than a choice of the cause."""
 NORMAL_MEDIAN: Final = 0.6745
@@ -75,286 +36,41 @@ DIGIT: Final = 1e-3 / math.sqrt(12.0)
 """Standard deviation of a number that is printed to the third decimal: the least error of a row."""
 
 
-class Row(NamedTuple):
-    """One printed number, its name and the other `COLUMNS`; NaN where nothing is told."""
-
-    record: str
-    group: str
-    body: str
-    radius_m: float
-    fluid: str
-    period_s: float
-    n: float
-    sd: float
-    more: float
-    then: float
-
-
-@dataclass(frozen=True)
-class Table:
-    """What was printed, and the fluids as they are told.
-
-    Parameters
-    ----------
-    runs
-        The rows.
-    viscosity_m2_per_s
-        Kinematic viscosity of each fluid.
-    relative_sd
-        Its relative standard deviation, for all fluids.
-    """
-
-    runs: tuple[Row, ...]
-    viscosity_m2_per_s: dict[str, float]
-    relative_sd: float
-
-    @cached_property
-    def nuisances(self) -> tuple[Nuisance, ...]:
-        """The fluids' viscosities."""
-        return tuple(
-            Nuisance(f"viscosity of {name}", "", self.relative_sd)
-            for name in dict.fromkeys(row.fluid for row in self.runs)
-        )
-
-    @property
-    def has_prior(self) -> BoolArray:
-        """Which nuisances have a prior; shape (nuisances,)."""
-        return np.ones(len(self.nuisances), dtype=bool)
-
-    def column(self, name: str) -> FloatArray:
-        """Return one column of the rows."""
-        return np.array([getattr(row, name) for row in self.runs], dtype=np.float64)
-
-    def of(self, what: str, name: str) -> FloatArray:
-        """Return 1 for the rows that have a name in a column, else 0."""
-        return np.array([float(getattr(row, what) == name) for row in self.runs])
-
-    def without(self, what: str, names: Sequence[str]) -> "Table":
-        """Return the table without the rows that have one of the names in a column."""
-        return replace(self, runs=tuple(r for r in self.runs if getattr(r, what) not in names))
-
-    @cached_property
-    def replicates(self) -> tuple[float, int]:
-        """Scatter of rows that the law holds to be equal, and its degrees of freedom."""
-        alike: dict[tuple[Any, ...], list[float]] = {}
-        for row in self.runs:
-            alike.setdefault((row.body, row.radius_m, row.fluid, row.period_s), []).append(row.n)
-        squares = sum(np.var(each) * len(each) for each in alike.values())
-        freedom = len(self.runs) - len(alike)
-        return (math.sqrt(squares / freedom) if freedom else math.nan), freedom
-
-
-class Terms(NamedTuple):
-    """n of every row and its parts; arrays of shape (..., rows).
-
-    Parameters
-    ----------
-    radius_m, viscosity_m2_per_s
-        Of the rows' bodies and fluids.
-    potential
-        k without viscosity.
-    history
-        By what the viscous part of k is multiplied.
-    added
-        What is added to n.
-    """
-
-    radius_m: FloatArray
-    viscosity_m2_per_s: FloatArray
-    potential: FloatArray
-    history: FloatArray
-    added: FloatArray
-
-
-@predict.register(Table)
-def _predict(design: Table, added: Sequence[Candidate], unknowns: FloatArray) -> FloatArray:
-    """Return n, shape (..., rows, 1)."""
-    count = len(design.nuisances)
-    told = np.array([design.viscosity_m2_per_s[row.fluid] for row in design.runs])
-    names = [each.name.removeprefix("viscosity of ") for each in design.nuisances]
-    moved = sum(
-        unknowns[..., at, None] * design.relative_sd * design.of("fluid", name)
-        for at, name in enumerate(names)
-    )
-    sphere, rod = (design.of("body", each) for each in BODIES[:2])
-    then = np.where(sphere + rod > 0.0, 0.0, design.column("then") - 1.0)
-    none = np.zeros_like(told + moved)
-    terms = Terms(
-        none + design.column("radius_m"),
-        told * (1.0 + moved),
-        none + physics.POTENTIAL_FLOW_ADDED_MASS * sphere + rod + np.nan_to_num(then),
-        none + sphere + rod,
-        none + np.nan_to_num(design.column("more")),
-    )
-    for at, one in enumerate(added):
-        size = unknowns[..., count + at, None] * one.effect.expected
-        terms = one.effect.put(terms, size, design, one.shape)
-    around = 2.0 * np.pi / design.column("period_s"), terms.viscosity_m2_per_s, 1.0
-    radius = np.where(sphere + rod > 0.0, terms.radius_m, 1.0)
-    with np.errstate(invalid="ignore"):  # a printed theory has no size and no period
-        free = np.where(
-            rod > 0.0,
-            physics.cylinder_added_mass_coefficient(radius, *around) - 1.0,
-            physics.added_mass_coefficient(radius, *around) - physics.POTENTIAL_FLOW_ADDED_MASS,
-        )
-    viscous = terms.history * np.where(sphere + rod > 0.0, free, 0.0)
-    return np.asarray((1.0 + terms.potential + viscous + terms.added)[..., None])
-
-
-def _viscosity(terms: Terms, size: FloatArray) -> Terms:
-    return terms._replace(viscosity_m2_per_s=terms.viscosity_m2_per_s * np.exp(size))
-
-
-def _history(terms: Terms, size: FloatArray) -> Terms:
-    return terms._replace(history=terms.history * (1.0 + size))
-
-
-def _added_mass(terms: Terms, size: FloatArray) -> Terms:
-    return terms._replace(added=terms.added + size)
-
-
-def _walls(terms: Terms, size: FloatArray, design: Table) -> Terms:
-    """A closed vessel about each body: a sphere's or a rod's potential flow in a concentric one."""
-    sphere, rod = (design.of("body", each) for each in BODIES[:2])
-    share = terms.radius_m / np.nanmax(np.where(sphere + rod > 0.0, terms.radius_m, np.nan))
-    near = np.where(sphere > 0.0, size * share**3, np.where(rod > 0.0, size * share**2, 0.0))
-    return terms._replace(added=terms.added + (1.5 * sphere + 2.0 * rod) * near / (1.0 - near))
-
-
-def _size(terms: Terms, size: FloatArray, design: Table, shape: float) -> Terms:
-    there = design.column("radius_m") == shape
-    return terms._replace(radius_m=terms.radius_m * (1.0 + size * there))
-
-
-def _group(terms: Terms, size: FloatArray, design: Table, shape: str) -> Terms:
-    return terms._replace(added=terms.added + size * design.of("group", shape))
-
-
-def _sizes(design: Table) -> Sequence[Any]:
-    """The radii of bodies whose theory can be computed, where there are several."""
-    found = sorted({row.radius_m for row in design.runs if math.isfinite(row.radius_m)})
-    return found if len(found) > 1 else ()
-
-
-def _groups(design: Table) -> Sequence[Any]:
-    found = list(dict.fromkeys(row.group for row in design.runs))
-    return found if len(found) > 1 else ()
-
-
-def _as(
-    identifier: str, parameter: Parameter, expected: float, acts: Callable[..., Any], name: str = ""
-) -> CampaignEffect:
-    """An effect of campaigns that a table shares."""
-    return replace(
-        CATALOGUE[identifier],
-        name=name or CATALOGUE[identifier].name,
-        parameter=parameter,
-        expected=expected,
-        on="terms",
-        acts=acts,
-        shapes=(None,),
-    )
-
-
-OF_TABLES: Final[tuple[CampaignEffect, ...]] = (
-    # Stokes's constants were off by factors of 1.4 and 1.7.
-    _as(
-        "viscosity-temperature",
-        Parameter("log_ratio", "", -3.0, 3.0),
-        0.5,
-        _viscosity,
-        "another viscosity than is told",
-    ),
-    _as("history-term", Parameter("C_H - 1", "", -1.0, 3.0), 0.1, _history),
-    _as("added-mass", Parameter("added_mass", "", -0.5, 20.0), 0.1, _added_mass),
-    _as("wall-confinement", Parameter("closeness", "", 0.0, 0.5), 0.1, _walls),
-    CampaignEffect(
-        "body-size",
-        "another size of one body",
-        r"a \to (1 + \epsilon)\, a",
-        Parameter("excess", "", -0.5, 1.0),
-        0.05,
-        "terms",
-        _size,
-        _sizes,
-    ),
-    CampaignEffect(
-        "group-offset",
-        "a group of rows that was taken otherwise",
-        r"n \to n + \Delta n \text{ in one group}",
-        Parameter("offset", "", -10.0, 10.0),
-        0.1,
-        "terms",
-        _group,
-        _groups,
-    ),
-)
-"""What a table of n may lack, by the identifiers of campaigns where the cause is the same."""
-
-
-@candidates.register(Table)
-def _candidates(design: Table) -> list[Candidate]:
-    sized = any(row.body in BODIES[:2] for row in design.runs)
-    shared = OF_TABLES if sized else OF_TABLES[2:3] + OF_TABLES[5:]
-    return [Candidate(each, shape) for each in shared for shape in each.shapes_in(design)]
-
-
-def read_table(path: Path, viscosity_m2_per_s: dict[str, float], relative_sd: float) -> Table:
-    """Read a table of tab-separated columns (`COLUMNS`); an empty cell is told by nobody.
-
-    Raises
-    ------
-    InputError
-        A column is missing, a cell is no number, or a body or fluid is unknown.
-    """
-    text = read_text(path, "see docs/published.md", absent="table")
-    lines = list(csv.DictReader(io.StringIO(text, newline=""), delimiter="\t"))
-    if not lines or (missing := [name for name in COLUMNS if name not in lines[0]]):
-        what = f"it lacks the column {missing[0]}" if lines else "it has no row"
-        raise InputError(path, what, f"give the columns {', '.join(COLUMNS)}")
-    rows = []
-    for number, line in enumerate(lines, 2):
-        try:
-            cells = [
-                line[name] if name in _WORDS else float(line[name] or "nan") for name in COLUMNS
-            ]
-        except ValueError as fault:
-            raise InputError(f"{path}, line {number}", f"{fault}", "give a number") from None
-        row, where = Row._make(cells), f"{path}, line {number}"
-        for name, names in {"body": BODIES, "fluid": tuple(viscosity_m2_per_s)}.items():
-            unknown = f"the {name} {getattr(row, name)!r} is unknown"
-            refuse_if(getattr(row, name) not in names, where, unknown, f"give {' or '.join(names)}")
-        for name in ("n", *_ASKED[row.body]):
-            lost = not 0.0 < getattr(row, name) < math.inf
-            refuse_if(lost, where, f"{name} is no positive number", f"a {row.body} needs it")
-        wrong = not (math.isnan(row.sd) or 0.0 < row.sd < math.inf)
-        refuse_if(wrong, where, "sd is no positive number", "leave it empty where none is printed")
-        rows.append(row)
-    return Table(tuple(rows), viscosity_m2_per_s, relative_sd)
-
-
 class Errors(NamedTuple):
-    """Standard deviation of each row, and where it is from."""
+    """Standard deviations of each row as it is compared.
+
+    Parameters
+    ----------
+    sd
+        By which chance is judged.
+    left
+        By which sizes are known, once a cause has been found.
+    origin
+        Where they are from.
+    """
 
     sd: FloatArray
+    left: FloatArray
     origin: str
 
 
 def errors_of(table: Table, left_out: Sequence[str] = ()) -> Errors:
     """Return the errors that are told; else those of replicates; else what the best cause leaves.
 
-    Rows that are left out don't count. The last is known from the rows alone: its size is such that
+    Rows that are left out don't count. Of the last, known from the rows alone, so much is made that
     the best cause is worth as much by a normal distribution as Student's t makes it.
     """
-    told = table.column("sd")
+    told = table.told_sd
     table = table.without("record", left_out)
-    scatter, freedom = table.replicates
+    left, freedom = table.replicates
     origin = f"the scatter of rows that should be equal ({freedom} degrees of freedom)"
     if np.isfinite(told).all():
-        return Errors(told, "as told")
+        return Errors(told, told, "as told")
+    scatter = left
     if freedom < FEWEST_REPLICATES:
-        origin = "what the best cause leaves, by Student's t: none is told, and no row repeated"
-        plain, many = measured_with(table, np.ones(len(table.runs))), len(table.runs) - 1
+        origin = "what the best cause leaves: none is told, no row repeated; chance by Student's t"
+        plain = table.measured_with(np.ones(len(table.runs)))
+        many = max(len(table.runs) - 1 - int(np.sum(~table.has_prior)), 1)
         none, best = (
             min(_scatter(joint_fit(table, plain, one)) for one in causes)
             for causes in ([()], [[one] for one in candidates(table)])
@@ -362,7 +78,9 @@ def errors_of(table: Table, left_out: Sequence[str] = ()) -> Errors:
         student = math.sqrt(many * max((none / best) ** 2 - 1.0, 0.0))
         normal = -float(ndtri(stdtr(many, -student)))
         scatter = best * student / normal if normal > 0.0 else best
-    return Errors(np.where(np.isfinite(told), told, max(scatter, DIGIT)), origin)
+        left = best * math.sqrt(len(table.runs) / many)
+    sd, left_sd = (np.where(np.isfinite(told), told, max(each, DIGIT)) for each in (scatter, left))
+    return Errors(sd, left_sd, origin)
 
 
 def _scatter(fit: JointFit) -> float:
@@ -370,14 +88,16 @@ def _scatter(fit: JointFit) -> float:
     return float(np.median(np.abs(fit.residuals[: len(fit.data.values)]))) / NORMAL_MEDIAN
 
 
-def measured_with(table: Table, sd: FloatArray) -> Measured:
-    """Return the rows' n with their errors, for the joint fit."""
-    return Measured(table.column("n")[:, None], 1.0 / sd[:, None, None])
-
-
+FEW_ROWS: Final = 8
+"""A table of so few rows is printed row by row, a longer one by groups."""
+COARSE: Final = 0.5
+"""Of a logarithm: a larger one is told as a factor."""
+OF_RADIUS: Final = ("body-size", "wall-confinement")
+"""Causes whose shape is a radius; that of the others is an arc."""
 CHANGES: Final[dict[str, Callable[[Row], Row]]] = {
     "the same at a quarter of the period": lambda row: row._replace(period_s=row.period_s / 4.0),
     "bodies of a third of the size": lambda row: row._replace(radius_m=row.radius_m / 3.0),
+    "arcs of a quarter": lambda row: row._replace(arc_m=row.arc_m / 4.0, to_m=row.to_m / 4.0),
     "the same rows once more": lambda row: row,
 }
 """Rows that might be measured next."""
@@ -403,42 +123,82 @@ def diagnose_table(table: Table, level: float = FALSE_ALARM) -> tuple[CampaignSe
     left_out: tuple[str, ...] = ()
     for _ in range(MOST_LEFT_OUT):
         errors = errors_of(table, left_out)
-        found = search(table, measured_with(table, errors.sd), level)
+        found = search(table, table.measured_with(errors.sd), level)
         before, left_out = left_out, tuple(far.record for far in found.left_out)
         if left_out == before:
             break
-    return found, errors
+    # Leaders and rivals stand with the errors by which their sizes are known.
+    data = found.baseline.design.measured_with(errors.left[_kept(table, found)])
+    known = [
+        replace(
+            one,
+            leader=_with(one.leader, data),
+            rivals=tuple((_with(rival, data), share) for rival, share in one.rivals),
+        )
+        for one in found.found
+    ]
+    return replace(found, found=tuple(known)), errors
 
 
-def answer_of_table(table: Table, found: CampaignSearch, errors: Errors) -> Answer:
+def _kept(table: Table, found: CampaignSearch) -> list[int]:
+    away = {far.record for far in found.left_out}
+    return [at for at, row in enumerate(table.runs) if row.record not in away]
+
+
+def _with(fit: JointFit, data: Measured) -> JointFit:
+    return joint_fit(fit.design, data, fit.added, fit.unknowns)
+
+
+def answer_of_table(found: CampaignSearch, errors: Errors) -> Answer:
     """Make the answer: whether theory and observation agree, what may be missing, what remains."""
+    table = found.baseline.design if found.whole is None else found.whole.baseline.design
     agree = "do not agree" if found.missing else "agree"
     left = chi_square_p_value(found.improved.chi2, found.improved.degrees_of_freedom)
-    told = _n(table, found.baseline, np.zeros(len(table.nuisances)))
-    before, after = (
-        float(np.sqrt(np.mean((n - table.column("n")) ** 2)))
-        for n in (told, _n(table, found.improved))
-    )
     causes = [row for one in found.found for row in _rows(one)]
     silent = found.missing and not causes and not found.left_out
+    unchecked = int(table.of("verified", "no").sum())
     rows = [
-        ("fluids", ", ".join(_fluids(table))),
-        ("errors", f"{np.median(errors.sd):.2g}: {errors.origin}"),
+        ("fluids", ", ".join(_fluids(table)) * any(row.body != "printed" for row in table.runs)),
+        ("not to judge by", f"{unchecked} rows, of which the digits are unsure" * bool(unchecked)),
+        ("errors", f"{_parts(table, float(np.median(errors.left)))}: {errors.origin}"),
         ("off the others", ", ".join(map(off, found.left_out))),
         ("causes", "none of the catalogue stands out" if silent else ""),
         *causes,
-        ("misfit", f"{before:.3g} rms in n" + (f", {after:.3g} with it" if causes else "")),
+        ("misfit", ", ".join(_misfits(table, found))),
         ("left", f"more than these explain ({printed(left)})" if left < FALSE_ALARM else ""),
     ]
     head = f"the {len(table.runs)} rows {agree} with theory (global {printed(found.p_value)})"
     return Answer((head,), tuple(row for row in rows if row[1]))
 
 
-def _n(table: Table, fit: JointFit, inputs: FloatArray | None = None) -> FloatArray:
-    """Return n of all rows by a fit's causes, with other inputs than the fitted ones."""
-    count = len(table.nuisances)
-    moved = fit.unknowns[:count] if inputs is None else inputs
-    return predict(table, fit.added, np.concatenate([moved, fit.unknowns[count:]]))[:, 0]
+def _parts(table: Table, size: float, names: Sequence[str] = ()) -> str:
+    """Print a size on the scale that is compared: of a logarithm in per cent, or as a factor."""
+    quantity = QUANTITIES[[*names, table.runs[0].quantity][0]]
+    if not quantity.log:
+        return compact(size, quantity.unit)
+    return f"{100.0 * size:.2g} %" if size < COARSE else f"a factor of {math.exp(size):.2g}"
+
+
+def _misfits(table: Table, found: CampaignSearch) -> list[str]:
+    """Say what theory leaves of each quantity as it is told, and what with what was found."""
+    said = []
+    values = table.scaled(table.column("value"))
+    fits = [numbers_of(table, found.baseline, told=True), numbers_of(table, found.improved)]
+    for name in dict.fromkeys(row.quantity for row in table.runs):
+        own = table.of("quantity", name) > 0.0
+        sizes = [np.sqrt(np.mean((table.scaled(fit) - values)[own] ** 2)) for fit in fits]
+        before, after = (_parts(table, float(size), [name]) for size in sizes)
+        said.append(f"{before} rms in {name}" + (f", {after} with it" if found.found else ""))
+    return said
+
+
+def numbers_of(table: Table, fit: JointFit, *, told: bool = False) -> FloatArray:
+    """Return the numbers of a table's rows by a fit, or as theory has them with inputs as told."""
+    fitted = zip(fit.design.nuisances, fit.unknowns, strict=False)
+    moved = {each.name: value for each, value in fitted if not (told and math.isfinite(each.sd))}
+    inputs = [moved.get(each.name, 0.0) for each in table.nuisances]
+    sizes = fit.unknowns[len(fit.design.nuisances) :]
+    return table.printed(predict(table, fit.added, np.array([*inputs, *sizes]))[:, 0])
 
 
 def _fluids(table: Table, factor: float = 1.0) -> list[str]:
@@ -451,7 +211,8 @@ def _rows(one: Found) -> list[tuple[str, str]]:
     last, size, shape = one.leader.last, one.leader.size(), one.leader.added[-1].shape
     said = f"{last.parameter.name.replace('_', ' ')} {size}"
     if isinstance(shape, float):
-        said = f"of radius {1e3 * shape:.3g} mm, {said}"
+        where = "of radius" if last.identifier in OF_RADIUS else "of the linear loss at an arc of"
+        said = f"{said} {where} {compact(shape, 'm')}"
     elif shape is not None:
         said = f"{shape}, {said}"
     if last.identifier == "viscosity-temperature":
@@ -474,6 +235,7 @@ class Case(Section):
     viscosity_m2_per_s: dict[str, float] = Field(description="kinematic viscosity of each fluid")
     relative_sd: float = Field(gt=0.0, description="its relative standard deviation")
     without: list[str] = Field([], description="groups of rows that do not count")
+    unverified: bool = Field(False, description="whether rows of unsure digits count")
 
 
 class Published(Section):
@@ -484,8 +246,14 @@ class Published(Section):
     cases: list[Case] = Field(min_length=1, description="the questions")
 
 
+def counts(case: Case, table: Table) -> BoolArray:
+    """Which rows count: those that were observed, and of sure digits unless all are asked for."""
+    sure = table.of("verified", "no") < 1.0
+    return np.isfinite(table.column("value")) & (sure | case.unverified)
+
+
 class Asked(NamedTuple):
-    """A case with its answer."""
+    """A case with its answer; the table holds the rows that don't count as well, errors do not."""
 
     case: Case
     table: Table
@@ -495,13 +263,13 @@ class Asked(NamedTuple):
 
     @property
     def told(self) -> FloatArray:
-        """Return n as theory has it with the inputs that are told."""
-        return _n(self.table, self.found.baseline, np.zeros(len(self.table.nuisances)))
+        """Return the numbers as theory has them with the inputs that are told."""
+        return numbers_of(self.table, self.found.baseline, told=True)
 
     @property
     def best(self) -> FloatArray:
-        """Return n with what was found."""
-        return _n(self.table, self.found.improved)
+        """Return the numbers with what was found."""
+        return numbers_of(self.table, self.found.improved)
 
     def as_json(self) -> dict[str, Any]:
         """Return the case: rows, causes with their probabilities, what is left."""
@@ -534,23 +302,32 @@ class Asked(NamedTuple):
         }
 
 
+def named_by(table: Table) -> str:
+    """Return the column by whose names a table is printed and drawn."""
+    return "record" if len(table.runs) <= FEW_ROWS else "group"
+
+
 def by_group(asked: Sequence[Asked]) -> list[tuple[str, ...]]:
     """Return the means of each group: observed, calculated then, and by each case; heads first."""
     whole = max((one.table for one in asked), key=lambda table: len(table.runs))
-    heads = ("group", "rows", "observed", "then", *(one.case.title for one in asked))
-    rows = [heads]
-    for group in dict.fromkeys(row.group for row in whole.runs):
-        numbers = [
-            table.of("group", group) @ n / max(table.of("group", group).sum(), 1.0)
-            for table, n in (
-                (whole, whole.column("n")),
-                (whole, whole.column("then")),
-                *((one.table, one.told) for one in asked),
-            )
-        ]
-        count = f"{whole.of('group', group).sum():.0f}"
-        rows.append((group, count, *(f"{value:.3f}" if value else "" for value in numbers)))
-    return rows
+    cases = [(one.table, one.told) for one in asked]
+    numbers = [(whole, whole.column("value")), (whole, whole.column("then")), *cases]
+    what = named_by(whole)
+    heads = (what.replace("record", "row"), "rows", "quantity", "observed", "then")
+    rows = [(*heads, *(one.case.title for one in asked))]
+    for name, quantity in dict.fromkeys((getattr(row, what), row.quantity) for row in whole.runs):
+        means, count = [], 0
+        for table, each in numbers:
+            own = (table.of(what, name) * table.of("quantity", quantity)) > 0.0
+            mean = each[own].mean() if own.any() else math.nan
+            count = count or int(own.sum())
+            # An exponential decay has 0 in the middle but for rounding.
+            form, exact = QUANTITIES[quantity].form, round(mean, 12) or 0.0
+            means.append("" if math.isnan(mean) else format(exact, form))
+        rows.append((name, f"{count}", quantity, *means))
+    # Neither an empty column nor one of ones says anything.
+    shown = [{*column[1:]} not in ({""}, {"1"}) for column in zip(*rows, strict=True)]
+    return [tuple(cell for cell, show in zip(row, shown, strict=True) if show) for row in rows]
 
 
 def ask(folder: Path) -> tuple[Published, list[Asked]]:
@@ -560,10 +337,14 @@ def ask(folder: Path) -> tuple[Published, list[Asked]]:
         published = Published.model_validate(read_configuration(place))
     except ValidationError as fault:
         raise as_input_error(place, fault, Published) from None
-    asked = []
-    for case in published.cases:
-        table = read_table(folder / "table.tsv", case.viscosity_m2_per_s, case.relative_sd)
-        table = table.without("group", case.without)
-        found, errors = diagnose_table(table)
-        asked.append(Asked(case, table, errors, found, answer_of_table(table, found, errors)))
-    return published, asked
+    return published, [_asked(folder / "table.tsv", case) for case in published.cases]
+
+
+def _asked(path: Path, case: Case) -> Asked:
+    table = read_table(path, case.viscosity_m2_per_s, case.relative_sd)
+    table = table.without("group", case.without)
+    counted = replace(table, runs=tuple(compress(table.runs, counts(case, table))))
+    none = f"no row counts in {case.title!r}"
+    refuse_if(not counted.runs, path, none, "give values; see docs/published.md")
+    found, errors = diagnose_table(counted)
+    return Asked(case, table, errors, found, answer_of_table(found, errors))

@@ -27,7 +27,7 @@ def run(arguments: Arguments) -> None:
     from pendpipe.figures.style import save
 
     published, asked = ask(arguments.folder)
-    lines = [f"{published.title} ({published.source})"]
+    lines = [published.title, f"  {published.source}"]
     lines += [f"  {row}" for row in in_columns(by_group(asked)).splitlines()]
     for one in asked:
         lines += ["", *one.answer.lines(one.case.title)]

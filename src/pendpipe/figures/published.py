@@ -1,6 +1,7 @@
 """What theory leaves of published numbers: observed less calculated, row by row."""
 
 from collections.abc import Sequence
+from itertools import compress
 from operator import methodcaller
 from typing import TYPE_CHECKING
 
@@ -8,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pendpipe.figures.style import GREEN, GREY, INK, Panel, curve, figure_of, level, measured
+from pendpipe.quantities import axis_unit
 
 if TYPE_CHECKING:
     from pendpipe.campaign.published import Asked
@@ -19,22 +21,33 @@ def draw_published(asked: Sequence["Asked"]) -> Figure:
 
 
 def _panel(one: "Asked") -> Panel:
-    table, found = one.table, one.found
-    groups = list(dict.fromkeys(row.group for row in table.runs))
-    place = np.arange(len(table.runs)) + [groups.index(row.group) for row in table.runs]
-    n = table.column("n")
+    from pendpipe.campaign.published import counts, named_by
+    from pendpipe.campaign.table import QUANTITIES
+
+    own = counts(one.case, one.table)
+    table, named = one.table, named_by(one.table)
+    observed, *others = (
+        table.scaled(each)[own]
+        for each in (table.column("value"), one.told, one.best, table.column("then"))
+    )
+    rows = list(compress(table.runs, own))
+    quantity = QUANTITIES[rows[0].quantity]
+    factor, unit = (1.0, "") if quantity.log else axis_unit(observed, quantity.unit)
+    told, best, then = (factor * (observed - each) for each in others)
+    names = [getattr(row, named) for row in rows]
+    groups = list(dict.fromkeys(names))
+    place = np.arange(len(rows)) + [groups.index(name) for name in names]
     marks = [
         level(0.0, INK),
-        measured(place, n - one.told, one.errors.sd, label="as told"),
+        measured(place, told, factor * one.errors.left, label="as told"),
     ]
-    if found.found:
-        left = n - one.best
+    if one.found.found:
         marks.append(
-            curve(place, left, GREEN, "", marker="s", markersize=3.5, label="with the cause")
+            curve(place, best, GREEN, "", marker="s", markersize=3.5, label="with the cause")
         )
-    then = n - table.column("then")
-    marks.append(curve(place, then, GREY, "", marker="_", markersize=7, label="at the time"))
-    middles = [place[[row.group == group for row in table.runs]].mean() for group in groups]
+    if np.isfinite(then).any():
+        marks.append(curve(place, then, GREY, "", marker="_", markersize=7, label="at the time"))
+    middles = [place[[name == group for name in names]].mean() for group in groups]
     marks.append(
         methodcaller(
             "set_xticks",
@@ -46,5 +59,7 @@ def _panel(one: "Asked") -> Panel:
             rotation_mode="anchor",
         )
     )
-    about = {"ylabel": "Observed less\ncalculated $n$", "xlabel": one.case.title}
-    return Panel(marks, about, key=3)
+    of = "$n$" if rows[0].quantity == "n" else rows[0].quantity
+    label = f"ln(observed/\ncalculated {of})" if quantity.log else f"Observed less\ncalculated {of}"
+    label += f" ({unit})" if unit else ""
+    return Panel(marks, {"ylabel": label, "xlabel": one.case.title}, key=3)

@@ -13,12 +13,20 @@ if TYPE_CHECKING:
         sphere_between_planes,
         sphere_in_tank,
     )
-    from pendpipe.physics.decay import amplitude, amplitude_and_gradient, stopping_time, time_at
+    from pendpipe.physics.decay import (
+        amplitude,
+        amplitude_and_gradient,
+        amplitude_halfway,
+        stopping_time,
+        time_at,
+        time_by_powers,
+    )
     from pendpipe.physics.fluid import (
         POTENTIAL_FLOW_ADDED_MASS,
         added_mass_coefficient,
         cylinder_added_mass_coefficient,
         cylinder_drag,
+        disc_drag,
         free_decay_root,
         harmonic_drag,
         penetration_depth,
@@ -91,6 +99,7 @@ __all__ = [
     "added_mass_coefficient",
     "amplitude",
     "amplitude_and_gradient",
+    "amplitude_halfway",
     "amplitude_of_largest_quality_factor",
     "amplitude_rate",
     "bearing_friction_rate",
@@ -98,6 +107,7 @@ __all__ = [
     "cylinder_drag",
     "damping_coefficient",
     "decay_rates",
+    "disc_drag",
     "displaced_moment",
     "driven_pendulum_acceleration",
     "energy_power_friction",
@@ -130,6 +140,7 @@ __all__ = [
     "structural_quality_factor",
     "swing",
     "time_at",
+    "time_by_powers",
     "universal_acceleration",
     "viscous_acceleration",
     "viscous_frequency_shift",

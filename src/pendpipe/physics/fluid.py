@@ -368,6 +368,35 @@ def cylinder_added_mass_coefficient(
     )
 
 
+@equation
+def disc_drag(
+    radius_m: Numbers,
+    angular_frequency_per_s: Numbers,
+    viscosity_pa_s: Numbers,
+    density_kg_per_m3: Numbers,
+) -> FloatArray:
+    """Torque of the fluid on a thin disc that turns about its axis, for each rad/s.
+
+    ``pi eta a^4/delta``: the shear ``eta omega r/delta`` over both faces. With a moment of inertia
+    I arcs half a swing tau apart have the logarithmic ratio ``pi eta a^4 tau/(2 I delta)``, which
+    is ``pi^(3/2)/(2 sqrt 2) rho a^4 sqrt(nu tau)/I`` (Stokes 1850, Eq. 163). The layers
+    must be thin beside the disc; its rim is left out.
+
+    Parameters
+    ----------
+    radius_m, angular_frequency_per_s, viscosity_pa_s, density_kg_per_m3
+        a in m, omega in rad/s, eta in Pa s, rho in kg/m^3; broadcast.
+
+    Returns
+    -------
+    FloatArray
+        In N m s, in phase with the velocity that it opposes; the fluid that turns along has the
+        moment of inertia ``pi eta a^4/(delta omega)``.
+    """
+    depth = penetration_depth(angular_frequency_per_s, viscosity_pa_s, density_kg_per_m3)
+    return np.pi * viscosity_pa_s * radius_m**4 / depth
+
+
 def _cylinder_force(radius_m: Any, rate: Any) -> Any:
     """``4 K1(z)/(z K0(z))`` with z = b sqrt(i omega/nu)."""
     from scipy.special import kve
