@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.noise import scatter
 from pendpipe.arrays import FloatArray
 
 DENSE: Final = 16.0
@@ -37,18 +38,22 @@ class Between(NamedTuple):
     time_s: FloatArray
     values: FloatArray
     noise_rms: float
-    """Of a reading of the record."""
+    """Of a reading of the record, about the wave of its window."""
     window: int
     """Readings that each is from."""
 
 
-def between(time_s: FloatArray, values: FloatArray, dense: float = DENSE) -> Between | None:
+def between(
+    time_s: FloatArray, values: FloatArray, step: float | None = None, dense: float = DENSE
+) -> Between | None:
     """Read a coarse record between its readings; None where it is not coarse.
 
     Parameters
     ----------
     time_s, values
         The readings, shape (n,).
+    step
+        Between neighbouring readings, where known.
     dense
         Readings in a cycle from which it is not coarse.
     """
@@ -58,9 +63,9 @@ def between(time_s: FloatArray, values: FloatArray, dense: float = DENSE) -> Bet
     if count < 16 or 2.0 * count > 1.2 * dense * passages:
         return None
     intervals = np.diff(time_s)
-    step = float(np.mean(intervals))
-    if np.max(np.abs(intervals - step)) > _EVEN * step:
-        return _between_uneven(time_s, values, dense) if count < _MOST_UNEVEN else None
+    interval = float(np.mean(intervals))
+    if np.max(np.abs(intervals - interval)) > _EVEN * interval:
+        return _between_uneven(time_s, values, step, dense) if count < _MOST_UNEVEN else None
     per_cycle = 1.0 / max(_frequency(values[:_MOST]), 1e-9)
     if not _SPARSE < per_cycle < dense:
         return None
@@ -76,8 +81,7 @@ def between(time_s: FloatArray, values: FloatArray, dense: float = DENSE) -> Bet
         float(np.sum((part - part @ explained) ** 2))
         for part in np.array_split(windows, len(windows) // _AT_ONCE + 1)
     ]
-    freedom = window - inverse.shape[0]
-    noise = math.sqrt(sum(squares) / len(windows) / max(freedom, 1))
+    noise = scatter(sum(squares) / len(windows), window - len(inverse), step)
     fine = math.ceil(_WANTED / per_cycle)
     place = np.arange((count - 1) * fine + 1) / fine
     found = np.empty(len(place))
@@ -101,7 +105,9 @@ _MOST_UNEVEN: Final = 1 << 12
 """Readings at uneven times, as people click them in a video: their spectrum takes n^2."""
 
 
-def _between_uneven(time_s: FloatArray, values: FloatArray, dense: float) -> Between | None:
+def _between_uneven(
+    time_s: FloatArray, values: FloatArray, step: float | None, dense: float
+) -> Between | None:
     """Read a coarse record at uneven times: the waves of each moment by least squares."""
     from scipy.signal import lombscargle
 
@@ -121,7 +127,8 @@ def _between_uneven(time_s: FloatArray, values: FloatArray, dense: float) -> Bet
     design = _wave(time_s[rows] - place[:, None], omega)
     sizes = np.einsum("npw,nw->np", np.linalg.pinv(design, rcond=1e-6), values[rows])
     left = values[rows] - np.einsum("nwp,np->nw", design, sizes)
-    noise = math.sqrt(float(np.mean(left**2)) * window / max(window - design.shape[2], 1))
+    square = float(np.sum(left**2)) / len(left)
+    noise = scatter(square, window - design.shape[2], step)
     return Between(place, sizes[:, 0] + sizes[:, 1], noise, window)
 
 

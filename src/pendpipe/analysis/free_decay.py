@@ -457,7 +457,7 @@ def _looked_at(
         NotAnalysableError,
     )
     noise = noise_rms(values, recording.resolution, quieter=0.1)
-    if (fine := between(time, values, HARDLY)) is not None:
+    if (fine := between(time, values, recording.resolution, HARDLY)) is not None:
         time, values, noise = fine.time_s, fine.values, fine.noise_rms
     least = least_swing(noise, recording.resolution)
     half_period = usual_half_period(time, values)

@@ -17,10 +17,37 @@ _BLOCK: Final = 64
 _BLOCKS: Final = 256
 """Estimates whose median counts: it is known to 1 %."""
 
+TOLD: Final = 8
+"""Degrees of freedom from which a scatter is known to a quarter, 1/sqrt(16), and is asked."""
+
 
 def quantisation_rms(step: float | None) -> float:
     """Rms of the rounding to a step: ``step/sqrt(12)``; zero where no step is known."""
     return 0.0 if step is None else step / math.sqrt(12.0)
+
+
+def scatter(square: float, freedom: float, step: float | None = None, least: float = 0.0) -> float:
+    """Rms of one reading about what was fitted: ``sqrt(square/freedom)``.
+
+    It is never below step/sqrt(12): a fit may follow the rounding of few readings.
+
+    Parameters
+    ----------
+    square
+        Sum of squares of what is left.
+    freedom
+        Readings less the numbers that were fitted to them; one at least is taken.
+    step
+        The step of the readings, where known.
+    least
+        Noise that can't be less for another reason.
+
+    Examples
+    --------
+    >>> scatter(8.0, 2.0), scatter(0.0, 5.0, step=12.0**0.5)
+    (2.0, 1.0)
+    """
+    return max(math.sqrt(max(square, 0.0) / max(freedom, 1.0)), quantisation_rms(step), least)
 
 
 def noise_rms(values: FloatArray, step: float | None = None, *, quieter: float = 0.5) -> float:
@@ -46,9 +73,8 @@ def noise_rms(values: FloatArray, step: float | None = None, *, quieter: float =
     float
         Standard deviation of one reading, in the unit of `values`.
     """
-    floor = quantisation_rms(step)
     if len(values) < 2 * _ORDER:
-        return floor
+        return quantisation_rms(step)
     short = len(values) // (4 if quieter < 0.5 else 1)
     length = _BLOCK + _ORDER if len(values) >= 4 * _BLOCK else max(short, 4 * _ORDER)
     length = min(length, len(values))
@@ -58,7 +84,7 @@ def noise_rms(values: FloatArray, step: float | None = None, *, quieter: float =
     fourth = _fourth_differences(blocks)
     squares = np.sort(np.einsum("kn,kn->k", fourth, fourth)) / fourth.shape[1]
     square = np.interp(quieter * (number - 1), np.arange(number), squares)
-    return max(floor, math.sqrt(float(square) / _GAIN))
+    return scatter(float(square), _GAIN, step)
 
 
 def white_rms(residual: FloatArray) -> float:
@@ -67,9 +93,9 @@ def white_rms(residual: FloatArray) -> float:
     More precise than `noise_rms` (no median), for residuals that hold no glitches.
     """
     if len(residual) < 2 * _ORDER:
-        return float(np.sqrt(np.mean(residual**2)))
+        return scatter(float(residual @ residual), len(residual))
     fourth = _fourth_differences(residual)
-    return math.sqrt(float(fourth @ fourth) / (len(fourth) * _GAIN))
+    return scatter(float(fourth @ fourth), len(fourth) * _GAIN)
 
 
 def _fourth_differences(values: FloatArray) -> FloatArray:

@@ -15,6 +15,7 @@ from pendpipe.analysis.fit.fitted import Baseline
 from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.quality import small_frequency
 from pendpipe.analysis.fit.result import FitResult
+from pendpipe.analysis.noise import scatter
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.arrays import FloatArray
@@ -390,13 +391,12 @@ def _fitted_model(fit: Fit, found: Hypothesis) -> FittedModel:
         float(np.sqrt(np.mean(data.residual(each.at.reading)[data.weight > 0.0] ** 2)))
         for each in (fit, found.baseline)
     )
-    # What is left holds all noise, whatever the model.
-    noise = max(min(found.noise.rms, left, by_baseline), data.step / 12.0**0.5)
     return FittedModel(
         parameters_of(fit, data),
         data.rms_of_reading(left),
         data.chi2_per_dof(fit.chi2, len(fit.free)),
-        data.rms_of_reading(noise),
+        # What is left holds all noise, whatever the model.
+        data.rms_of_reading(scatter(min(found.noise.rms, left, by_baseline) ** 2, 1.0, data.step)),
     )
 
 

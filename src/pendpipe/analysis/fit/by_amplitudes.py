@@ -22,7 +22,7 @@ from pendpipe.analysis.fit.period import Period
 from pendpipe.analysis.fit.prediction import pendulum_decay
 from pendpipe.analysis.fit.quality import without_swings
 from pendpipe.analysis.fit.result import FitResult, result_of
-from pendpipe.analysis.noise import quantisation_rms
+from pendpipe.analysis.noise import scatter
 from pendpipe.analysis.torque import TOP
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
@@ -126,10 +126,8 @@ def fit_amplitudes(
     if sine:
         decays = [(drag, partial(pendulum_decay, s, drag)) for drag in _DRAGS for s in shares]
     rough = min((fit_envelope(points, held.envelope, each) for _, each in decays), key=_misfit)
-    scatter = max(
-        math.sqrt(float(rough.residual @ rough.residual) / freedom), quantisation_rms(step)
-    )
-    sd = max(scatter, _FINEST * first) * _students(freedom)
+    square = float(rough.residual @ rough.residual)
+    sd = scatter(square, freedom, step, _FINEST * first) * _students(freedom)
     points = replace(points, angle_sd_rad=np.full(len(points), sd))
     fits = [(drag, fit_envelope(points, held.envelope, decay)) for drag, decay in decays]
     drag, envelope = min(fits, key=lambda each: _misfit(each[1]))
@@ -231,7 +229,7 @@ def _points_of(
         time_s=time,
         time_sd_s=np.full(len(time), np.nan),
         angle_rad=sizes,
-        angle_sd_rad=np.full(len(time), max(quantisation_rms(step), 0.01 * float(sizes[0]))),
+        angle_sd_rad=np.full(len(time), scatter(0.0, 1.0, step, 0.01 * float(sizes[0]))),
         level_rad=np.zeros(len(time)),
         step_rad=step,
         start_s=float(time[0]),

@@ -20,6 +20,7 @@ from pendpipe.analysis.fit.result import FitResult, result_of
 from pendpipe.analysis.fit.rounding import best_noise
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
 from pendpipe.analysis.fit.waveform import DRIFT, Waveform
+from pendpipe.analysis.noise import scatter
 from pendpipe.analysis.torque import Apart
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
@@ -93,8 +94,8 @@ class Fitted:
         """What the fit leaves, as if all of it were noise."""
         if self.problem.step:
             return self.problem.noise_rms
-        freedom = max(len(self.problem.values) - 9 + len(self.held), 1)
-        return self.problem.noise_rms * math.sqrt(max(self.chi2, 1e-300) / freedom)
+        freedom = len(self.problem.values) - 9 + len(self.held)
+        return self.problem.noise_rms * scatter(max(self.chi2, 1e-300), freedom)
 
     def better_by(self, other: Fitted) -> float:
         """Logarithm of the likelihood over another law's, the noise being the better fit's.

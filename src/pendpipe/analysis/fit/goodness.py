@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.demodulation import harmonic_columns, normal_equations
-from pendpipe.analysis.noise import quantisation_rms, undithered_rms
+from pendpipe.analysis.noise import TOLD, scatter, undithered_rms
 from pendpipe.analysis.turning_points.measure import invert
 from pendpipe.arrays import FloatArray
 from pendpipe.levels import REFUTED
@@ -119,7 +119,6 @@ def judge(
         Noise that can't be less.
     """
     n, freedom = len(residual), max(len(residual) - fitted - lines, 1)
-    least = max(quantisation_rms(step), floor)
     square = float(residual @ residual)
     phase, sums, weights = _binned(time_s, residual, turn_s, half_cycle)
     cycles = (phase[-1] - phase[0]) / (2.0 * math.pi)
@@ -129,17 +128,17 @@ def judge(
     found = _demodulated(phase, sums, weights, count, harmonics)
     count = len(found.square)
     of_noise = n - size * count
-    if of_noise < 8:
-        noise = max(math.sqrt(square / freedom), least)
+    if of_noise < TOLD:
+        noise = scatter(square, freedom, step, floor)
         return Goodness(noise, square / freedom / noise**2, (), 1.0)
-    noise = max(math.sqrt(max(square - float(np.sum(found.square)), 0.0) / of_noise), least)
+    noise = scatter(square - float(np.sum(found.square)), of_noise, step, floor)
     rounding = undithered_rms(np.interp(found.phase, half_cycle * math.pi, amplitude), step, noise)
     asked = list(_questions(found, noise, rounding, fitted, lines))
     p_values = tuple(tail(each.chi2 / each.freedom, each.freedom, of_noise) for each in asked)
     ratio = square / freedom / noise**2
     if combined(p_values) >= REFUTED:
         # Where all of the residual is noise, all of it tells how large that is.
-        return Goodness(max(math.sqrt(square / freedom), least), ratio, p_values, 1.0)
+        return Goodness(scatter(square, freedom, step, floor), ratio, p_values, 1.0)
     # What a, b, c suffer from is what is left at the motion's own frequency.
     own = max((each.chi2 / each.freedom for each in asked if each.name == "motion"), default=1.0)
     bent, large = None, float(np.max(amplitude))

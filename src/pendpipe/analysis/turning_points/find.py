@@ -21,7 +21,7 @@ from pendpipe.analysis.half_cycles import (
     least_swing,
     usual_half_period,
 )
-from pendpipe.analysis.noise import quantisation_rms, undithered_rms
+from pendpipe.analysis.noise import TOLD, scatter, undithered_rms
 from pendpipe.analysis.turning_points.harmonics import far_points, mean_square, odd_harmonics
 from pendpipe.analysis.turning_points.long_records import follow
 from pendpipe.analysis.turning_points.measure import (
@@ -349,7 +349,7 @@ def turning_points_of(
 ) -> TurningPoints:
     """As `find_turning_points`, of readings that are prepared already; of `long` ones in a pass."""
     points = None
-    if (fine := between(samples.time_s, samples.values)) is not None:
+    if (fine := between(samples.time_s, samples.values, samples.step)) is not None:
         return replace(_of_few(samples, fine, place), readings=samples)
     if len(samples) > long:
         points = follow(samples, lambda head: _measured(head, place), long // 128)
@@ -362,7 +362,7 @@ def _of_few(samples: Samples, fine: Between, place: str | Path) -> TurningPoints
     dense = replace(samples, time_s=fine.time_s, values=fine.values, step=None, noise_rms=0.0)
     least = 1e-4 * float(np.ptp(fine.values))
     points = _measured(replace(dense, noise_rms=max(fine.noise_rms, least)), place)
-    noise = max(fine.noise_rms, quantisation_rms(samples.step))
+    noise = fine.noise_rms
     sd = np.hypot(points.angle_sd_rad, 2.0 * noise / math.sqrt(fine.window))
     pace = math.pi / float(np.median(np.diff(points.time_s) / np.diff(points.half_cycle)))
     clear = np.maximum(np.abs(points.angle_rad), sd)
@@ -398,7 +398,10 @@ def _measured(samples: Samples, place: str | Path) -> TurningPoints:
     )
     amplitude, rates, level = _losses(places, first, samples.noise_rms, rough.level)
     places, measured, shape = _shaped(samples, places, amplitude, rates, level, stride)
-    samples = replace(samples, noise_rms=_noise(samples, measured))
+    square, freedom = mean_square(measured, 3 + measured.harmonics.shape[1])
+    if freedom >= TOLD:
+        noise = scatter(freedom * square, freedom, samples.step)
+        samples = replace(samples, noise_rms=noise)
     keep = kept(samples, places, measured)
     _refuse_few(samples, int(keep.sum()), place)
     return finished(samples, places, measured, shape, rates, level, keep)
@@ -480,14 +483,6 @@ def _shaped(
         samples, places, level, shape, measured, relative * size
     )
     return places, measured, shape
-
-
-def _noise(samples: Samples, measured: Measured) -> float:
-    """Rms of one reading about the fitted half cycles, never below step/sqrt(12)."""
-    square, freedom = mean_square(measured, 3 + measured.harmonics.shape[1])
-    if freedom < 8:
-        return samples.noise_rms
-    return max(math.sqrt(max(square, 0.0)), quantisation_rms(samples.step))
 
 
 _WINDOWS: Final = (6, 10, 16, 26, 42, 68)

@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.noise import quantisation_rms
+from pendpipe.analysis.noise import scatter
 from pendpipe.analysis.turning_points.measure import Samples, cosine_sine, loss_rates
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import FloatArray
@@ -281,7 +281,7 @@ def follow(
     count = _track(values, np.array(begin), columns, result, np.empty((3, _BATCH)), tables)
     if count < _FEWEST or columns[0, count - 1] < samples.time_s[-1] - _FEWEST * half_period:
         return None
-    noise = max(math.sqrt(result[0] / result[1]), quantisation_rms(samples.step))
+    noise = scatter(float(result[0]), float(result[1]), samples.step)
     # The beginning was measured with what harmonics it has.
     if noise > _PLAIN * head.noise_rms_rad:
         return None
