@@ -11,11 +11,10 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from scipy.fft import prev_fast_len
 
+from pendpipe.analysis.fit.rounding import best_noise
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 
-_NOISE_RATIOS: Final = tuple(np.linspace(0.04, 0.5, 12))
-"""Noise over step, at the values that are tried."""
 _NEEDED_GAIN: Final = 12.0
 """Twice the log-likelihood by which a lattice must explain more: of its two numbers chance
 gives it once in 400."""
@@ -156,9 +155,9 @@ def rounding_bias(angle: FloatArray, step: float, noise_rms: float) -> FloatArra
 def with_lattice(data: Data, reading: FloatArray) -> Data:
     """Estimate the noise before rounding, if the readings show the mean rounding error.
 
-    This is not the maximum-likelihood noise of the codes (`fit.rounding.best_noise`): the
-    model may still be wrong by part of a step, which smooths the rounding error as noise does.
-    Here the sawtooth that remains in the residual decides.
+    It is the fit's (`fit.rounding.best_noise`). Where the model is still wrong by part of a step,
+    which smooths the rounding error as noise does, it is larger, and the sawtooth that is taken
+    off smaller. Whether one is there, the residual decides.
 
     Parameters
     ----------
@@ -174,13 +173,11 @@ def with_lattice(data: Data, reading: FloatArray) -> Data:
         return data
     turn = 2.0 * np.pi * data.values / data.step
     origin = float(np.angle(np.mean(np.exp(1j * turn)))) * data.step / (2.0 * np.pi)
-    best, least = None, len(off) * float(np.log(np.mean(off**2))) - _NEEDED_GAIN
-    for share in _NOISE_RATIOS:
-        bias = rounding_bias((reading - origin)[data.weight > 0.0], data.step, share * data.step)
-        cost = len(off) * float(np.log(np.mean((off - bias) ** 2)))
-        if cost < least:
-            best, least = share, cost
-    return replace(data, lattice=None if best is None else (origin, best * data.step))
+    noise = best_noise(off, data.step, 0.1 * data.step)
+    finer = replace(data, lattice=(origin, noise))
+    left = finer.residual(reading)[data.weight > 0.0]
+    gain = len(off) * float(np.log(np.mean(off**2) / np.mean(left**2)))
+    return finer if gain > _NEEDED_GAIN else replace(data, lattice=None)
 
 
 _MOST_SCATTERED: Final = 40_000

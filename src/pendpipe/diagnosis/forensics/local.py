@@ -16,6 +16,7 @@ import numpy as np
 from scipy.fft import dct, idct
 
 from pendpipe.analysis.demodulation import cycle_starts, harmonic_columns, normal_equations
+from pendpipe.analysis.noise import scatter
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -184,14 +185,12 @@ def _fitted(
 
 
 def _rms(left: FloatArray, freedom: float) -> float:
-    """Return the root mean square, with outliers clipped."""
+    """Return the scatter, with outliers clipped."""
     scale = math.sqrt(len(left) / freedom)
-    rms = 1.4826 * float(np.median(np.abs(left))) * scale
-    if rms == 0.0:
-        rms = math.sqrt(float(left @ left) / freedom)
+    rms = 1.4826 * float(np.median(np.abs(left))) * scale or scatter(float(left @ left), freedom)
     for _ in range(2):
         near = np.minimum(np.abs(left), 4.0 * rms / scale)
-        rms = math.sqrt(float(near @ near) / freedom)
+        rms = scatter(float(near @ near), freedom)
     return max(rms, 1e-300)
 
 
