@@ -9,7 +9,6 @@ from hypothesis import given, strategies as st
 
 from pendpipe.analysis.turning_points.measure import prepare as prepare_samples
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.faults import _applied
 from pendpipe.diagnosis.found import Finding
 from pendpipe.diagnosis.held_out import completed, held_out, predicted_worse
@@ -68,9 +67,7 @@ def state_with(readings: FloatArray, *names: str) -> Hypothesis:
     fit = refine(Model(TIME_S, INTERVAL_S, effects), data, noise, start)
     steps = []
     for effect in effects:
-        gain = bare.chi2 - fit.chi2
-        lead = Lead(effect, (), gain, 1e-12)
-        rival = Rival.of(lead, fit, bare.chi2, Scale(fit.chi2), NO_SCAN)
+        rival = Rival.of(effect, fit, bare.chi2, Scale(fit.chi2), NO_SCAN)
         steps.append(Step((rival,), 1e-9, bare))
     return hypothesis_of(fit, data, noise, (), bare, steps=tuple(steps))
 
@@ -78,7 +75,7 @@ def state_with(readings: FloatArray, *names: str) -> Hypothesis:
 def simplified(state: Hypothesis) -> Hypothesis:
     """Make the best of the moves that lower the score, until none does."""
     while better := [each for each in simpler(state, task_of()) if each.lower > 0.0]:
-        best = max(better, key=lambda each: each.lower).state
+        best = max(better, key=lambda each: each.lower)
         state = best.settle(best.fit)
     return state
 
@@ -130,9 +127,7 @@ def test_each_further_name_has_its_price_and_sin_x_has_none() -> None:
     fit, _, _ = null_fit()
 
     def steps(*names: str) -> list[Step]:
-        rivals = [
-            Rival(Lead(by_identifier(name), (), 0.0, 0.0), fit, 9.0, 9.0, 9.0) for name in names
-        ]
+        rivals = [Rival(by_identifier(name), fit, 9.0, 9.0, 9.0) for name in names]
         return [Step((rival,), 0.0, fit) for rival in rivals]
 
     one = price(steps("impulse"))
@@ -200,9 +195,8 @@ def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
     state = task_of().scanned(hypothesis_of(fit, data, noise, (), fit))
     (drawn,) = describing(state, task_of())
     assert drawn.lower > 0.0
-    state = drawn.state
-    assert state.steps[-1].winner.lead.effect.kind == "unnamed"
-    assert remainder_of(state.fit, state.data, state.noise).excess < 0.2 * before.excess
+    assert drawn.steps[-1].winner.effect.kind == "unnamed"
+    assert remainder_of(drawn.fit, drawn.data, drawn.noise).excess < 0.2 * before.excess
 
 
 @pytest.mark.structure
@@ -212,17 +206,17 @@ def test_what_is_left_is_described_where_only_sin_x_was_found() -> None:
     model, value = Model(TIME_S, INTERVAL_S, (sine,)), np.append(TRUTH, 1.0)
     data, noise = prepared(model.reading(value) + 0.3 * CHIRP + white(6))
     fit = refine(model, data, noise, value)
-    known = Step((Rival(Lead(sine, (), 9.0, 0.0), fit, 9.0, 9.0, 9.0),), 0.0, fit)
+    known = Step((Rival(sine, fit, 9.0, 9.0, 9.0),), 0.0, fit)
     bare = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
     state = task_of().scanned(hypothesis_of(fit, data, noise, (), bare, steps=(known,)))
     (drawn,) = describing(state, task_of())
     assert drawn.lower > 0.0
-    assert drawn.state.steps[-1].winner.drawn
+    assert drawn.steps[-1].winner.drawn
 
 
 def test_noise_is_not_described() -> None:
     fit, data, noise = null_fit()
-    state, _ = run_search(hypothesis_of(fit, data, noise, (), fit), task_of())
+    state = run_search(hypothesis_of(fit, data, noise, (), fit), task_of())
     assert state.steps == ()
 
 
@@ -263,9 +257,7 @@ def test_a_random_cause_pays_the_price_of_a_name(name: str, names: tuple[str, ..
     least = {"clipping": 0.0}.get(name, FURTHER if names else CHOICE)
     for gain, told in ((least - 1.0, least == 0.0), (least + 1.0, True)):
         after = _applied(Finding(name, 1e-9, gain), state, task_of(samples))
-        assert [fault.identifier for fault in (after.state.faults if after else ())] == [
-            name
-        ] * told
+        assert [fault.identifier for fault in (after.faults if after else ())] == [name] * told
 
 
 @pytest.mark.slow
@@ -288,8 +280,8 @@ def test_a_name_is_tried_on_credit_if_it_takes_a_good_part_of_the_misfit(
 ) -> None:
     state = state_with(pulled() + white(6))
     excess = remainder_of(state.fit, state.data, state.noise).excess
-    lead = Lead(by_identifier("impulse"), (), 0.0, 0.0)
-    step = Step((Rival(lead, state.fit, part * excess, worth, worth),), 0.0, state.fit)
+    effect = by_identifier("impulse")
+    step = Step((Rival(effect, state.fit, part * excess, worth, worth),), 0.0, state.fit)
     assert worth < CHOICE
     assert shares_a_misfit(step, state) == tried
 

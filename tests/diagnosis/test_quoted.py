@@ -3,6 +3,7 @@
 import functools
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,6 @@ from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.diagnosis.values import constants_of, quality_factors_of, small_periods
-from pendpipe.diagnosis.weighing import Weighed, weigh
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.curves import restoring_curve
@@ -47,10 +47,6 @@ ANGLE = 5
 """Place of the angle of the release among the values of `TRUTH`."""
 INPUTS = Path("../shared/inputs4")
 END_S = float(TIME_S[-1])
-
-
-def weighed_of(outcome: Diagnosis) -> list[Weighed]:
-    return [weigh(outcome.search, step) for step in outcome.search.steps]
 
 
 # The period of small swings is that of the description.
@@ -202,13 +198,13 @@ def softening() -> Diagnosis:
 
 def test_each_description_has_the_effects_of_its_name_and_its_probability() -> None:
     outcome = diagnosed("frequency-drift")
-    found, weighed = outcome.search, weighed_of(outcome)
-    described = descriptions_of(found, weighed)
-    (step,), (each,) = found.steps, weighed
-    rivals = [step.winner.lead.effect, *(mate.lead.effect for mate in each.mates)]
+    found = outcome.search
+    described = descriptions_of(found)
+    (step,) = found.steps
+    rivals = [step.winner.effect, *(mate.effect for mate in step.mates)]
     wanted = {
         effect.key: weight
-        for effect, weight in zip(rivals, each.weights[:-1].tolist(), strict=True)
+        for effect, weight in zip(rivals, step.weights[:-1], strict=True)
         if weight >= LISTED
     }
     given = {one.fit.model.effects[0].key: one.probability for one in described}
@@ -229,18 +225,19 @@ def test_a_set_of_effects_whose_fit_is_stuck_is_no_description(
     found = outcome.search
     # The drift's last mate or nothing, without the tone: the first was never fitted so.
     odds = [[0.5, 0.5], [0.0, 1.0]]
-    weighed = [
-        each._replace(weights=np.array([*np.zeros(len(each.weights) - 2), *chances]))
-        for each, chances in zip(weighed_of(outcome), odds, strict=True)
+    steps = [
+        replace(step, weights=(*[0.0] * (len(step.weights) - 2), *chances))
+        for step, chances in zip(found.steps, odds, strict=True)
     ]
+    found = replace(found, steps=tuple(steps))
 
     def stuck(model: Model, data: Data, noise: Noise, starts: Any, **_: Any) -> Fit:
         far = starts[0] * np.where(np.arange(model.size) == ANGLE, 1.5, 1.0)
         return refine(model, data, noise, far, rounds=0)
 
-    fitted = descriptions_of(found, weighed)
+    fitted = descriptions_of(found)
     monkeypatch.setattr(pendpipe.diagnosis.quoted, "best_fit", stuck)
-    described = descriptions_of(found, weighed)
+    described = descriptions_of(found)
     assert len(fitted) == 2
     assert [each.fit.value is found.baseline.value for each in described] == [True]
 
@@ -249,9 +246,9 @@ def test_a_set_of_effects_whose_fit_is_stuck_is_no_description(
 def test_what_chance_excludes_is_no_description_beside_one_that_leaves_noise() -> None:
     """The fit has 8 % for "none of these", and lies thirty errors of the descriptions away."""
     outcome = softening()
-    found, weighed = outcome.search, weighed_of(outcome)
-    assert weighed[0].weights[-1] > LISTED
-    assert all(each.fit.model.effects for each in descriptions_of(found, weighed))
+    found = outcome.search
+    assert found.steps[0].weights[-1] > LISTED
+    assert all(each.fit.model.effects for each in descriptions_of(found))
     alone, given = (
         outcome.baseline.parameters["frequency"],
         outcome.improved.parameters["frequency"],
@@ -264,7 +261,7 @@ def test_a_number_is_the_mean_of_the_descriptions_and_its_variance_holds_their_s
     outcome = diagnosed("frequency-drift")
     numbers = [
         (each.probability, constants_of(each.fit, "rad"))
-        for each in descriptions_of(outcome.search, weighed_of(outcome))
+        for each in descriptions_of(outcome.search)
     ]
     p = np.array([probability for probability, _ in numbers])
     for name in ("frequency", "a", "b", "c"):
@@ -279,7 +276,7 @@ def test_a_number_is_the_mean_of_the_descriptions_and_its_variance_holds_their_s
 def test_a_fault_of_the_measurement_alone_leaves_one_description_without_it() -> None:
     """Beside lost samples the fit is as wrong as its times."""
     outcome = diagnosed("dropped-samples")
-    (only,) = descriptions_of(outcome.search, weighed_of(outcome))
+    (only,) = descriptions_of(outcome.search)
     assert only.fit.value is outcome.search.fit.value
     given, alone = (each.parameters["frequency"] for each in (outcome.improved, outcome.baseline))
     assert abs(given.value - FREQUENCY_HZ) < 3.0 * given.sd
@@ -326,8 +323,8 @@ def test_a_cause_that_cannot_be_named_moves_no_period_beyond_its_error(
 def test_what_leaves_more_than_noise_is_no_surer_than_the_fit() -> None:
     """The same answer, once as if chance did not explain what is left."""
     outcome = softening()
-    found, weighed, told = outcome.search, weighed_of(outcome), printed_by(outcome.fit)
-    clean, rest = (quoted(found, weighed, outcome.fit, level).numbers for level in (0.0, 1.0))
+    found, told = outcome.search, printed_by(outcome.fit)
+    clean, rest = (quoted(found, outcome.fit, level).numbers for level in (0.0, 1.0))
     for name, least in told.items():
         assert rest[name].sd > 0.999 * least.sd
     # Nor is a curve, whatever it leaves.
@@ -343,7 +340,7 @@ def test_what_leaves_more_than_noise_is_no_surer_than_the_fit() -> None:
 def test_what_leaves_more_than_noise_is_no_less_sure_than_what_is_seen() -> None:
     """A second plane that leaves most of an ellipse said 0.83(41) s; turning points, 0.83(3) s."""
     found = softening().search
-    (first, *_) = descriptions_of(found, weighed_of(softening()))
+    (first, *_) = descriptions_of(found)
     seen, lost = Estimate(1.204, 0.03, "Hz"), Estimate(1.3, 0.6, "Hz")
     for level, sd in ((1.0, seen.sd), (0.0, lost.sd)):
         quotes = averages(found, [first], lambda _: {"f": lost}, {"f": seen}, level)

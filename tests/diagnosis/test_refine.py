@@ -215,8 +215,7 @@ def test_a_start_beyond_all_numbers_is_none() -> None:
 @pytest.mark.structure
 def test_effects_of_the_best_ones_class_are_useful(gain: float) -> None:
     fit, _, _ = null_fit()
-    lead = Lead(by_identifier("cubic-stiffness"), (), gain, 0.0)
-    best = Rival(lead, fit, gain, gain, gain)
+    best = Rival(by_identifier("cubic-stiffness"), fit, gain, gain, gain)
     at_the_limit = gain - useful_chi2(0.0, gain, drawn=False)
     behind = replace(best, gain=at_the_limit, worth=at_the_limit, evidence=at_the_limit)
     assert not of_one_class(best, behind)
@@ -235,12 +234,12 @@ def test_in_a_gross_misfit_every_refit_ends_at_its_minimum() -> None:
     model, data, noise, truth = stribeck_record()
     base = refine(model.bare(), data, noise, truth[:-2])
     names = {"stribeck-friction": (float(truth[-1]),), "damping-drift": (100.0,)}
-    leads = [Lead(by_identifier(name), shape, 0.0, 0.0) for name, shape in names.items()]
+    leads = [Lead(by_identifier(name), shape) for name, shape in names.items()]
     whole = side_by_side(base, data, noise, leads, (), phase_lost=True)
     near = side_by_side(base, data, noise, leads, (), phase_lost=False)
-    for lead, fit in whole:
-        start = np.concatenate([base.value, [0.0], lead.shape])
-        alone = refine(base.model.adding(lead.effect), data, noise, start)
+    for effect, fit in whole:
+        start = np.concatenate([base.value, [0.0], names[effect.identifier]])
+        alone = refine(base.model.adding(effect), data, noise, start)
         assert fit.chi2 == pytest.approx(alone.chi2, abs=0.1)
     (_, best), (_, rival) = near
     assert best.chi2 == pytest.approx(whole[0][1].chi2, abs=1.0)
@@ -290,7 +289,7 @@ def test_in_a_misfit_a_law_that_acts_throughout_comes_before_an_event(
     """A step takes a part of any misfit; one that explains it far better leads."""
     fit, _, _ = null_fit()
     rivals = [
-        Rival(Lead(by_identifier(name), (), 0.0, 0.0), fit, gain, worth, worth)
+        Rival(by_identifier(name), fit, gain, worth, worth)
         for name, gain, worth in (
             ("frequency-step", 1000.0, 60.0),
             ("presliding-friction", 900.0, 60.0 - behind),

@@ -43,13 +43,23 @@ _NUMBERS_AT_ONCE = 1 << 22
 """Numbers in it, 32 MB, where a column is long."""
 
 
-class Candidate(NamedTuple):
-    """An effect of one shape, and the position of its columns."""
+class Lead(NamedTuple):
+    """An effect at a shape, and how it scores there.
+
+    Parameters
+    ----------
+    effect, shape
+        The effect, and its values behind the sizes.
+    score
+        Fall of chi^2, to first order.
+    p_value
+        Probability that chance does better over the effect's own shapes.
+    """
 
     effect: Effect
-    shape: tuple[float, ...]
-    first: int
-    width: int
+    shape: tuple[float, ...] = ()
+    score: float = 0.0
+    p_value: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -62,8 +72,9 @@ class Bank:
         Orthonormal, of the model's tangent space, shape (m + 1, p).
     columns
         Shape (m + 1, k), float32: a candidate's columns are orthonormal among themselves.
-    candidates
-        The effects and shapes to which the columns belong.
+    candidates, freedom
+        The effects and shapes to which the columns belong, and how many each has: its degrees of
+        freedom.
     log_scale_variance
         Variance of the logarithm of the noise that each candidate meets, shape (candidates,).
     noise
@@ -72,7 +83,8 @@ class Bank:
 
     basis: FloatArray
     columns: NDArray[np.float32]
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[Lead, ...]
+    freedom: NDArray[np.intp]
     log_scale_variance: FloatArray
     noise: Noise | None = None
 
@@ -87,15 +99,20 @@ class Bank:
         A size that can't be negative (a friction) scores with a positive sign only.
         """
         products = self.columns.T @ residual.astype(np.float32)
-        signed = [c.first for c in self.candidates if c.effect.one_sided]
+        sided = np.array([each.effect.one_sided for each in self.candidates], dtype=bool)
+        signed = self.first[sided]
         products[signed] = np.maximum(products[signed], 0.0)
         squares = products.astype(np.float64) ** 2
-        starts = np.array([candidate.first for candidate in self.candidates], dtype=np.intp)
-        return np.asarray(np.add.reduceat(squares, starts, axis=0))
+        return np.asarray(np.add.reduceat(squares, self.first, axis=0))
 
     def p_values(self, scores: FloatArray) -> FloatArray:
         """Return the probability that chance alone does better, for each candidate by itself."""
         return local_p_values(scores, self.freedom, self.log_scale_variance)
+
+    @property
+    def first(self) -> NDArray[np.intp]:
+        """The number of each candidate's first column."""
+        return np.cumsum(self.freedom) - self.freedom
 
     def rows(self) -> dict[str, list[int]]:
         """Return the indices of the candidates of each effect, by its key."""
@@ -103,11 +120,6 @@ class Bank:
         for index, candidate in enumerate(self.candidates):
             found.setdefault(candidate.effect.key, []).append(index)
         return found
-
-    @property
-    def freedom(self) -> FloatArray:
-        """Degrees of freedom of each candidate."""
-        return np.array([candidate.width for candidate in self.candidates], dtype=np.float64)
 
 
 def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
@@ -120,7 +132,7 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
     most = sum(max(e.sizes, 1) * len(rows) for e, rows in zip(effects, shapes, strict=True))
     basis, filled = tangent_basis(fit), 0
     columns = np.empty((most, len(basis)), dtype=np.float32)
-    candidates, unsure = [], [np.zeros(0)]
+    candidates, freedom, unsure = list[Lead](), list[int](), [np.zeros(0)]
     at_once = max(min(_COLUMNS_AT_ONCE, _NUMBERS_AT_ONCE // len(basis)), 1)
     for effect, rows in zip(effects, shapes, strict=True):
         some = max(at_once // max(effect.sizes, 1), 1)
@@ -133,12 +145,13 @@ def build_bank(fit: Fit, noise: Noise, effects: Sequence[Effect]) -> Bank:
                 continue
             flat = units.reshape(-1, len(basis))
             columns[filled : filled + len(flat)] = flat
+            filled += len(flat)
             each = noise.log_scale_variance(flat)
             unsure.append(each.reshape(units.shape[:2]).mean(axis=1))
-            for shape in own:
-                candidates.append(Candidate(seen, shape, filled, units.shape[1]))
-                filled += units.shape[1]
-    return Bank(basis, columns[:filled].T, tuple(candidates), np.concatenate(unsure), noise)
+            candidates += [Lead(seen, shape) for shape in own]
+            freedom += [units.shape[1]] * len(own)
+    width = np.array(freedom, dtype=np.intp)
+    return Bank(basis, columns[:filled].T, tuple(candidates), width, np.concatenate(unsure), noise)
 
 
 def _beside(
@@ -273,26 +286,6 @@ class Chance:
     everywhere: Trials
     own: dict[str, Trials]
     draws: int = DRAWS
-
-
-@dataclass(frozen=True)
-class Lead:
-    """An effect's best score.
-
-    Parameters
-    ----------
-    effect, shape
-        The effect, and the shape at which it scores best.
-    score
-        Fall of chi^2, to first order.
-    p_value
-        Probability that chance does better over the effect's own shapes.
-    """
-
-    effect: Effect
-    shape: tuple[float, ...]
-    score: float
-    p_value: float
 
 
 @dataclass(frozen=True)
@@ -449,7 +442,7 @@ def _bank_leads(bank: Bank, scores: FloatArray, own: dict[str, Trials]) -> list[
         candidate = bank.candidates[max(rows, key=lambda row: scores[row])]
         score, local = float(np.max(scores[rows])), float(np.min(p_values[rows]))
         p_value = own[name].global_p_value(local) if name in own else local
-        leads.append(Lead(candidate.effect, candidate.shape, score, p_value))
+        leads.append(candidate._replace(score=score, p_value=p_value))
     return leads
 
 

@@ -8,7 +8,7 @@ fitted again, until none pays. A finding that no longer pays with a better model
 
 import math
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -27,14 +27,6 @@ from pendpipe.dynamics.any_law import NoMotionError
 _SHARE_OF_EACH: Final = TESTS_SHARE / len(FINDERS)
 _MOST_ROUNDS: Final = 12
 """Findings that are applied, and put back, of a record: about as many as there are tests."""
-
-
-class Applied(NamedTuple):
-    """A hypothesis with a finding applied, or withdrawn, what that gains, and what is said."""
-
-    gain: float
-    state: Hypothesis
-    said: str
 
 
 def correct(state: Hypothesis, task: Task) -> Hypothesis:
@@ -64,8 +56,8 @@ def _with_findings(state: Hypothesis, task: Task, *, last: bool) -> Hypothesis:
         better = [after for each in found if (after := _applied(each, state, task)) is not None]
         if not better:
             return _measured_anew(found, state, task)
-        _, state, said = max(better, key=lambda after: after.gain)
-        task.progress(said)
+        state = max(better, key=lambda after: after.lower)
+        task.progress(state.words)
     return state
 
 
@@ -129,15 +121,17 @@ def _less(taken: FloatArray, state: Hypothesis) -> Hypothesis:
     return replace(state, data=replace(data, values=data.values - taken), samples=samples)
 
 
-def _applied(finding: Finding, state: Hypothesis, task: Task) -> Applied | None:
+def _applied(finding: Finding, state: Hypothesis, task: Task) -> Hypothesis | None:
     """Apply a finding that is significant and pays, withdraw one that does no more."""
     known = _known(finding.identifier, state)
     if finding.kind == "property" and known is None:
         return None
     before = state if known is None else _put_back(known, state)
     if finding.p_value > task.level or not _pays(finding, state):
-        said = f"{finding.identifier}: no longer needed with the final model"
-        return None if known is None else Applied(math.inf, _settled(before, state), said)
+        if known is None:
+            return None
+        words = f"{finding.identifier}: no longer needed with the final model"
+        return replace(_settled(before, state), lower=math.inf, words=words)
     after = _with(finding, before)
     if finding.taken is None and finding.time_s is None:
         after = replace(after, faults=(*before.faults, finding))
@@ -145,7 +139,8 @@ def _applied(finding: Finding, state: Hypothesis, task: Task) -> Applied | None:
             after = _settled(after, state)
         elif known is not None:
             return None
-        return Applied(finding.delta_chi2, after, f"{finding.identifier}: {finding.summary}")
+        words = f"{finding.identifier}: {finding.summary}"
+        return replace(after, lower=finding.delta_chi2, words=words)
     data = after.data
     same = replace(state.data.first(len(data)), weight=data.weight)
     try:
@@ -161,7 +156,7 @@ def _applied(finding: Finding, state: Hypothesis, task: Task) -> Applied | None:
         gains = gain + (known.delta_chi2 if known else 0.0)
         found = replace(finding, delta_chi2=finding.delta_chi2 + gains)
         after = replace(after, faults=(*after.faults, found))
-    return Applied(gain, after.settle(fit, data, noise), finding.summary)
+    return replace(after.settle(fit, data, noise), lower=gain, words=finding.summary)
 
 
 def _pays(finding: Finding, state: Hypothesis) -> bool:
@@ -208,7 +203,7 @@ def _measured_anew(found: list[Finding], state: Hypothesis, task: Task) -> Hypot
     return replace(state, faults=tuple(faults), quiet=quiet, notes=notes)
 
 
-def random_torque(state: Hypothesis, task: Task) -> Applied | None:
+def random_torque(state: Hypothesis, task: Task) -> Hypothesis | None:
     """Apply the test for random kicks, whatever the model leaves."""
     if state.samples is None:
         return None

@@ -50,7 +50,7 @@ _LEAST_STEP: Final = 0.1
 
 @dataclass(frozen=True)
 class Step:
-    """One added effect.
+    """One added effect, with its rivals.
 
     Parameters
     ----------
@@ -59,15 +59,21 @@ class Step:
     p_value
         Global, when it was found.
     before
-        The model to which it was added.
+        The model to which it was added; once weighed, that of all other effects.
     predicted_worse
         Twice the log density that it costs in the prediction of cycles left out.
+    mates
+        The effects that the recording cannot distinguish from it, the best of each identifier.
+    weights
+        Probabilities of the effect, of its mates, and of none of them; empty until it is weighed.
     """
 
     rivals: tuple[Rival, ...]
     p_value: float
     before: Fit
     predicted_worse: float = 0.0
+    mates: tuple[Rival, ...] = ()
+    weights: tuple[float, ...] = ()
 
     @property
     def winner(self) -> Rival:
@@ -88,7 +94,7 @@ def price_of_another(names: int) -> float:
 
 def is_further(step: Step) -> bool:
     """Whether it is a name with a price: no curve, and nothing that is there anyway."""
-    effect = step.winner.lead.effect
+    effect = step.winner.effect
     known = effect.expected or effect.parameter_free or isinstance(effect, ReleasedParameter)
     return not (known or effect.kind == "unnamed")
 
@@ -122,6 +128,9 @@ class Hypothesis:
     without_curve
         The fit without the curve at the end: probabilities of names refer to it. None where there
         is no such curve, or no name beside it.
+    lower, words
+        By how much its score is lower than that of the hypothesis it was made from, and what was
+        done to that one.
     """
 
     beginning: Beginning
@@ -138,6 +147,8 @@ class Hypothesis:
     first: Detection | None = None
     now: Detection | None = None
     without_curve: Fit | None = None
+    lower: float = 0.0
+    words: str = ""
 
     def settle(self, fit: Fit, data: Data | None = None, noise: Noise | None = None) -> Hypothesis:
         """Return the hypothesis with a new fit, and the noise estimated from it."""
@@ -176,7 +187,7 @@ class Hypothesis:
         key = tuple(map(id, steps))
         if key not in self._without:
             model, value, held = self.fit.model, self.fit.value.copy(), list(self.held)
-            for effect in (step.winner.lead.effect for step in steps):
+            for effect in (step.winner.effect for step in steps):
                 model, value = model.dropping(effect, value)
                 if isinstance(effect, ReleasedParameter) and effect.index is not None:
                     held.append(effect.index)

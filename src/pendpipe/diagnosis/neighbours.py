@@ -10,7 +10,7 @@ sizes, less its prior (`rivals.Rival.charge`), with what its set predicts worse 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -48,7 +48,6 @@ from pendpipe.diagnosis.rivals import (
     NO_SCAN,
     Rival,
     Scale,
-    believable,
     off_harmonics,
     ranked,
     refit_leads,
@@ -126,7 +125,7 @@ def _charge(state: Hypothesis, rivals: Sequence[Rival]) -> float:
     A size is known to one part in g^(1/2) of it, for a gain of g in chi^2 (Laplace). Tones are
     scanned at every second cosine.
     """
-    effect, gain = rivals[0].lead.effect, max(rivals[0].gain, 1.0)
+    effect, gain = rivals[0].effect, max(rivals[0].gain, 1.0)
     by_frequency = Trials(0.5 * len(state.data), 0.0)
     own = state.scan.chance.own.get(effect.key)
     trials = own or (by_frequency if effect.spectral else Trials(1.0, 0.0))
@@ -140,37 +139,19 @@ _MOST_RARE: Final = 2
 """Rare names that may take the place of one curve."""
 
 
-class Neighbour(NamedTuple):
-    """A hypothesis one step away, whose noise is yet to be estimated anew."""
-
-    state: Hypothesis
-    lower: float
-    """By how much its score is lower."""
-    words: str
-
-
-class Proposed(NamedTuple):
-    """A set of effects, as steps, with its fit."""
-
-    fit: Fit
-    steps: tuple[Step, ...]
-    words: str = ""
-
-
-def compared(state: Hypothesis, here: Proposed, there: Sequence[Proposed]) -> Iterator[Neighbour]:
+def compared(here: Hypothesis, there: Sequence[Hypothesis]) -> Iterator[Hypothesis]:
     """Compare sets of effects with the present one by their scores."""
     best = min((here, *there), key=lambda each: each.fit.chi2)
-    scale = Scale.of(best.fit, state.data, state.noise)
+    scale = Scale.of(best.fit, here.data, here.noise)
 
-    def score(each: Proposed) -> float:
+    def score(each: Hypothesis) -> float:
         return scale.lost(each.fit.chi2) + price(each.steps)
 
     for each in there:
-        other = replace(state, fit=each.fit, steps=each.steps)
-        yield Neighbour(other, score(here) - score(each), each.words)
+        yield replace(each, lower=score(here) - score(each))
 
 
-def simpler(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
+def simpler(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:
     """Drop an effect, or exchange all names for a curve, or a curve for rare names or events."""
     there = [
         *_drops(state),
@@ -178,7 +159,7 @@ def simpler(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
         *_rare_for_a_curve(state, task.rare(state)),
         *_events_for_a_curve(state, task),
     ]
-    return compared(state, Proposed(state.fit, state.steps), there)
+    return compared(state, there)
 
 
 def leading(state: Hypothesis, task: Task, *, names_first: bool) -> Step | None:
@@ -197,19 +178,19 @@ def leading(state: Hypothesis, task: Task, *, names_first: bool) -> Step | None:
     if not rivals:
         return None
     # A rare name is a rival of what it looks like, and leads where `prefer_rare` says so.
-    rivals.sort(key=lambda rival: rival.lead.effect.rare)
+    rivals.sort(key=lambda rival: rival.effect.rare)
     if names_first:
         rivals.sort(key=lambda rival: rival.drawn)
     return Step(tuple(prefer_rare(state, rivals, task)), state.unexplained, state.fit)
 
 
-def adding(state: Hypothesis, step: Step) -> Neighbour:
+def adding(state: Hypothesis, step: Step) -> Hypothesis:
     """Add a step's leader. What its set predicts worse of cycles left out counts against it.
 
     Where it does not pay that is not asked.
     """
     winner, steps = step.winner, (*state.steps, step)
-    effect, held = winner.lead.effect, state.held
+    effect, held = winner.effect, state.held
     if isinstance(effect, ReleasedParameter):
         held = tuple(effect.without(held))
     lower = winner.worth - (price(steps) - price(state.steps))
@@ -224,11 +205,10 @@ def adding(state: Hypothesis, step: Step) -> Neighbour:
             drawn=winner.drawn,
         )
         lower, steps = lower - worse, (*state.steps, replace(step, predicted_worse=worse))
-    other = replace(state, fit=winner.fit, steps=steps, held=held)
     unit = state.data.unit
     before, after = (compact(_rms(fit, state.data), unit) for fit in (state.fit, winner.fit))
     words = f"adding {winner.name}: residual {before} → {after} rms"
-    return Neighbour(other, lower, words)
+    return replace(state, fit=winner.fit, steps=steps, held=held, lower=lower, words=words)
 
 
 def shares_a_misfit(step: Step, state: Hypothesis) -> bool:
@@ -244,19 +224,20 @@ def _rms(fit: Fit, data: Data) -> float:
     return float(np.sqrt(np.mean(residual**2)))
 
 
-def _drops(state: Hypothesis) -> Iterator[Proposed]:
+def _drops(state: Hypothesis) -> Iterator[Hypothesis]:
     """Drop one effect; what was held may not be held again."""
     for step in state.steps:
-        effect = step.winner.lead.effect
+        effect = step.winner.effect
         if isinstance(effect, ReleasedParameter):
             continue
         without = state.without(step)
         if without is not None:
             others = tuple(other for other in state.steps if other is not step)
-            yield Proposed(without, others, f"{effect.name} is no longer needed")
+            words = f"{effect.name} is no longer needed"
+            yield replace(state, fit=without, steps=others, words=words)
 
 
-def _curve_for_names(state: Hypothesis) -> Iterator[Proposed]:
+def _curve_for_names(state: Hypothesis) -> Iterator[Hypothesis]:
     """Put one curve in the place of several names."""
     names = [step for step in state.steps if is_further(step)]
     if len(names) < 2 or any(step.winner.drawn for step in state.steps):
@@ -270,10 +251,10 @@ def _curve_for_names(state: Hypothesis) -> Iterator[Proposed]:
     kept = [step for step in state.steps if step not in names]
     words = f"{rivals[0].name} alone does as well as {len(names)} effects"
     step = Step(tuple(rivals), names[0].p_value, bare)
-    yield Proposed(rivals[0].fit, (*kept, step), words)
+    yield replace(state, fit=rivals[0].fit, steps=(*kept, step), words=words)
 
 
-def _rare_for_a_curve(state: Hypothesis, rare: Sequence[Effect]) -> Iterator[Proposed]:
+def _rare_for_a_curve(state: Hypothesis, rare: Sequence[Effect]) -> Iterator[Hypothesis]:
     """Put a rare name, or two, in the place of a curve: a camera is oblique, and has a shutter."""
     for step in [step for step in state.steps if step.winner.drawn]:
         fit = state.without(step)
@@ -286,15 +267,16 @@ def _rare_for_a_curve(state: Hypothesis, rare: Sequence[Effect]) -> Iterator[Pro
             names = ranked([_rival(fit, each, scale) for each in fits])
             steps.append(Step(tuple(names), step.p_value, fit))
             fit = names[0].fit
-            yield Proposed(fit, tuple(steps), f"{names[0].name} in place of {step.winner.name}")
+            words = f"{names[0].name} in place of {step.winner.name}"
+            yield replace(state, fit=fit, steps=tuple(steps), words=words)
 
 
-def _events_for_a_curve(state: Hypothesis, task: Task) -> Iterator[Proposed]:
+def _events_for_a_curve(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:
     """Put events of one kind in the place of a curve in time, which gains more than each of them.
 
     The first are the three best of all kinds; each is followed by others of its own.
     """
-    for step in [step for step in state.steps if step.winner.lead.effect.in_time]:
+    for step in [step for step in state.steps if step.winner.effect.in_time]:
         bare = state.without(step)
         kept = tuple(other for other in state.steps if other is not step)
         enough = Scale.of(state.fit, state.data, state.noise).within(step.winner.charge)
@@ -303,8 +285,9 @@ def _events_for_a_curve(state: Hypothesis, task: Task) -> Iterator[Proposed]:
             fit, steps = bare, kept
             while fit and best and len(steps) < MOST_EFFECTS:
                 steps, gain = (*steps, Step((best,), step.p_value, fit)), fit.chi2 - best.fit.chi2
-                fit, words = best.fit, f"{best.name}, {len(steps) - len(kept)} times"
-                yield Proposed(fit, steps, f"{words}, in place of {step.winner.name}")
+                fit, times = best.fit, f"{best.name}, {len(steps) - len(kept)} times"
+                words = f"{times}, in place of {step.winner.name}"
+                yield replace(state, fit=fit, steps=steps, words=words)
                 if fit.chi2 - (MOST_EFFECTS - len(steps)) * gain > enough:
                     break  # the others would have to gain more than this one
                 best = next(iter(_events(fit, state, task, first.identifier)), None)
@@ -322,7 +305,7 @@ def _events(fit: Fit, state: Hypothesis, task: Task, kind: str = "") -> list[Riv
     )
 
 
-def describing(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
+def describing(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:
     """Describe what is left by the best curve, or a rare name.
 
     Where nothing was found in what chance does not explain, a curve says so, whatever it is worth.
@@ -335,8 +318,8 @@ def describing(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
     found = any(map(is_further, state.steps)) or state.faults
     step = Step(tuple(prefer_rare(state, rivals, task)), state.unexplained, state.fit)
     lower = rivals[0].evidence - CHOICE if found else math.inf
-    other = replace(state, fit=step.winner.fit, steps=(*state.steps, step))
-    yield Neighbour(other, lower, f"describing what is left by {step.winner.name}")
+    words, steps = f"describing what is left by {step.winner.name}", (*state.steps, step)
+    yield replace(state, fit=step.winner.fit, steps=steps, lower=lower, words=words)
 
 
 def prefer_rare(state: Hypothesis, rivals: Sequence[Rival], task: Task) -> list[Rival]:
@@ -346,8 +329,8 @@ def prefer_rare(state: Hypothesis, rivals: Sequence[Rival], task: Task) -> list[
     often. They are asked where what leads only describes what they would explain.
     """
     leader, before = rivals[0], state.fit
-    tone = leader.lead.effect.spectral or isinstance(leader.lead.effect, PlaneCoupling)
-    tone = tone and not off_harmonics(leader.fit, leader.lead.effect)
+    tone = leader.effect.spectral or isinstance(leader.effect, PlaneCoupling)
+    tone = tone and not off_harmonics(leader.fit, leader.effect)
     if not (leader.drawn or tone):
         return list(rivals)
     fits = _with_each(before, task.rare(state), state)
@@ -355,9 +338,7 @@ def prefer_rare(state: Hypothesis, rivals: Sequence[Rival], task: Task) -> list[
         return list(rivals)
     lowest = min((leader.fit, *fits), key=lambda fit: fit.chi2)
     scale = Scale.of(lowest, state.data, state.noise)
-    others = [
-        each.again(each.fit, before.chi2, scale) for each in rivals if not each.lead.effect.rare
-    ]
+    others = [each.again(each.fit, before.chi2, scale) for each in rivals if not each.effect.rare]
     named = ranked([_rival(before, fit, scale) for fit in fits])
     added = price_of_another(sum(map(is_further, state.steps))) if leader.drawn else 0.0
     if named[0].evidence - added <= others[0].evidence:
@@ -366,8 +347,7 @@ def prefer_rare(state: Hypothesis, rivals: Sequence[Rival], task: Task) -> list[
 
 
 def _rival(bare: Fit, fit: Fit, scale: Scale) -> Rival:
-    lead = Lead(fit.model.effects[-1], (), bare.chi2 - fit.chi2, 0.0)
-    return Rival.of(lead, fit, bare.chi2, scale, NO_SCAN)
+    return Rival.of(fit.model.effects[-1], fit, bare.chi2, scale, NO_SCAN)
 
 
 def _with_curves(bare: Fit, state: Hypothesis, *, in_time: bool = False) -> list[Fit]:
@@ -381,7 +361,7 @@ def _with_curves(bare: Fit, state: Hypothesis, *, in_time: bool = False) -> list
 def _with_each(bare: Fit, effects: Sequence[Effect], state: Hypothesis) -> list[Fit]:
     """Fit each effect beside those of a model; effects without a shape, and not twice the same."""
     present = {effect.key for effect in bare.model.effects}
-    leads = [Lead(each, (), 0.0, 0.0) for each in effects if each.key not in present]
+    leads = [Lead(each) for each in effects if each.key not in present]
     lost = loses_phase(bare)
     fits = side_by_side(bare, state.data, state.noise, leads, state.held, phase_lost=lost)
-    return [fit for lead, fit in fits if fit and believable(bare, fit, lead.effect)]
+    return [fit for _, fit in fits]

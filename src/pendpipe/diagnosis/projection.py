@@ -7,9 +7,10 @@ product of the rest, at unit length, with the whitened residual: the locally mos
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import betainc, chdtrc
 
 from pendpipe.arrays import FloatArray, scaled_qr
@@ -103,7 +104,7 @@ def finer_shape(
 
 
 def local_p_values(
-    scores: FloatArray, freedom: FloatArray, log_scale_variance: FloatArray | None = None
+    scores: FloatArray, freedom: NDArray[Any], log_scale_variance: FloatArray | None = None
 ) -> FloatArray:
     """Return the probability that chance alone does better, for each candidate by itself.
 

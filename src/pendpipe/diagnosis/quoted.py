@@ -19,13 +19,12 @@ import numpy as np
 from pendpipe.analysis.fit.quality import small_frequency
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.hypothesis import Hypothesis
+from pendpipe.diagnosis.hypothesis import Hypothesis, Step
 from pendpipe.diagnosis.refine import Fit, best_fit
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import with_errors
 from pendpipe.diagnosis.rivals import Rival
 from pendpipe.diagnosis.values import constants_of, quality_factors_of, small_periods
-from pendpipe.diagnosis.weighing import Weighed
 from pendpipe.estimate import LISTED, Estimate, averaged
 
 _STARTS: Final = 2
@@ -59,19 +58,19 @@ class _Choice(NamedTuple):
 _Chosen = tuple[_Choice, ...]
 
 
-def descriptions_of(found: Hypothesis, weighed: Sequence[Weighed]) -> list[Description]:
+def descriptions_of(found: Hypothesis) -> list[Description]:
     """Fit each description of a probability of 5 % and more, the most probable first.
 
     Where some leave only noise, these alone. Of a recording that lacks nothing it is the fit.
     """
-    choices = [_choices(step.winner, each) for step, each in zip(found.steps, weighed, strict=True)]
+    choices = [_choices(step) for step in found.steps]
     sets = [
         (math.prod(choice.probability for choice in chosen), chosen)
         for chosen in itertools.product(*choices)
         if not _twice(chosen)
     ]
     sets.sort(key=lambda each: -each[0])
-    known = _known(found, weighed)
+    known = _known(found)
     described = []
     for number, (probability, chosen) in enumerate(sets):
         if number and probability < LISTED:
@@ -84,41 +83,38 @@ def descriptions_of(found: Hypothesis, weighed: Sequence[Weighed]) -> list[Descr
     return [each for each in described if each.fit.scatter is None] or described
 
 
-def _choices(winner: Rival, weighed: Weighed) -> list[_Choice]:
+def _choices(step: Step) -> list[_Choice]:
     """Return the effect that was added, the mates of its class, and none of these."""
-    rivals = (winner, *weighed.mates)
-    named = [
-        _Choice(float(weight), rival)
-        for weight, rival in zip(weighed.weights[:-1], rivals, strict=True)
-    ]
+    rivals = (step.winner, *step.mates)
+    named = list(map(_Choice, step.weights[:-1], rivals))
     return [*named, _Choice(max(1.0 - sum(each.probability for each in named), 0.0), None)]
 
 
 def _twice(chosen: _Chosen) -> bool:
     """Whether a curve is drawn twice: the mate of one step is what another has added."""
-    drawn = [each.rival.lead.effect.key for each in chosen if each.rival and each.rival.drawn]
+    drawn = [each.rival.effect.key for each in chosen if each.rival and each.rival.drawn]
     return len(set(drawn)) < len(drawn)
 
 
 def _key(chosen: _Chosen) -> tuple[str, ...]:
     """Which effects, by step; what happens twice is told apart by its step."""
-    return tuple(each.rival.lead.effect.key if each.rival else "" for each in chosen)
+    return tuple(each.rival.effect.key if each.rival else "" for each in chosen)
 
 
-def _known(found: Hypothesis, weighed: Sequence[Weighed]) -> dict[tuple[str, ...], Fit]:
+def _known(found: Hypothesis) -> dict[tuple[str, ...], Fit]:
     """Return what was fitted already: each step's mates, and the model without it.
 
     Names were weighed without the curve at the end.
     """
-    own = tuple(step.winner.lead.effect.key for step in found.steps)
+    own = tuple(step.winner.effect.key for step in found.steps)
     known = {("",) * len(own): found.baseline, own: found.fit}
     names = own
     if found.without_curve:
         names = (*own[:-1], "")
         known[names] = found.without_curve
-    for number, (step, each) in enumerate(zip(found.steps, weighed, strict=True)):
+    for number, step in enumerate(found.steps):
         beside = own if step.winner.drawn else names
-        for key, fit in [("", each.without), *((m.lead.effect.key, m.fit) for m in each.mates)]:
+        for key, fit in [("", step.before), *((m.effect.key, m.fit) for m in step.mates)]:
             known.setdefault((*beside[:number], key, *beside[number + 1 :]), fit)
     return known
 
@@ -132,7 +128,7 @@ def _fitted(found: Hypothesis, chosen: _Chosen, fits: Sequence[Fit]) -> Fit | No
     here = {id(effect): found.fit.value[place] for effect, place in found.fit.model.places()}
     values = list[FloatArray]()
     for rival in (each.rival for each in chosen if each.rival):
-        effect = rival.lead.effect
+        effect = rival.effect
         model = model.adding(effect)
         if isinstance(effect, ReleasedParameter):
             held = effect.without(held)
@@ -177,14 +173,12 @@ class Quoted:
         return {y: each for y, each in self.numbers.items() if not isinstance(y, str)}
 
 
-def quoted(
-    found: Hypothesis, weighed: Sequence[Weighed], fit: FitResult | None, level: float
-) -> Quoted:
+def quoted(found: Hypothesis, fit: FitResult | None, level: float) -> Quoted:
     """Average the numbers of one recording.
 
     Parameters
     ----------
-    found, weighed
+    found
         The end of a search.
     fit
         What ``pendpipe fit`` prints: it stands for "none of these", and its errors are the least
@@ -199,7 +193,7 @@ def quoted(
         return {**constants_of(fit, unit), **quality_factors_of(fit, amplitudes)}
 
     bare = constants_of(with_errors(found.baseline, found.data, found.noise), unit)
-    return averages(found, descriptions_of(found, weighed), of, {**bare, **printed_by(fit)}, level)
+    return averages(found, descriptions_of(found), of, {**bare, **printed_by(fit)}, level)
 
 
 def averages(

@@ -148,10 +148,8 @@ class Rival:
 
     Parameters
     ----------
-    lead
-        Its score in the scan.
-    fit
-        Of the extended model.
+    effect, fit
+        The effect, and the model with it.
     gain
         Delta chi^2 over the model without it.
     worth
@@ -161,18 +159,18 @@ class Rival:
         the trials of the effect's own scan included, with its prior.
     """
 
-    lead: Lead
+    effect: Effect
     fit: Fit
     gain: float
     worth: float
     evidence: float
 
     @classmethod
-    def of(cls, lead: Lead, fit: Fit, before: float, scale: Scale, chance: Chance) -> Rival:
+    def of(cls, effect: Effect, fit: Fit, before: float, scale: Scale, chance: Chance) -> Rival:
         """Return the rival whose fit lowers chi^2 from `before`."""
         worth = scale.worth(before, fit.chi2)
-        found = evidence(lead, fit, worth, chance, scale.unit)
-        return cls(lead, fit, before - fit.chi2, worth, found)
+        found = evidence(effect, fit, worth, chance, scale.unit)
+        return cls(effect, fit, before - fit.chi2, worth, found)
 
     def again(self, fit: Fit, before: float, scale: Scale) -> Rival:
         """Return it with another fit, and the same charge for its scan.
@@ -180,9 +178,9 @@ class Rival:
         A curve has no scan; it is charged for the coefficients that it needs now.
         """
         if self.drawn:
-            return Rival.of(self.lead, fit, before, scale, NO_SCAN)
+            return Rival.of(self.effect, fit, before, scale, NO_SCAN)
         worth = scale.worth(before, fit.chi2)
-        return Rival(self.lead, fit, before - fit.chi2, worth, worth - self.charge)
+        return Rival(self.effect, fit, before - fit.chi2, worth, worth - self.charge)
 
     @property
     def charge(self) -> float:
@@ -192,22 +190,22 @@ class Rival:
     @property
     def identifier(self) -> str:
         """The effect's identifier."""
-        return self.lead.effect.identifier
+        return self.effect.identifier
 
     @property
     def name(self) -> str:
         """The effect's name in words."""
-        return self.lead.effect.name
+        return self.effect.name
 
     @property
     def prior(self) -> float:
         """Twice the log of its prior probability ratio, with that of its size."""
-        return _prior(self.lead.effect, self.fit)
+        return _prior(self.effect, self.fit)
 
     @property
     def drawn(self) -> bool:
         """Whether it is an unnamed curve."""
-        return self.lead.effect.kind == "unnamed"
+        return self.effect.kind == "unnamed"
 
 
 def form_spread(best: Rival) -> float:
@@ -229,7 +227,7 @@ def of_one_class(best: Rival, rival: Rival) -> bool:
     Each additional value is charged 2 (Akaike).
     """
     within = class_width(best)
-    more = max(best.lead.effect.count - rival.lead.effect.count, 0)
+    more = max(best.effect.count - rival.effect.count, 0)
     by_record = best.worth - rival.worth - _SHAPE_CHARGE * more < within
     return by_record or best.evidence - rival.evidence < within
 
@@ -241,12 +239,12 @@ def equivalent(p_value: float, score: float) -> float:
     return float(chdtri(1, p_value))
 
 
-def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance, unit: float = 1.0) -> float:
+def evidence(effect: Effect, fit: Fit, gain: float, chance: Chance, unit: float = 1.0) -> float:
     """Convert a worth to evidence, comparable between effects with more or fewer free values.
 
     Parameters
     ----------
-    lead, fit
+    effect, fit
         The effect, and the model with it.
     gain
         What its Delta chi^2 is worth.
@@ -255,13 +253,12 @@ def evidence(lead: Lead, fit: Fit, gain: float, chance: Chance, unit: float = 1.
     unit
         The chi^2 that counts as 1.
     """
-    superfluous, sizes = _needed_sizes(fit, lead.effect, unit)
+    superfluous, sizes = _needed_sizes(fit, effect, unit)
     gain -= superfluous
     if gain <= 0.0:
         # A negative gain stays negative: a rival that is refitted with another noise
         # (`Rival.again`) must not be credited with it.
         return gain
-    effect = lead.effect
     if effect.parameter_free:
         # The size is predicted: a free one would be charged.
         gain += max(math.log(gain) - 0.45, 0.0)
@@ -311,7 +308,7 @@ def ranked(rivals: Sequence[Rival]) -> list[Rival]:
     def order(rival: Rival) -> tuple[int, float, float]:
         if best.evidence - rival.evidence >= within:
             return 3, 0.0, -rival.evidence
-        freedom = int(rival.drawn) + int(rival.lead.effect.in_time)
+        freedom = int(rival.drawn) + int(rival.effect.in_time)
         return freedom, -rival.prior if rival.drawn else 0.0, -rival.evidence
 
     return sorted(rivals, key=order)
@@ -330,7 +327,7 @@ def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:
     likelihood = np.array([rival.evidence for rival in rivals]) - prior
     best = float(likelihood.max())
     # A released parameter has the baseline's own form, which has no such uncertainty.
-    own_form = np.array([rival.lead.effect.kind == "parameter" for rival in rivals])
+    own_form = np.array([rival.effect.kind == "parameter" for rival in rivals])
     worth = np.where(own_form, 1.0, shrunk) * (likelihood - best)
     logs = _in_order(0.5 * (worth + prior), rivals)
     logs = np.append(logs, 0.5 * (none - best))
@@ -390,14 +387,11 @@ def refit_leads(
 ) -> list[Rival]:
     """Refit the leading effects nonlinearly, and return them ranked, the best first."""
     leads = _worth_refitting(detection.leads, phase_lost, most, wide=bool(pulled(base)))
-    fits: list[tuple[Lead, Fit]] = []
-    for lead, fit in side_by_side(base, data, noise, leads, held, phase_lost=phase_lost):
-        if fit is not None and believable(base, fit, lead.effect):
-            fits.append((lead, fit))
+    fits = side_by_side(base, data, noise, leads, held, phase_lost=phase_lost)
     if not fits:
         return []
     scale = Scale.of(min((fit for _, fit in fits), key=lambda fit: fit.chi2), data, noise)
-    rivals = ranked([Rival.of(lead, fit, base.chi2, scale, detection.chance) for lead, fit in fits])
+    rivals = ranked([Rival.of(*each, base.chi2, scale, detection.chance) for each in fits])
     return rivals if scale.clean else _names_first(rivals)
 
 
@@ -415,7 +409,7 @@ def _names_first(rivals: list[Rival]) -> list[Rival]:
 
     def order(rival: Rival) -> tuple[bool, float, bool, float]:
         prior = rival.prior if rival.evidence > near else -math.inf
-        return rival.drawn or rival.gain < half, -prior, rival.lead.effect.local, -rival.evidence
+        return rival.drawn or rival.gain < half, -prior, rival.effect.local, -rival.evidence
 
     return sorted(rivals, key=order)
 
@@ -462,8 +456,8 @@ def side_by_side(
     held: Sequence[int],
     *,
     phase_lost: bool,
-) -> list[tuple[Lead, Fit | None]]:
-    """Refit each lead; None where that fails.
+) -> list[tuple[Effect, Fit]]:
+    """Refit each lead; those of which that fails, or that nobody believes, are left out.
 
     Where the phase is lost all refits run to their end: an effect that explains a quarter may
     come first, and gains still grow while a scale is far off.
@@ -473,8 +467,9 @@ def side_by_side(
     refits = [_started(base, data, noise, lead, held, little) for lead in leads]
     useful = math.inf if phase_lost else _limit(base, data, noise, leads, refits)
     return [
-        (lead, _finished(refit, useful) if refit else None)
+        (lead.effect, fit)
         for lead, refit in zip(leads, refits, strict=True)
+        if refit and (fit := _finished(refit, useful)) and believable(base, fit, lead.effect)
     ]
 
 

@@ -37,11 +37,7 @@ from pendpipe.diagnosis.remainder import remainder_of, with_errors
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.search import baseline_fitted, run_search
 from pendpipe.diagnosis.values import parameters_of
-from pendpipe.diagnosis.weighing import (
-    Weighed,
-    effect_named,
-    fault_named,
-)
+from pendpipe.diagnosis.weighing import effect_named, fault_named
 from pendpipe.dynamics.any_law import NoMotionError, sample_pieces
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects import Effect
@@ -215,17 +211,16 @@ def diagnose_decay(
         catalogue = catalogue_beside(restoring)
         task = Task(catalogue, released, baseline, level, seed, progress, samples)
         # No name holds a fit that is left behind: of a long recording it is large.
-        found, weighed = run_search(baseline_fitted(beginning, task), task)
-        found = _with_scatter(found, samples)
+        found = _with_scatter(run_search(baseline_fitted(beginning, task), task), samples)
     except NoMotionError as error:
         remedy = "cut it with --start and --stop, or change what is held with --fix"
         raise NotAnalysableError(place, f"the model can't follow it ({error})", remedy) from error
-    effects = _in_order(found, weighed, samples)
+    effects = _in_order(found, samples)
     verdict = verdict_of(effects, found.p_value, level)
     # A part of b that is held bounds b here alone.
     printed = None if beginning.model.parts else fit
     stands = printed if printed and printed.light != "red" else None
-    before, after, leading = _models(found, weighed, printed, level)
+    before, after, leading = _models(found, printed, level)
     drag_form, swung = stands.drag_form if stands else "energy", found.baseline.model.restoring
     gap = gap_note((whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
     stamps = tuple(note for note in (gap, *found.notes.values()) if note)
@@ -254,10 +249,7 @@ def diagnose_decay(
 
 
 def _models(
-    found: Hypothesis,
-    weighed: Sequence[Weighed],
-    fit: FitResult | None,
-    level: float,
+    found: Hypothesis, fit: FitResult | None, level: float
 ) -> tuple[FittedModel, FittedModel, Fit]:
     """Return the baseline as it is printed, the model with what is missing, and its fit.
 
@@ -274,7 +266,7 @@ def _models(
         before = replace(law if of_all else before, parameters={**law.parameters, **small})
     if _adds_nothing(found) and found.fit.error_scale == 1.0:
         return before, before, found.fit
-    said = quoted(found, weighed, fit, level)
+    said = quoted(found, fit, level)
     after = _fitted_model(found.fit, found)
     parameters = {**parameters_of(said.leading, found.data), **said.constants}
     after = replace(
@@ -298,15 +290,10 @@ def _left_out(found: Hypothesis, held: Sequence[int], progress: Progress) -> Hel
     return held_out(found.baseline, found.fit, found.data, found.noise, held, found.held)
 
 
-def _in_order(
-    found: Hypothesis, weighed: Sequence[Weighed], samples: Samples
-) -> tuple[FoundEffect, ...]:
+def _in_order(found: Hypothesis, samples: Samples) -> tuple[FoundEffect, ...]:
     """List effects and measurement faults in the order in which they were added."""
-    effects = [
-        (number, effect_named(found, step, each))
-        for number, (step, each) in enumerate(zip(found.steps, weighed, strict=True))
-    ]
-    faults = [(fault.after, fault_named(found, fault, weighed)) for fault in found.faults]
+    effects = [(number, effect_named(found, step)) for number, step in enumerate(found.steps)]
+    faults = [(fault.after, fault_named(found, fault)) for fault in found.faults]
     # The sort is stable: a fault goes before the effect that followed it.
     order = [each for _, each in sorted([*faults, *effects], key=lambda pair: pair[0])]
     return tuple(_checked(each, found, samples) for each in order)

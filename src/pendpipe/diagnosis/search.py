@@ -7,7 +7,6 @@ from typing import Final
 import numpy as np
 
 from pendpipe.diagnosis.begin import Beginning
-from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.faults import correct, examine, random_torque
 from pendpipe.diagnosis.hypothesis import (
     MOST_EFFECTS,
@@ -18,8 +17,6 @@ from pendpipe.diagnosis.hypothesis import (
     is_gross,
 )
 from pendpipe.diagnosis.neighbours import (
-    Neighbour,
-    Proposed,
     adding,
     compared,
     describing,
@@ -32,7 +29,7 @@ from pendpipe.diagnosis.refine import Fit, best_fit, fitted_from, refine
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
 from pendpipe.diagnosis.rivals import NO_SCAN, Rival, Scale
 from pendpipe.diagnosis.summary import BASELINES
-from pendpipe.diagnosis.weighing import Weighed, weigh, with_likelier
+from pendpipe.diagnosis.weighing import weigh, with_likelier
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.dynamics.eq8 import C
 
@@ -57,7 +54,7 @@ def baseline_fitted(beginning: Beginning, task: Task) -> Hypothesis:
     return Hypothesis(beginning, fit, data, white, held, fit, task.samples).settle(fit)
 
 
-def run_search(state: Hypothesis, task: Task) -> tuple[Hypothesis, tuple[Weighed, ...]]:
+def run_search(state: Hypothesis, task: Task) -> Hypothesis:
     """Go to a neighbour of a smaller score, until there is none that was not seen.
 
     Cheap neighbours come first, and the first kind that has a better one is taken. Last, where all
@@ -71,28 +68,28 @@ def run_search(state: Hypothesis, task: Task) -> tuple[Hypothesis, tuple[Weighed
         begun = max(_starts(state, task), key=lambda each: each.lower, default=None)
         if begun is not None and begun.lower > 0.0:
             task.progress(begun.words)
-            state = begun.state.settle(begun.state.fit)
+            state = begun.settle(begun.fit)
     while True:
         state = with_other_noise(task.scanned(correct(state, task)), task)
         seen.add(state.key)
         for some in (_additions, simpler, _descriptions):
-            new = [each for each in some(state, task) if each.state.key not in seen]
+            new = [each for each in some(state, task) if each.key not in seen]
             best = max(new, key=lambda each: each.lower, default=None)
             if best is not None and best.lower > 0.0:
                 task.progress(best.words)
-                state = best.state.settle(best.state.fit)
+                state = best.settle(best.fit)
                 break
         else:
             state = _judged(examine(state, task))
             weighed = tuple(weigh(state, step) for step in state.steps)
             other = with_likelier(state, weighed, seen)
             if other is None:
-                return state, weighed
+                return replace(state, steps=weighed)
             task.progress(f"{' and '.join(step.winner.name for step in other.steps)} is likelier")
             state = other
 
 
-def _starts(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
+def _starts(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:
     """Add an effect from a start of its own, where it leaves less of the readings.
 
     Without its phase a model's chi^2 says less than the squares of what it leaves.
@@ -104,14 +101,19 @@ def _starts(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
         fit = fitted_from(before.model.adding(start.effect), data, noise, value, held=state.held)
         if fit is None:
             continue
-        lead = Lead(start.effect, (), before.chi2 - fit.chi2, 0.0)
-        rival = Rival.of(lead, fit, before.chi2, Scale.of(fit, data, noise), NO_SCAN)
-        other = replace(state, fit=fit, steps=(Step((rival,), state.unexplained, before),))
+        scale = Scale.of(fit, data, noise)
+        rival = Rival.of(start.effect, fit, before.chi2, scale, NO_SCAN)
         squares = [np.sum((data.residual(f.at.reading) * data.weight) ** 2) for f in (before, fit)]
-        yield Neighbour(other, float(squares[0] - squares[1]), f"beginning with {rival.name}")
+        yield replace(
+            state,
+            fit=fit,
+            steps=(Step((rival,), state.unexplained, before),),
+            lower=float(squares[0] - squares[1]),
+            words=f"beginning with {rival.name}",
+        )
 
 
-def _additions(state: Hypothesis, task: Task, *, names_first: bool = False) -> Iterator[Neighbour]:
+def _additions(state: Hypothesis, task: Task, *, names_first: bool = False) -> Iterator[Hypothesis]:
     """Add the effect that leads, or random kicks; or two names that share a misfit."""
     drawn, chance = _ends_with_curve(state), state.scan.p_value > task.threshold
     if chance or drawn or len(state.steps) >= MOST_EFFECTS:
@@ -123,37 +125,35 @@ def _additions(state: Hypothesis, task: Task, *, names_first: bool = False) -> I
     yield one
     yield from _kicks(state, task, one)
     # Of two laws that share a misfit neither may pay its price before the other is there.
-    if one.lower < -one.state.steps[-1].predicted_worse and shares_a_misfit(step, state):
-        trial = task.scanned(correct(one.state.settle(one.state.fit), task))
+    if one.lower < -one.steps[-1].predicted_worse and shares_a_misfit(step, state):
+        trial = task.scanned(correct(one.settle(one.fit), task))
         for more in _additions(trial, task, names_first=True):
             yield _from(state, more)
 
 
-def _kicks(state: Hypothesis, task: Task, instead: Neighbour) -> Iterator[Neighbour]:
+def _kicks(state: Hypothesis, task: Task, instead: Hypothesis) -> Iterator[Hypothesis]:
     """Let random kicks explain the residual, instead of an effect that leaves more than noise.
 
     They leave none of it: both gains count against the noise.
     """
-    winner = instead.state.steps[-1].winner
+    winner = instead.steps[-1].winner
     left = remainder_of(winner.fit, state.data, state.noise)
     if left.systematic and not is_gross(state.fit, state.data):
         kicked = random_torque(state, task)
         if kicked is not None:
-            ahead = kicked.gain - (winner.gain - winner.charge)
-            yield Neighbour(kicked.state, instead.lower + ahead, kicked.said)
+            ahead = kicked.lower - (winner.gain - winner.charge)
+            yield replace(kicked, lower=instead.lower + ahead)
 
 
-def _from(state: Hypothesis, more: Neighbour) -> Neighbour:
+def _from(state: Hypothesis, after: Hypothesis) -> Hypothesis:
     """Compare a neighbour of a neighbour with the hypothesis before both."""
-    after = more.state
     model = state.fit.model.at_times(after.data.time_s)
     fit = refine(model, after.data, after.noise, state.fit.value, held=state.held, rounds=0)
-    here, there = Proposed(fit, state.steps), Proposed(after.fit, after.steps)
-    (found,) = compared(after, here, [there])
-    return more._replace(lower=found.lower)
+    (found,) = compared(replace(after, fit=fit, steps=state.steps), [after])
+    return found
 
 
-def _descriptions(state: Hypothesis, task: Task) -> Iterator[Neighbour]:
+def _descriptions(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:
     if state.remainder.systematic and not _ends_with_curve(state):
         yield from describing(state, task)
 

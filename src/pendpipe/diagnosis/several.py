@@ -43,7 +43,7 @@ from pendpipe.diagnosis.search import LESS_FRICTION, run_search
 from pendpipe.diagnosis.stacked import StackedData, StackedNoise
 from pendpipe.diagnosis.summary import DOUBTFUL
 from pendpipe.diagnosis.values import constants_of
-from pendpipe.diagnosis.weighing import Weighed, effect_named
+from pendpipe.diagnosis.weighing import effect_named
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.dynamics.eq8 import BASELINE, C, Restoring
 from pendpipe.effects import Effect
@@ -121,7 +121,7 @@ def diagnose_several(
         raise InputError("diagnose", "angles and displacements are mixed", "give one kind")
     progress("all together")
     try:
-        found, weighed = search_together(
+        found = search_together(
             outcomes,
             baseline=baseline,
             level=level,
@@ -134,12 +134,10 @@ def diagnose_several(
     except NoMotionError as error:
         remedy = "diagnose them one by one"
         raise NotAnalysableError("diagnose", f"no model follows all ({error})", remedy) from error
-    after = _Together(
-        found, found.fit, descriptions_of(found, weighed), outcomes, names, own, level
-    )
+    after = _Together(found, found.fit, descriptions_of(found), outcomes, names, own, level)
     bare = with_errors(found.baseline, found.data, found.noise)
     before = replace(after, improved=found.baseline, described=[Description(1.0, bare)])
-    named, differing = after.effects(weighed)
+    named, differing = after.effects()
     events = after.events()
     p_value = min([found.p_value, *(outcome.p_value for outcome in outcomes)])
     p_value = min(1.0, (len(outcomes) + 1) * p_value)
@@ -185,7 +183,7 @@ def search_together(
     same_sensor: bool,
     own: Sequence[str],
     progress: Progress,
-) -> tuple[Hypothesis, tuple[Weighed, ...]]:
+) -> Hypothesis:
     """Hypothesis for what all recordings lack, or do not share, and weigh it.
 
     Parameters
@@ -321,7 +319,7 @@ def _known_first(state: Hypothesis, task: Task, searches: Sequence[Hypothesis]) 
     named: dict[str, list[Step]] = {}
     for found in searches:
         for step in found.steps:
-            named.setdefault(step.winner.lead.effect.key, []).append(step)
+            named.setdefault(step.winner.effect.key, []).append(step)
     if loses_phase(state.fit):
         state = task.scanned(state)
     order = sorted(named.values(), key=lambda steps: -sum(step.winner.gain for step in steps))
@@ -331,20 +329,19 @@ def _known_first(state: Hypothesis, task: Task, searches: Sequence[Hypothesis]) 
         model, before = state.fit.model, state.fit
         assert isinstance(model, Stack)
         step = max(steps, key=lambda each: each.winner.gain)
-        common = model.admitted([step.winner.lead.effect])
+        common = model.admitted([step.winner.effect])
         if step.winner.drawn or not common:
             continue
         fit = _fitted(model.adding(common[0]), state.data, state.noise, searches, state.held)
         if fit is None:
             continue
         scale = Scale.of(fit, state.data, state.noise)
-        lead = replace(step.winner.lead, effect=common[0])
-        winner = replace(step.winner, lead=lead).again(fit, before.chi2, scale)
+        winner = replace(step.winner, effect=common[0]).again(fit, before.chi2, scale)
         # Rivals are refitted when they are weighed, each from its values in one recording.
         rivals = [
             rival
             for rival in step.rivals[1:]
-            if not rival.drawn and model.admitted([rival.lead.effect]) == [rival.lead.effect]
+            if not rival.drawn and model.admitted([rival.effect]) == [rival.effect]
         ]
         added = Step((winner, *rivals), step.p_value, before)
         if winner.worth < price([*state.steps, added]) - price(state.steps):
@@ -414,11 +411,11 @@ class _Together:
 
         return of(self.improved)[name] if name in self.differing else self.averaged(of)[name]
 
-    def effects(self, weighed: Sequence[Weighed]) -> tuple[list[FoundEffect], list[FoundEffect]]:
+    def effects(self) -> tuple[list[FoundEffect], list[FoundEffect]]:
         """Return what all recordings lack, and what they contradict each other in."""
         named, differing = [], []
-        for step, each in zip(self.found.steps, weighed, strict=True):
-            effect, one = step.winner.lead.effect, effect_named(self.found, step, each)
+        for step in self.found.steps:
+            effect, one = step.winner.effect, effect_named(self.found, step)
             if isinstance(effect, Differs):
                 differing.append(self.contradiction(effect, one))
                 continue

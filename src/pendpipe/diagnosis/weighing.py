@@ -4,11 +4,10 @@ import math
 from collections.abc import Collection, Container, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.found import CANDIDATE, Finding, FoundEffect, Mate
 from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Step, is_further, is_gross
 from pendpipe.diagnosis.instants import with_instants
@@ -48,38 +47,13 @@ _SAME_GAIN: Final = 0.02
 """Relative change of a gain below which the rivals are not refitted."""
 
 
-class Weighed(NamedTuple):
-    """An effect and its rivals, beside all other effects.
-
-    Parameters
-    ----------
-    without
-        The fit without it.
-    gain
-        Its Delta chi^2.
-    mates
-        The effects that the recording cannot distinguish from it, the best of each identifier.
-    weights
-        Probabilities of the effect, of its mates, and of none of them.
-    rivals
-        All that were refitted beside the other effects, of one class or not.
-    """
-
-    without: Fit
-    gain: float
-    mates: tuple[Rival, ...]
-    weights: FloatArray
-    rivals: tuple[Rival, ...]
-
-
-def weigh(found: Hypothesis, step: Step) -> Weighed:
+def weigh(found: Hypothesis, step: Step) -> Step:
     """Compare one effect with its rivals, beside all other effects."""
-    effect = step.winner.lead.effect
+    effect = step.winner.effect
     found = beside(found, effect)
-    without, rivals = _rivalry(found, step)
-    gain = without.chi2 - found.fit.chi2
-    own = next((rival for rival in rivals if rival.lead.effect.key == effect.key), step.winner)
-    others = [rival for rival in rivals if rival.identifier != effect.identifier]
+    step = _refitted_beside(found, step)
+    own = step.winner
+    others = [rival for rival in step.rivals if rival.identifier != effect.identifier]
     mates = _best_of_each([mate for mate in others if of_one_class(own, mate)])
     # An effect that every pendulum has gets its prior against rivals and against "none of these".
     none = own.evidence - max(own.prior, 0.0) - _clean_charge(found)
@@ -90,8 +64,8 @@ def weigh(found: Hypothesis, step: Step) -> Weighed:
     weights = probabilities([own, *mates], none)
     # What every pendulum has, and a line off the harmonics, no misfit can be mistaken for.
     if not (effect.expected or off_harmonics(found.fit, effect)):
-        weights = weights * _explained(found, effect, gain)
-    return Weighed(without, gain, tuple(mates), weights, tuple(rivals))
+        weights = weights * _explained(found, effect, step.before.chi2 - found.fit.chi2)
+    return replace(step, mates=tuple(mates), weights=tuple(weights.tolist()))
 
 
 def beside(found: Hypothesis, effect: Effect) -> Hypothesis:
@@ -102,13 +76,12 @@ def beside(found: Hypothesis, effect: Effect) -> Hypothesis:
     return replace(found, fit=found.named)
 
 
-def effect_named(found: Hypothesis, step: Step, weighed: Weighed) -> FoundEffect:
+def effect_named(found: Hypothesis, step: Step) -> FoundEffect:
     """Return one effect with its final values, probability and location."""
-    effect = step.winner.lead.effect
+    effect = step.winner.effect
     found = beside(found, effect)
-    without, gain, mates, weights, _ = weighed
-    rivals = zip(weights[1:].tolist(), mates, strict=False)
-    members = [(probability, mate.lead.effect, mate.fit) for probability, mate in rivals]
+    mates = list(zip(step.mates, step.weights[1:-1], strict=True))
+    members = [(probability, mate.effect, mate.fit) for mate, probability in mates]
     return FoundEffect(
         effect.identifier,
         effect.name,
@@ -117,20 +90,20 @@ def effect_named(found: Hypothesis, step: Step, weighed: Weighed) -> FoundEffect
         with_instants(
             effect_parameters(found.fit, effect, found.data.unit),
             effect,
-            _others_in_place(found, effect) or without,
+            _others_in_place(found, effect) or step.before,
             found.noise,
             found.fit.error_scale,
         ),
-        gain,
+        step.before.chi2 - found.fit.chi2,
         step.p_value,
-        float(weights[0]),
+        step.weights[0],
         tuple(
-            Mate(mate.identifier, float(weight))
-            for mate, weight in zip(mates, weights[1:], strict=False)
+            Mate(mate.identifier, weight)
+            for mate, weight in mates
             if weight > LISTED or not mate.drawn
         ),
         effect.discriminating_test,
-        locate(without, found.fit, found.data, effect),
+        locate(step.before, found.fit, found.data, effect),
         curve_of(found, [(1.0, effect, found.fit), *members]),
     )
 
@@ -174,13 +147,13 @@ def _explained(found: Hypothesis, effect: Effect, gain: float) -> float:
     What an unnamed curve describes beside it is not explained.
     """
     curves = [step.winner for step in found.steps if step.winner.drawn]
-    open_still = sum(each.gain for each in curves if each.lead.effect is not effect)
+    open_still = sum(each.gain for each in curves if each.effect is not effect)
     if found.remainder.systematic:
         open_still += found.remainder.excess
     return max(gain, 0.0) / max(max(gain, 0.0) + open_still, 1.0)
 
 
-def fault_named(found: Hypothesis, finding: Finding, weighed: Sequence[Weighed]) -> FoundEffect:
+def fault_named(found: Hypothesis, finding: Finding) -> FoundEffect:
     """Return a fault of the measurement found by its own test.
 
     A random cause takes what a wrong name leaves: it is no more probable than each name beside it,
@@ -198,8 +171,7 @@ def fault_named(found: Hypothesis, finding: Finding, weighed: Sequence[Weighed])
     if finding.identifier in _SEEN_IN_RESIDUAL:
         each *= _explained(found, effect, finding.delta_chi2)
     if finding.identifier in RANDOM:
-        names = zip(found.steps, weighed, strict=True)
-        none = [float(name.weights[-1]) for step, name in names if not step.winner.drawn]
+        none = [step.weights[-1] for step in found.steps if not step.winner.drawn]
         each *= 1.0 - max(none, default=0.0)
     return FoundEffect(
         effect.identifier,
@@ -233,14 +205,14 @@ def _charge_for_several(found: Hypothesis) -> float:
     return _OF_A_FURTHER_NAME * max(names - alone, 0)
 
 
-def _rivalry(found: Hypothesis, step: Step) -> tuple[Fit, Sequence[Rival]]:
-    """Return the fit without one effect, and the rivals that could replace it."""
-    effect = step.winner.lead.effect
+def _refitted_beside(found: Hypothesis, step: Step) -> Step:
+    """Return a step with the fit without its effect, and the rivals that could replace it."""
+    effect = step.winner.effect
     without = found.without(step) or step.before
     gain = without.chi2 - found.fit.chi2
     same = abs(gain - step.winner.gain) < _SAME_GAIN * gain
     if len(found.steps) == 1 and same and not is_gross(without, found.data):
-        return without, step.rivals
+        return replace(step, before=without)
     # Refit what was behind in the search, but not far: noise and other effects have changed.
     hopeless = step.winner.evidence - 2.0 * (class_width(step.winner) + NEAR)
     scale = Scale.of(found.fit, found.data, found.noise)
@@ -250,20 +222,21 @@ def _rivalry(found: Hypothesis, step: Step) -> tuple[Fit, Sequence[Rival]]:
     fits = []
     others = {other.key for other in without.model.effects if not other.local}
     for rival in step.rivals:
-        if rival.lead.effect.key in others:
+        if rival.effect.key in others:
             continue  # one that was added later
-        own = rival.lead.effect.key == effect.key
-        if not (own or rival.lead.effect.expected) and rival.evidence < hopeless:
+        own = rival.effect.key == effect.key
+        if not (own or rival.effect.expected) and rival.evidence < hopeless:
             continue
         fit = found.fit if own else refitted(without, found, rival, useful)
         if fit is not None:
             fits.append((rival, fit))
-    return without, [rival.again(fit, without.chi2, scale) for rival, fit in fits]
+    rivals = tuple(rival.again(fit, without.chi2, scale) for rival, fit in fits)
+    return replace(step, rivals=rivals, before=without)
 
 
 def refitted(without: Fit, found: Hypothesis, rival: Rival, useful: float) -> Fit | None:
     """Refit a rival in the final model, from its earlier result, as far as it is useful."""
-    effect = rival.lead.effect
+    effect = rival.effect
     held: Collection[int] = set(range(without.model.size)).difference(without.free)
     if isinstance(effect, ReleasedParameter):
         held = effect.without(held)
@@ -292,7 +265,7 @@ def _is_of(fit: Fit, without: Fit, effect: Effect, found: Hypothesis) -> bool:
 
 
 def with_likelier(
-    found: Hypothesis, weighed: Sequence[Weighed], seen: Container[object]
+    found: Hypothesis, weighed: Sequence[Step], seen: Container[object]
 ) -> Hypothesis | None:
     """Let the most probable name of a class lead it, if that hypothesis is new.
 
@@ -303,9 +276,9 @@ def with_likelier(
     for number in reversed(range(0 if found.without_curve else len(found.steps))):
         each = weighed[number]
         names = [
-            (float(weight), mate)
-            for mate, weight in zip(each.mates, each.weights[1:], strict=False)
-            if not mate.drawn and mate.lead.effect.key not in present
+            (weight, mate)
+            for mate, weight in zip(each.mates, each.weights[1:-1], strict=True)
+            if not mate.drawn and mate.effect.key not in present
         ]
         weight, mate = max(names, key=lambda one: one[0], default=(0.0, None))
         if mate is not None and weight > _LIKELIER * each.weights[0]:
@@ -315,22 +288,22 @@ def with_likelier(
     return None
 
 
-def _exchanged(found: Hypothesis, number: int, mate: Rival, weighed: Weighed) -> Hypothesis | None:
+def _exchanged(found: Hypothesis, number: int, mate: Rival, step: Step) -> Hypothesis | None:
     """Replace a step's winner by a rival; None where the model has no such motion."""
-    step, effect, held = found.steps[number], mate.lead.effect, set(found.held)
-    own = step.winner.lead.effect
+    effect, held = mate.effect, set(found.held)
+    own = step.winner.effect
     # A held part of b has no index: the model itself holds it.
     if isinstance(own, ReleasedParameter) and own.index is not None:
         held.add(own.index)
     if isinstance(effect, ReleasedParameter):
         held = set(effect.without(held))
-    fit = refitted(weighed.without, found, mate, math.inf)
+    fit = refitted(step.before, found, mate, math.inf)
     if fit is None:
         return None
     # All of one model and noise: those of an earlier model would be far behind this one.
-    rest = [rival for rival in weighed.rivals if rival.lead.effect.key != effect.key]
+    rest = [rival for rival in step.rivals if rival.effect.key != effect.key]
     steps = list(found.steps)
-    steps[number] = replace(step, rivals=(mate, *rest), before=weighed.without)
+    steps[number] = replace(step, rivals=(mate, *rest))
     if number + 1 < len(steps):
         # The next step is tested without its own effect: start from this model.
         steps[number + 1] = replace(steps[number + 1], before=mate.fit)
