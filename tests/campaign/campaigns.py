@@ -1,5 +1,6 @@
 """The default campaign's design, and data that its model predicts."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -14,13 +15,16 @@ ROOT = Path(__file__).parents[2]
 
 
 @cache
-def default(inertia_exponent: float = 1.0) -> Design:
-    """The paper's 27 records; by default with its loss torque, k f^2 whatever the inertia."""
+def default(inertia_exponent: float = 1.0, walls: bool = False) -> Design:
+    """The paper's 27 records; by default with its loss torque, k f^2 whatever the inertia.
+
+    With `walls` Eq. 16 is that in the tank that the configuration tells.
+    """
     path = ROOT / "config/config.yaml"
     content = read_configuration(path) | {"records": str(ROOT / "config/records.tsv")}
     content["apparatus"]["hysteresis"] = {"inertia_exponent": inertia_exponent}
     campaign = load_campaign(content, path)
-    return design_of(campaign, campaign.records)
+    return replace(design_of(campaign, campaign.records), walls=walls)
 
 
 def data(

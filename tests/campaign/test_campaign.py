@@ -309,10 +309,10 @@ def test_a_branch_is_a_shape() -> None:
     assert changed.tolist() == [run.branch == "high" for run in DESIGN.runs]
 
 
-@pytest.mark.parametrize("surface", ["slip", "film"])
+@pytest.mark.parametrize(("surface", "film"), [("slip", 0.0), ("film", 1.0)])
 @pytest.mark.parametrize("higher", [0.0, 0.03, -0.05])
 def test_walls_between_the_computed_ones_are_those_of_the_tank(
-    surface: Surface, higher: float
+    surface: Surface, film: float, higher: float
 ) -> None:
     tank = DESIGN.apparatus.tank
     for close, depth in ((0.05, 0.04), (0.2, 0.1), (0.35, 0.03)):
@@ -327,7 +327,7 @@ def test_walls_between_the_computed_ones_are_those_of_the_tank(
             off_centre_m=deep * tank.off_centre_m / tank.depth_m,
             surface=surface,
         )
-        drag, mass = confined(tank, surface, np.array(close), np.array(depth), np.array(higher))
+        drag, mass = confined(tank, film, np.array(close), np.array(depth), np.array(higher))
         assert drag == pytest.approx(exact.drag_factor, abs=0.004)
         assert mass + 0.5 + 2.25 * depth == pytest.approx(exact.added_mass_coefficient, abs=0.004)
 
@@ -367,14 +367,14 @@ def test_the_drag_in_the_told_tank_holds_what_is_uncertain_of_it() -> None:
 def test_a_sphere_that_hangs_low_has_walls_too() -> None:
     tank = DESIGN.apparatus.tank
     low = tank.model_copy(update={"height_m": 0.3 * tank.depth_m})
-    half = confined(tank, "slip", np.array(0.15), np.array(0.05))[0]
-    assert confined(low, "slip", np.array(0.15), np.array(0.05))[0] > half
+    half = confined(tank, 0.0, np.array(0.15), np.array(0.05))[0]
+    assert confined(low, 0.0, np.array(0.15), np.array(0.05))[0] > half
     assert height_sd(tank) == pytest.approx(0.06)
     assert height_sd(low) == pytest.approx(np.hypot(0.06, 0.3 * 0.06))
 
 
 def test_the_height_in_the_tank_is_uncertain_and_matters_near_walls_only() -> None:
-    walls = Candidate(CATALOGUE["wall-confinement"], "film")
+    walls = Candidate(CATALOGUE["wall-confinement"])
     row = [each.name for each in DESIGN.nuisances].index("height in the tank")
     at = np.zeros(len(DESIGN.nuisances) + 1)
     moved = at.copy()
@@ -386,10 +386,30 @@ def test_the_height_in_the_tank_is_uncertain_and_matters_near_walls_only() -> No
     assert not changed[DESIGN.wet == 0.0].any()
 
 
+def test_a_diagnosis_starts_from_the_tank_that_is_told() -> None:
+    """A campaign in that tank lacks nothing, and one far from all walls lacks it."""
+    told_tank = default(walls=True)
+    moved = np.random.default_rng(5).standard_normal(len(told_tank.nuisances))
+    moved[0] = 0.0
+    assert not search(told_tank, data(told_tank, seed=5, moved=moved)).missing
+    names = {each.name for each in told_tank.nuisances}
+    assert {"depth of the fluid", "film on the surface"} <= names
+    assert names - {each.name for each in DESIGN.nuisances} == {
+        "depth of the fluid",
+        "film on the surface",
+    }
+    answer = search(told_tank, data(DESIGN, seed=5))
+    assert answer.missing
+    assert answer.found[0].leader.last.identifier == "wall-confinement"
+    # (2 a/H)^3 of 3.8 cm in 5 cm is what must be taken away.
+    size = answer.found[0].leader.size()
+    assert abs(size.value + (0.038 / 0.05) ** 3) < 3.0 * size.sd
+
+
 def test_a_sphere_far_from_all_walls_is_free() -> None:
     tank = DESIGN.apparatus.tank
     assert tank is not None
-    drag, mass = confined(tank, "slip", np.zeros(3), np.array([0.02, 0.05, 0.1]))
+    drag, mass = confined(tank, 0.0, np.zeros(3), np.array([0.02, 0.05, 0.1]))
     assert drag.tolist() == [1.0, 1.0, 1.0]
     assert mass.tolist() == [0.0, 0.0, 0.0]
 

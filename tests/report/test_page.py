@@ -17,6 +17,7 @@ import yaml
 from pendpipe.cli import main
 from pendpipe.figures.data import error, number, typical_record
 from pendpipe.files import without_folders
+from pendpipe.physics import sphere_in_tank
 from pendpipe.quantities import with_error
 from pendpipe.recording import Recording
 from pendpipe.report.charts import Axis, Chart, areas, extremes, line, pack
@@ -122,17 +123,21 @@ def test_headline_has_campaign_paper_and_hidden_truth(page: str) -> None:
     assert "3940 s²" in page
     row = re.search(r"<tr><th[^>]*>Drag measured over Eq. 16.*?</tr>", page, re.DOTALL)
     cells = re.findall(r"<td[^>]*>(.*?)</td>", row.group())
-    # (1.1165 - 1.117)/0.0062 rounds to -0.1.
-    assert cells == ["1.1165 ± 0.0062", "1.13 (176/156)", "−1.0 %", "1.117", "−0.1"]
+    # More water than is told: 12 % above Eq. 16; (1.1165 - 1.1196)/0.0062 rounds to -0.5.
+    assert cells == ["1.1165 ± 0.0062", "1.13 (176/156)", "−1.0 %", "1.12", "−0.5"]
+    deeper = sphere_in_tank(
+        0.019, 0.0375, 7.9e-4, surface_m=0.0375, length_m=0.23, width_m=0.11, off_centre_m=0.015
+    )
+    assert deeper.drag_factor == pytest.approx(1.12, abs=0.005)
 
 
 def test_the_terminal_shows_the_headline_s_numbers(example: Any) -> None:
     """1 + a/δ of the typical record among them, beside the paper's and the hidden truth."""
-    rows = headline(example.content, {"drag_factor": 1.117})
+    rows = headline(example.content, json.loads(example.campaign.read_text()))
     lines = as_text(rows).splitlines()
     assert all(row.found in line for row, line in zip(rows, lines, strict=True))
     drag = next(line for line in lines if line.startswith("Drag measured over Eq. 16"))
-    assert re.search(r" 1\.1165 ± 0\.0062 +paper 1\.13 \(176/156\); truth 1\.117$", drag)
+    assert re.search(r" 1\.1165 ± 0\.0062 +paper 1\.13 \(176/156\); truth 1\.12$", drag)
     typical = typical_record(example.content)
     shown = next(line for line in lines if "1 + a/δ" in line)
     assert float(shown.split()[-1]) == pytest.approx(1.0 + typical["a_over_delta"], abs=0.05)

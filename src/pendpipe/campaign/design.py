@@ -9,18 +9,23 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from pendpipe import physics
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
+from pendpipe.campaign.tank import DEPTHS, confined, height_sd, room_m
 from pendpipe.configuration.apparatus import fluid_at
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.configuration.models import WATER_C, Apparatus, Fluid, Tank
 
 AIR_DRAG_RELATIVE_SD = 0.1
 """Of the drag that weights and rod meet in air: each weight counts as the sphere of its area."""
+
+
+_FILM_SD: Final = 0.5
+"""Of a surface that is clean (0) or under a film (1), which are equally probable."""
 
 
 class Nuisance(NamedTuple):
@@ -93,20 +98,17 @@ class Inputs:
     inertia_exponent: FloatArray
     higher: FloatArray
     """Of the sphere in the tank, in depths of the fluid."""
+    deeper_m: FloatArray
+    """Of the fluid in the tank."""
+    closer: FloatArray
+    """Closeness of the walls beyond that of the tank that is told."""
+    film: FloatArray
+    """0 under a clean surface, 1 under a film; in between for a share of both."""
     gravity: FloatArray
     fast_clock: FloatArray
     """Relative excess of the recorded frequencies and rates over the true ones."""
     rate_exponent: FloatArray
     """Of the loss torque in omega: 0 for internal friction that doesn't depend on the rate."""
-
-
-def height_sd(tank: Tank) -> float:
-    """Standard uncertainty of the sphere's height in depths of the fluid.
-
-    Half the depth stays half the depth, however deep the fluid is.
-    """
-    height = 0.0 if tank.height_m is None else tank.height_m
-    return float(np.hypot(tank.height_sd_m, height / tank.depth_m * tank.depth_sd_m)) / tank.depth_m
 
 
 @dataclass(frozen=True)
@@ -118,6 +120,8 @@ class Design:
     air: Fluid | None
     coefficient_s2: float = 3940.0
     """k about which the fit counts."""
+    walls: bool = True
+    """Whether Eq. 16 is that within the walls of the tank that is told."""
 
     @property
     def reference_inertia(self) -> float:
@@ -141,12 +145,20 @@ class Design:
         return tuple(dict.fromkeys(run.assembly for run in order))
 
     @cached_property
+    def tank(self) -> Tank | None:
+        """The tank that is told; None where none is, or none that holds the sphere."""
+        tank, sphere = self.apparatus.tank, self.apparatus.sphere
+        held = tank and sphere and room_m(tank, 0.5 * sphere.diameter_m) > 0.0
+        return tank if held else None
+
+    @cached_property
     def nuisances(self) -> tuple[Nuisance, ...]:
         """All uncertain inputs; those with sd 0 are exact and are left out."""
         own, sphere, law = self.apparatus, self.apparatus.sphere, self.apparatus.hysteresis
         fluids = [run.fluid for run in self.runs if run.fluid is not None]
         fitted = sphere if any(run.sphere for run in self.runs) else None
-        tank = own.tank if fitted and any(run.tank for run in self.runs) else None
+        tank = self.tank if fitted and any(run.tank for run in self.runs) else None
+        told = tank if self.walls else None
         drags_in_air = self.air is not None and self.air.boundary_layer
         found = (
             Nuisance("hysteretic coefficient", "", math.inf),
@@ -166,6 +178,8 @@ class Design:
             Nuisance("radius of the sphere", "m", fitted.diameter_sd_m / 2 if fitted else 0.0),
             Nuisance("lever of the sphere", "m", fitted.distance_sd_m if fitted else 0.0),
             Nuisance("height in the tank", "depths", height_sd(tank) if tank else 0.0),
+            Nuisance("depth of the fluid", "m", told.depth_sd_m if told else 0.0),
+            Nuisance("film on the surface", "", _FILM_SD if told else 0.0),
             Nuisance("thermometer", "K", max((f.temperature_sd_k for f in fluids), default=0.0)),
             Nuisance("immersed screw", "m", sphere.screw_length_sd_m if fluids and sphere else 0.0),
             Nuisance("gravity", "m/s^2", own.gravity_sd_m_per_s2),
@@ -257,6 +271,9 @@ class Design:
             inertia_exponent=own.hysteresis.inertia_exponent
             + deviation("exponent of the loss torque"),
             higher=deviation("height in the tank"),
+            deeper_m=deviation("depth of the fluid"),
+            closer=np.zeros((*moved.shape[:-1], 1)),
+            film=0.5 + deviation("film on the surface"),
             gravity=own.gravity_m_per_s2 + deviation("gravity"),
             fast_clock=deviation("clock"),
             rate_exponent=np.zeros((*moved.shape[:-1], 1)),
@@ -418,6 +435,8 @@ def terms_of(design: Design, inputs: Inputs) -> Terms:
         displaced=displaced * lever**2,
         inputs=inputs,
     )
+    if design.tank is not None:
+        whole = _within_walls(design, design.tank, whole, (viscosity, density))
     if design.air is None:
         return whole
     # What the air does: Eq. 2's drag on weights (spheres of their area) and rod.
@@ -431,6 +450,36 @@ def terms_of(design: Design, inputs: Inputs) -> Terms:
     )
     on_weights = (drags * places**2 * design.mounted).sum(axis=-1)
     return replace(whole, air=on_weights + design.rod_air_drag)
+
+
+def _within_walls(
+    design: Design, tank: Tank, terms: Terms, fluid: tuple[FloatArray, FloatArray]
+) -> Terms:
+    """Walls, floor and surface: the fluid goes faster past the sphere.
+
+    Drag and added mass grow together, as `confined` says of tanks of the told one's proportions.
+    """
+    inputs, runs = terms.inputs, design.runs
+    told = (2.0 * inputs.radius_m / (tank.depth_m + inputs.deeper_m)) ** 3 if design.walls else 0.0
+    inside = np.flatnonzero([run.tank and run.fluid is not None for run in runs])
+    near = np.broadcast_to(np.maximum(told + inputs.closer, 0.0), terms.inertia.shape)[..., inside]
+    if not np.any(near):
+        return terms
+    around = (each[..., inside] for each in fluid)
+    omega = terms.angular_frequency[..., inside]
+    depth = physics.penetration_depth(omega, *around) / inputs.radius_m
+    film = np.where([runs[number].open_surface for number in inside], inputs.film, 1.0)
+    drag, mass = confined(tank, film, near, np.minimum(depth, DEPTHS[-1]), inputs.higher)
+    factor, carried = np.ones_like(terms.inertia), np.zeros_like(terms.inertia)
+    factor[..., inside] = drag
+    # The memory's own inertia grows with its drag; the rest is the potential flow's.
+    carried[..., inside] = mass - 2.25 * depth * (drag - 1.0)
+    return replace(
+        terms,
+        steady=terms.steady * factor,
+        history=terms.history * factor,
+        inertia=terms.inertia + carried * terms.displaced,
+    )
 
 
 def solve(design: Design, terms: Terms) -> FloatArray:

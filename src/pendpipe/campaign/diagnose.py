@@ -440,7 +440,10 @@ def _carried(fit: JointFit, truth: JointFit, design: Design) -> FloatArray:
 
 
 BASELINE = "eq16"
-"""Eq. 16 with the exact root, the priors of the configuration and the loss torque."""
+"""Eq. 16 with the exact root, the priors of the configuration and the loss torque.
+
+Where a tank is told, within its walls.
+"""
 
 
 def campaign_diagnosis(
@@ -519,16 +522,15 @@ def _predicted(search: CampaignSearch) -> dict[str, Any]:
 
 
 def _with_and_without(search: CampaignSearch) -> dict[str, JointFit]:
-    """Fits with a drag factor, of all records and without those that are left out."""
+    """Fits with a drag factor over Eq. 16, of all records and without those that are left out."""
     answers = {"all_records": search.whole or search}
     if search.whole:
         answers["without"] = search
     return {
         name: joint_fit(
-            each.baseline.design,
+            replace(each.baseline.design, walls=False),
             each.baseline.data,
-            named("uniform-drag-excess"),
-            each.baseline.unknowns,
+            named("uniform-drag-excess", "added-mass"),
         )
         for name, each in answers.items()
     }
@@ -560,7 +562,7 @@ def quoted_coefficient(search: CampaignSearch) -> Estimate:
 
 def _shown(fit: JointFit) -> dict[str, Any]:
     return {
-        "drag_factor": fit.size(about=1.0).as_json(),
+        "drag_factor": fit.size(0, about=1.0).as_json(),
         "hysteretic_coefficient": coefficient(fit).as_json(),
         "chi2": fit.chi2,
         "dof": fit.degrees_of_freedom,
@@ -688,7 +690,10 @@ def answer_of(
 ) -> Answer:
     """Make the answer: whether the records agree, who does not, and what causes explain it."""
     count = len((search.whole or search).baseline.design.runs)
-    agree = "do not agree with Eq. 16" if search.missing else "agree with Eq. 16, the loss torque"
+    theory = _theory(search.baseline.design)
+    agree = (
+        f"do not agree with {theory}" if search.missing else f"agree with {theory}, the loss torque"
+    )
     head = f"the {count} records {agree} and the stated errors of the apparatus"
     rows = [*(_rows(search, ranked) if search.missing else ()), ("counted once", "; ".join(copies))]
     kept = tuple(row for row in rows if row[1])
@@ -709,7 +714,10 @@ def _rows(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> list[t
     return [
         ("off the others", ", ".join(map(off, search.left_out))),
         *(
-            (_words(name), f"the drag is {fit.size(about=1.0)} times Eq. 16, k {coefficient(fit)}")
+            (
+                _words(name),
+                f"the drag is {fit.size(0, about=1.0)} times Eq. 16, k {coefficient(fit)}",
+            )
             for name, fit in (_with_and_without(search) if search.whole else {}).items()
         ),
         ("causes", "no effect of the catalogue stands out, nor any record" if silent else ""),
@@ -724,6 +732,10 @@ def _rows(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> list[t
         ("quote", f"k is {quoted_coefficient(search)}, averaged over causes" if known else ""),
         ("left", f"more than these explain ({printed(left)})" if left < FALSE_ALARM else ""),
     ]
+
+
+def _theory(design: Design) -> str:
+    return "Eq. 16 in the tank that is told" if design.tank and design.walls else "Eq. 16"
 
 
 def _words(name: str) -> str:
@@ -754,7 +766,7 @@ _STEP = 1e-3
 
 
 def causes(search: CampaignSearch) -> dict[str, Any]:
-    """Patterns over the records in the fluid, as excesses of the viscous loss over Eq. 16.
+    """Patterns over the records in the fluid, as excesses of the viscous loss over the theory.
 
     Inputs are taken as configured, the loss torque as fitted. Each cause is given the size that
     follows the measured excess best, whether that size is believable or not; its joint fit, which

@@ -13,10 +13,8 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from pendpipe import physics
 from pendpipe.arrays import FloatArray
 from pendpipe.campaign.design import Design, Inputs, Terms
-from pendpipe.campaign.tank import DEPTHS, Surface, confined
 from pendpipe.effects.effect import Parameter
 
 Acts = Callable[..., Any]
@@ -164,37 +162,21 @@ def stem(inputs: Inputs, size: FloatArray) -> Inputs:
 
 
 @campaign_effect(
-    "terms",
+    "inputs",
     "wall-confinement",
-    "walls near the sphere",
+    "walls other than those that are told",
     r"D \to K(s, \delta/a)\, D, \quad C_m \to C_m(s, \delta/a), \quad s = 2 a/H",
-    Parameter("closeness", "", 0.0, 0.5),
+    Parameter("closeness", "", -0.5, 0.5),
     0.1,
-    lambda design: ("slip", "film") if design.apparatus.tank is not None else (),
+    lambda design: (None,) if design.tank is not None else (),
 )
-def walls(terms: Terms, size: FloatArray, design: Design, shape: Surface) -> Terms:
-    """Walls, floor and surface: the fluid goes faster past the sphere.
+def walls(inputs: Inputs, size: FloatArray) -> Inputs:
+    """Walls, floor and surface that are nearer or farther than those of the told tank.
 
-    Drag and added mass grow together. The closeness is s^3 with H the depth of a tank of the
-    given one's proportions, in which the sphere's height is uncertain; its surface is clean
-    ("slip") or a film.
+    The closeness is s^3, with H the depth of a tank of the given one's proportions; its size is
+    what is added to that of the told tank.
     """
-    assert design.apparatus.tank is not None
-    near = np.where([run.tank for run in design.runs], size, 0.0)
-    density, viscosity = design.fluids(terms.inputs.warmer_k)
-    around = viscosity * (1.0 + terms.inputs.thicker), np.where(density > 0.0, density, 1.0)
-    radius = terms.inputs.radius_m
-    depth = physics.penetration_depth(terms.angular_frequency, *around) / radius
-    thick = np.minimum(depth, DEPTHS[-1])
-    drag, mass = confined(design.apparatus.tank, shape, near, thick, terms.inputs.higher)
-    # The memory's own inertia grows with its drag; the rest is the potential flow's.
-    other = mass - 2.25 * depth * (drag - 1.0)
-    return replace(
-        terms,
-        steady=terms.steady * drag,
-        history=terms.history * drag,
-        inertia=terms.inertia + other * terms.displaced,
-    )
+    return replace(inputs, closer=inputs.closer + size)
 
 
 _ADDED_PER_DRAG = 0.6

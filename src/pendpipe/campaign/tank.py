@@ -9,9 +9,8 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
-from pendpipe import physics
 from pendpipe.arrays import FloatArray
-from pendpipe.campaign.design import height_sd
+from pendpipe.configuration.apparatus import in_tank
 from pendpipe.configuration.models import Tank
 
 Surface = Literal["slip", "film"]
@@ -24,13 +23,15 @@ _FEW_NEAR: Final = CLOSENESS[[0, 2, 3, 5]]
 """Of `CLOSENESS`: see `_FEW_DEPTHS`."""
 _FEW_DEPTHS: Final = DEPTHS[::3]
 """Those at which other heights are computed, which change less."""
-_ORDER: Final = 10
-"""Of the multipoles: 1e-5 of the force at the closest walls."""
+
+
+_RADIUS_M: Final = 0.01
+"""Of the sphere for which tanks are computed: only proportions count."""
 
 
 def confined(
     tank: Tank,
-    surface: Surface,
+    film: FloatArray | float,
     closeness: FloatArray,
     depth: FloatArray,
     higher: FloatArray | float = 0.0,
@@ -45,8 +46,9 @@ def confined(
     ----------
     tank
         Its proportions, and where the sphere hangs in it.
-    surface
-        ``"slip"`` (a level surface that is clean) or ``"film"`` (a lid, or a contaminated one).
+    film
+        0 under a level surface that is clean, 1 under a film (a lid, or a contaminated surface); in
+        between for a share of both. It broadcasts as the others do.
     closeness
         (2 a/H)^3 with H the depth of the fluid; walls nearer than the closest computed count
         as these.
@@ -65,16 +67,27 @@ def confined(
     proportions = tuple(
         size / tank.depth_m for size in (tank.length_m, tank.width_m, tank.off_centre_m)
     )
-    whole = _table(surface, proportions, nodes[1], scale)
+    whole = _table(proportions, nodes[1], scale)
     excess = _powers(near, thick, len(CLOSENESS), len(DEPTHS)) @ whole
     up = np.asarray(higher) / max(nodes[1] - nodes[0], 1e-9)
     # Lagrange's parabola through three heights; the middle one is `whole`.
     for weight, height in ((up * (up - 1.0) / 2.0, nodes[0]), (up * (up + 1.0) / 2.0, nodes[2])):
         if np.any(weight):
-            moved = _moved(surface, proportions, (nodes[1], height), scale)
+            moved = _moved(proportions, (nodes[1], height), scale)
             rows = _powers(near, thick, len(_FEW_NEAR), len(_FEW_DEPTHS))
             excess = excess + weight[..., None] * (rows @ moved)
-    return np.asarray(1.0 + excess[..., 0]), np.asarray(excess[..., 1])
+    clean, covered = excess[..., :2], excess[..., 2:]
+    mixed = clean + np.asarray(film)[..., None] * (covered - clean)
+    return np.asarray(1.0 + mixed[..., 0]), np.asarray(mixed[..., 1])
+
+
+def height_sd(tank: Tank) -> float:
+    """Standard uncertainty of the sphere's height in depths of the fluid.
+
+    Half the depth stays half the depth, however deep the fluid is.
+    """
+    height = 0.0 if tank.height_m is None else tank.height_m
+    return float(np.hypot(tank.height_sd_m, height / tank.depth_m * tank.depth_sd_m)) / tank.depth_m
 
 
 def _nodes(tank: Tank) -> tuple[float, float, float]:
@@ -100,54 +113,55 @@ def _powers(closeness: FloatArray, depth: FloatArray, nears: int, depths: int) -
 
 
 @cache
-def _table(
-    surface: Surface, proportions: tuple[float, ...], height: float, closest: float
-) -> FloatArray:
-    """Coefficients of the drag's and the added mass's excess; sizes in depths of the fluid."""
+def _table(proportions: tuple[float, ...], height: float, closest: float) -> FloatArray:
+    """Coefficients of the columns of `_excess`; sizes in depths of the fluid."""
     near, depth = (each.ravel() for each in np.meshgrid(CLOSENESS / CLOSENESS[-1], DEPTHS))
-    found = _excess(surface, proportions, height, closest * near, depth)
+    found = _excess(proportions, height, closest * near, depth)
     return np.asarray(np.linalg.solve(_powers(near, depth, len(CLOSENESS), len(DEPTHS)), found))
 
 
 @cache
 def _moved(
-    surface: Surface, proportions: tuple[float, ...], heights: tuple[float, float], closest: float
+    proportions: tuple[float, ...], heights: tuple[float, float], closest: float
 ) -> FloatArray:
-    """Coefficients of the change of both from one height to another, at fewer nodes."""
+    """Coefficients of their change from one height to another, at fewer nodes."""
     near, depth = (each.ravel() for each in np.meshgrid(_FEW_NEAR / CLOSENESS[-1], _FEW_DEPTHS))
     before = _powers(near, depth, len(CLOSENESS), len(DEPTHS)) @ _table(
-        surface, proportions, heights[0], closest
+        proportions, heights[0], closest
     )
-    after = _excess(surface, proportions, heights[1], closest * near, depth)
+    after = _excess(proportions, heights[1], closest * near, depth)
     rows = _powers(near, depth, len(_FEW_NEAR), len(_FEW_DEPTHS))
     return np.asarray(np.linalg.solve(rows, after - before))
 
 
 def _excess(
-    surface: Surface,
     proportions: tuple[float, ...],
     height: float,
     closeness: FloatArray,
     depth: FloatArray,
 ) -> FloatArray:
-    """Excess of drag and added mass in tanks, shape (tanks, 2)."""
+    """Excess of drag and added mass, under a clean surface and a film; shape (tanks, 4)."""
     length, width, aside = proportions
     found = []
     for close, delta in zip(closeness.tolist(), depth.tolist(), strict=True):
-        deep = 2.0 * close ** (-1.0 / 3.0)  # in radii
-        force = physics.sphere_in_tank(
-            1.0,
-            height * deep,
-            delta,
-            surface_m=(1.0 - height) * deep,
+        deep = 2.0 * close ** (-1.0 / 3.0) * _RADIUS_M
+        tank = Tank(
             length_m=length * deep,
             width_m=width * deep,
+            depth_m=deep,
+            height_m=height * deep,
             off_centre_m=aside * deep,
-            surface=surface,
-            order=_ORDER,
         )
-        free = physics.POTENTIAL_FLOW_ADDED_MASS + 2.25 * delta
-        found.append((force.drag_factor - 1.0, force.added_mass_coefficient - free))
+        clean, film = (
+            in_tank(tank, _RADIUS_M, delta * _RADIUS_M, each) for each in _SURFACES.values()
+        )
+        free = in_tank(None, _RADIUS_M, delta * _RADIUS_M).added_mass_coefficient
+        found.append(
+            (
+                *(clean.drag_factor - 1.0, clean.added_mass_coefficient - free),
+                *(film.drag_factor - 1.0, film.added_mass_coefficient - free),
+            )
+        )
     return np.array(found)
 
 
@@ -227,16 +241,4 @@ def _drag(
     higher_m: float = 0.0,
 ) -> float:
     """Drag over that of Eq. 2, with more fluid in the tank and the sphere higher up."""
-    depth = tank.depth_m + deeper_m
-    height = (0.5 * depth if tank.height_m is None else tank.height_m) + higher_m
-    return physics.sphere_in_tank(
-        radius_m,
-        height,
-        penetration_m,
-        surface_m=depth - height,
-        length_m=tank.length_m,
-        width_m=tank.width_m,
-        off_centre_m=tank.off_centre_m,
-        surface=surface,
-        order=_ORDER,
-    ).drag_factor
+    return in_tank(tank, radius_m, penetration_m, surface, deeper_m, higher_m).drag_factor

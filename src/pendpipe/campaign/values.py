@@ -1,9 +1,10 @@
 """The campaign's numbers: k, each record's Q and Eq. 16, the drag's factor, C_H, exponents.
 
-All of them come from one joint fit in which the drag of every record in the fluid is free: what a
-record measures is then its own, and what the records share (loss torque, sphere, temperature,
-distances, g, clock) is in the covariance. That covariance is ``G G^T`` with a column of G for
-each reading and each prior, so that an error can be traced to its sources.
+All of them come from one joint fit in which the drag of every record in the fluid is free, and the
+sphere's added mass: what a record measures is then its own, and what the records share (loss
+torque, sphere, temperature, distances, g, clock) is in the covariance. That covariance is
+``G G^T`` with a column of G for each reading and each prior, so that an error can be traced to its
+sources.
 """
 
 import math
@@ -24,10 +25,11 @@ from pendpipe.campaign.fit import (
     JointFit,
     Measured,
     joint_fit,
+    named,
     only,
     terms_with,
 )
-from pendpipe.campaign.tank import by_depth, room_m, told
+from pendpipe.campaign.tank import by_depth, told
 from pendpipe.configuration.models import Tank
 from pendpipe.estimate import Estimate, chi_square_p_value, quality_of_rate
 
@@ -110,7 +112,7 @@ class Values:
     Parameters
     ----------
     fit
-        The joint fit with a free drag of every record in the fluid.
+        The joint fit with a free drag of every record in the fluid, and a free added mass.
     benchmark
         The test of the records without a fluid.
     """
@@ -203,10 +205,8 @@ class Values:
     @property
     def _tank(self) -> tuple[Tank, float] | None:
         """The tank that is told, with room for the sphere, and the sphere's radius."""
-        tank, sphere = self.design.apparatus.tank, self.design.apparatus.sphere
-        if tank is None or sphere is None or room_m(tank, 0.5 * sphere.diameter_m) <= 0.0:
-            return None
-        return tank, 0.5 * sphere.diameter_m
+        tank, sphere = self.design.tank, self.design.apparatus.sphere
+        return (tank, 0.5 * sphere.diameter_m) if tank and sphere else None
 
     @cached_property
     def theory_factor_in_tank(self) -> Estimate | None:
@@ -350,12 +350,15 @@ def campaign_values(design: Design, data: Measured) -> Values | None:
     dry = design.wet == 0.0
     if not dry.any():
         return None
+    design = replace(design, walls=False)
     each = [
         Candidate(DRAG_OF_ONE_RECORD, run.record)
         for run, sphere in zip(design.runs, _spheres(design).tolist(), strict=True)
         if sphere
     ]
-    return Values(joint_fit(design, data, each), _benchmark(*only(design, data, dry)))
+    return Values(
+        joint_fit(design, data, [*named("added-mass"), *each]), _benchmark(*only(design, data, dry))
+    )
 
 
 def _benchmark(design: Design, data: Measured) -> Benchmark:

@@ -77,5 +77,5 @@ def run(arguments: Arguments) -> None:
         )
         write_whole(out, page)
     tell(f"{out}: {len(page.encode()) / 1e6:.1f} MB")
-    if rows := headline(comparison, configuration.get("simulated") or {}):
+    if rows := headline(comparison, configuration):
         print(as_text(rows))

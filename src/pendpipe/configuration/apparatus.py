@@ -1,15 +1,18 @@
 """From the configuration's words to the physics: parts, fluid, and how they swing."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from pendpipe import physics
 from pendpipe.arrays import FloatArray
 from pendpipe.configuration.load import Campaign, Record
-from pendpipe.configuration.models import Apparatus, Fluid, Geometry
+from pendpipe.configuration.models import Apparatus, Fluid, Geometry, Tank
 from pendpipe.errors import InputError, refuse_if
+
+_ORDER: Final = 10
+"""Of the multipoles: 1e-5 of the force at the closest walls."""
 
 
 class Pendulum(NamedTuple):
@@ -87,6 +90,33 @@ def fluid_at(fluid: Fluid, temperature_c: float | FloatArray | None) -> physics.
         for of_water in (physics.water_density, physics.water_viscosity)
     )
     return physics.Fluid(fluid.density_kg_per_m3 * density, fluid.viscosity_pa_s * viscosity)
+
+
+def in_tank(
+    tank: Tank | None,
+    radius_m: float,
+    penetration_m: float,
+    surface: Literal["slip", "film"] = "slip",
+    deeper_m: float = 0.0,
+    higher_m: float = 0.0,
+) -> physics.Confined:
+    """`physics.sphere_in_tank` for a tank, with more fluid in it and the sphere higher up."""
+    if tank is None:
+        free = physics.POTENTIAL_FLOW_ADDED_MASS + 2.25 * penetration_m / radius_m
+        return physics.Confined(1.0, 1.0, free)
+    depth = tank.depth_m + deeper_m
+    height = (0.5 * depth if tank.height_m is None else tank.height_m) + higher_m
+    return physics.sphere_in_tank(
+        radius_m,
+        height,
+        penetration_m,
+        surface_m=depth - height,
+        length_m=tank.length_m,
+        width_m=tank.width_m,
+        off_centre_m=tank.off_centre_m,
+        surface=surface,
+        order=_ORDER,
+    )
 
 
 def quadratic_rate(campaign: Campaign, record: Record, built: Pendulum) -> float:

@@ -220,8 +220,13 @@ class Simulated(Section):
     """The truth that the simulated instrument hides."""
 
     hysteretic_coefficient_s2: Positive = Field(3940.0, description="k of Q_hys = k f^2")
-    drag_factor: Positive = Field(1.117, description="drag in the fluid over Eq. 2")
+    drag_factor: Positive = Field(
+        1.0, description="drag in the fluid over that of Eq. 2 within the tank's walls"
+    )
     history_coefficient: NotNegative = Field(1.0, description="C_H of Eq. 2")
+    tank: Tank | None = Field(
+        None, description="the tank as it really is; none: as the apparatus tells it"
+    )
     sensor: Sensor = Field(default_factory=Sensor, description="the angle sensor")
     device: Device = Field(default_factory=Device, description="the converter")
     release: dict[str, Release] = Field(

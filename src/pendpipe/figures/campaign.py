@@ -403,19 +403,22 @@ def draw_fig09(comparison: Mapping[str, Any]) -> Figure:
 
 @styled
 def draw_causes(path: Path) -> Figure:
-    """Draw what each cause alone predicts of the excess over Eq. 16, and what was measured."""
+    """Draw what each cause alone predicts of the excess over theory, and what was measured."""
     patterns = read_json(path).get("patterns") if path.is_file() else None
     if not patterns:
         raise NothingToDrawError("the records were not diagnosed together")
     records = patterns["records"]
-    span = max(1.6 * max(abs(record["excess"]) for record in records), 0.01)
-    limits = {"xlabel": "Frequency (Hz)", "ylim": (-10.0 * span, 110.0 * span)}
+    excess = np.array([record["excess"] for record in records])
+    span = max(1.6 * float(np.abs(excess).max()), 0.01)
+    # As far to a side as there are records on it.
+    ends = [110.0 if np.any(side * excess > 0.1 * span) else 10.0 for side in (-1.0, 1.0)]
+    limits = {"xlabel": "Frequency (Hz)", "ylim": (-ends[0] * span, ends[1] * span)}
     return figure_of(
         5.0,
         *(
             Panel(
                 [*_in_class(patterns, within), methodcaller("set_title", title)],
-                {**limits, "ylabel": "Viscous loss above Eq. 16 (%)" if within else ""},
+                {**limits, "ylabel": "Viscous loss above theory (%)" if within else ""},
             )
             for within, title in ((True, "not distinguished"), (False, "rejected"))
         ),

@@ -73,10 +73,11 @@ CAPTIONS: Final = {
     ),
     "causes": Caption(
         "What each cause predicts",
-        "The viscous loss of every record in the fluid above that of Eq. 16, inputs as configured"
-        " (symbols), and what each cause alone would add if its size were the best for these"
-        " points (lines, one part for each branch). Left the causes that all records together"
-        " cannot distinguish, right those that they reject.",
+        "The viscous loss of every record in the fluid above that of Eq. 16, within the walls of"
+        " the tank where one is told, inputs as configured (symbols), and what each cause alone"
+        " would add if its size were the best for these points (lines, one part for each branch)."
+        " Left the causes that all records together cannot distinguish, right those that they"
+        " reject.",
         "A cause explains the mismatch only if its line has the sign, the size and the frequency"
         " dependence of the points; the table gives the size that it would need.",
     ),

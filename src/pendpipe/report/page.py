@@ -197,7 +197,7 @@ def render(
         title=title,
         has_theory=has_theory,
         simulated=sum(entry.get("source") == "simulated" for entry in entries),
-        rows=headline(comparison, configuration.get("simulated") or {}),
+        rows=headline(comparison, configuration),
         figures=drawn,
         tables={name: table_inside(figures / f"{name}.svg") for name in drawn},
         columns=columns,

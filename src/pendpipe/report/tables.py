@@ -8,7 +8,11 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from pendpipe import physics
+from pendpipe.configuration.apparatus import in_tank
+from pendpipe.configuration.models import Tank
 from pendpipe.figures.data import Entry, error, number, typical_record, used
 from pendpipe.files import without_folders
 from pendpipe.quantities import compact, in_columns, pretty_unit, stretch, with_error
@@ -264,16 +268,18 @@ class Row(NamedTuple):
     pull: str = ""
 
 
-def headline(comparison: Comparison, truth: Mapping[str, Any]) -> list[Row]:
+def headline(comparison: Comparison, configuration: Mapping[str, Any]) -> list[Row]:
     """The table at the top of the page.
 
     Parameters
     ----------
     comparison
         The content of comparison.json.
-    truth
-        The section ``simulated`` of the configuration; empty for real recordings.
+    configuration
+        Its section ``simulated`` is the truth; real recordings have none.
     """
+    truth: Mapping[str, Any] = configuration.get("simulated") or {}
+    drag = _simulated_drag(comparison, configuration)
     calibration = comparison.get("calibration") or {}
     rows = [
         _row(
@@ -296,7 +302,7 @@ def headline(comparison: Comparison, truth: Mapping[str, Any]) -> list[Row]:
             "Drag measured over Eq. 16, mean of the records",
             comparison.get("theory_factor"),
             "theory_factor",
-            truth.get("drag_factor"),
+            drag,
         ),
         _row(
             "Drag measured over Eq. 16 with the walls of the told tank",
@@ -307,19 +313,31 @@ def headline(comparison: Comparison, truth: Mapping[str, Any]) -> list[Row]:
             "Drag over Eq. 16 as one factor in the fit of all records",
             comparison.get("drag_factor"),
             "theory_factor",
-            truth.get("drag_factor"),
+            drag,
         ),
         _row(
             "History coefficient C_H of Eq. 2, if it takes the whole difference",
             comparison.get("history_coefficient"),
             "history_coefficient",
-            truth.get("history_coefficient") if truth.get("drag_factor") == 1.0 else None,
+            truth.get("history_coefficient") if drag == 1.0 else None,
         ),
         *_exponents(comparison),
         *_typical(comparison),
         *_extremes(comparison),
     ]
     return [row for row in rows if row is not None]
+
+
+def _simulated_drag(comparison: Comparison, configuration: Mapping[str, Any]) -> float | None:
+    """The simulated drag over Eq. 16, mean of the records; None where nothing is simulated."""
+    truth, apparatus = configuration.get("simulated"), configuration.get("apparatus")
+    wet = [ratio for each in comparison["records"] if (ratio := each.get("a_over_delta"))]
+    if not (truth and apparatus and apparatus.get("sphere") and wet):
+        return None
+    there = truth.get("tank") or apparatus.get("tank")
+    tank, radius_m = there and Tank.model_validate(there), apparatus["sphere"]["diameter_m"] / 2
+    walls = [in_tank(tank, radius_m, radius_m / each).drag_factor for each in wet]
+    return float(truth["drag_factor"] * np.mean(walls))
 
 
 def _reference(comparison: Comparison) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from pendpipe import physics
 from pendpipe.arrays import FloatArray
-from pendpipe.configuration.apparatus import pendulum, quadratic_rate
+from pendpipe.configuration.apparatus import in_tank, pendulum, quadratic_rate
 from pendpipe.configuration.load import Campaign, Record
 from pendpipe.configuration.models import Sensor
 from pendpipe.dynamics import Eq8, Release, sample
@@ -30,7 +30,8 @@ def equation_of_motion(campaign: Campaign, record: Record) -> Eq8:
     """Eq. 8 of a simulated record, from geometry and the configured truth.
 
     a from C_d, c from the bearing's torque; frequency and b from the free decay in a fluid that
-    remembers, with Stokes' drag times the drag factor and the loss torque of k.
+    remembers, with Stokes' drag on sphere and screw within the walls of the tank as it really is
+    (under a level, clean surface), times the drag factor, and with the loss torque of k.
     """
     settings = campaign.configuration
     truth, built = settings.simulated, pendulum(campaign, record)
@@ -43,14 +44,23 @@ def equation_of_motion(campaign: Campaign, record: Record) -> Eq8:
         apparatus.gravity_m_per_s2,
         plain_added_mass=True,
     )
-    steady = history = 0.0
+    steady = history = carried = 0.0
     if ball and settings.fluids[record.fluid].boundary_layer:
         radius, lever = ball.diameter_m / 2, ball.distance_m
         density, viscosity = (float(np.asarray(each)) for each in built.fluid)
-        steady = 6.0 * np.pi * viscosity * radius * lever**2 * truth.drag_factor
+        layer = float(physics.penetration_depth(moving.angular_frequency_per_s, viscosity, density))
+        walls = in_tank(truth.tank or apparatus.tank, radius, layer)
+        memory = float(np.sqrt(density / viscosity))
+        steady = 6.0 * np.pi * viscosity * radius * lever**2 * truth.drag_factor * walls.drag_factor
         turning = 1.0 + float(physics.rotation_of_sphere(radius, lever))
-        history = steady * turning * truth.history_coefficient
-        history *= radius * float(np.sqrt(density / viscosity))
+        history = steady * turning * truth.history_coefficient * radius * memory
+        # The memory carries its own fluid along; the rest is the potential flow's.
+        potential = walls.added_mass_coefficient - 2.25 * layer / radius * walls.drag_factor
+        displaced = density * float(physics.sphere_volume(radius)) * lever**2
+        carried = (potential - physics.POTENTIAL_FLOW_ADDED_MASS) * displaced
+        along = 2.0 * np.pi * viscosity * ball.screw_length_m * ball.screw_distance_m**2
+        steady += along
+        history += 2.0 * along * ball.screw_radius_m * memory
     torque = float(moving.restoring_torque_n_m_per_rad)
     stiff = apparatus.hysteresis
     loss = float(
@@ -61,7 +71,7 @@ def equation_of_motion(campaign: Campaign, record: Record) -> Eq8:
             stiff.inertia_exponent,
         )
     )
-    solid = float(moving.moment_of_inertia_kg_m2), steady, history, torque
+    solid = float(moving.moment_of_inertia_kg_m2) + carried, steady, history, torque
     root = complex(physics.free_decay_root(*solid, loss, -2.0 * stiff.inertia_exponent))
     viscous, omega = -complex(physics.free_decay_root(*solid)).real, abs(root)
     friction = physics.bearing_friction_rate(apparatus.bearing_torque_n_m, torque / omega**2, omega)
