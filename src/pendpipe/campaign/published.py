@@ -14,11 +14,18 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 from pydantic import Field, ValidationError
-from scipy.special import ndtri, stdtr
+from scipy.special import chdtri, fdtrc, ndtri, stdtr
 
 from pendpipe.answer import Answer, percent, printed
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.campaign.diagnose import MOST_LEFT_OUT, CampaignSearch, Found, off, search
+from pendpipe.campaign.diagnose import (
+    MOST_LEFT_OUT,
+    CampaignSearch,
+    Found,
+    local_scores,
+    off,
+    search,
+)
 from pendpipe.campaign.fit import JointFit, Measured, candidates, chi2_near, joint_fit, predict
 from pendpipe.campaign.table import QUANTITIES, Row, Table, read_table
 from pendpipe.configuration.load import as_input_error, read_configuration
@@ -30,8 +37,6 @@ from pendpipe.quantities import compact, with_error
 
 FEWEST_REPLICATES: Final = 3
 """Degrees of freedom from which a scatter is known to 40 %, better than a choice of the cause."""
-NORMAL_MEDIAN: Final = 0.6745
-"""Median of the absolute value of a standard normal number."""
 DIGIT: Final = 1e-3 / math.sqrt(12.0)
 """Standard deviation of a number that is printed to the third decimal: the least error of a row."""
 
@@ -42,50 +47,63 @@ class Errors(NamedTuple):
     Parameters
     ----------
     sd
-        By which chance is judged.
-    left
-        By which sizes are known, once a cause has been found.
+        By which rows and causes are weighed.
+    judges
+        By which chance is judged: larger where `sd` is known from few rows.
     origin
         Where they are from.
     """
 
     sd: FloatArray
-    left: FloatArray
+    judges: FloatArray
     origin: str
 
 
 def errors_of(table: Table, left_out: Sequence[str] = ()) -> Errors:
     """Return the errors that are told; else those of replicates; else what the best cause leaves.
 
-    Rows that are left out don't count. Of the last, known from the rows alone, so much is made that
-    the best cause is worth as much by a normal distribution as Student's t makes it.
+    Rows that are left out don't count.
     """
     told = table.told_sd
-    table = table.without("record", left_out)
-    left, freedom = table.replicates
-    origin = f"the scatter of rows that should be equal ({freedom} degrees of freedom)"
     if np.isfinite(told).all():
         return Errors(told, told, "as told")
-    scatter = left
+    table = table.without("record", left_out)
+    scatter, freedom = table.replicates
+    origin = f"the scatter of rows that should be equal ({freedom} degrees of freedom)"
     if freedom < FEWEST_REPLICATES:
-        origin = "what the best cause leaves: none is told, no row repeated; chance by Student's t"
-        plain = table.measured_with(np.ones(len(table.runs)))
-        many = max(len(table.runs) - 1 - int(np.sum(~table.has_prior)), 1)
-        none, best = (
-            min(_scatter(joint_fit(table, plain, one)) for one in causes)
-            for causes in ([()], [[one] for one in candidates(table)])
-        )
-        student = math.sqrt(many * max((none / best) ** 2 - 1.0, 0.0))
-        normal = -float(ndtri(stdtr(many, -student)))
-        scatter = best * student / normal if normal > 0.0 else best
-        left = best * math.sqrt(len(table.runs) / many)
-    sd, left_sd = (np.where(np.isfinite(told), told, max(each, DIGIT)) for each in (scatter, left))
-    return Errors(sd, left_sd, origin)
+        origin = "what the best cause leaves: none is told, no row repeated"
+        plain, rows = table.measured_with(np.ones(len(table.runs))), len(table.runs)
+        fits = (joint_fit(table, plain, [one]).residuals[:rows] for one in candidates(table))
+        freedom = max(rows - 1 - int(np.sum(~table.has_prior)), 1)
+        scatter = math.sqrt(min(float(each @ each) for each in fits) / freedom)
+    scatter = max(scatter, DIGIT)
+    sd, judges = (
+        np.where(np.isfinite(told), told, each)
+        for each in (scatter, judged(table, scatter, freedom))
+    )
+    return Errors(sd, judges, origin)
 
 
-def _scatter(fit: JointFit) -> float:
-    """Return the scatter of rows about a fit of unit errors, by its median: a few may be wrong."""
-    return float(np.median(np.abs(fit.residuals[: len(fit.data.values)]))) / NORMAL_MEDIAN
+def judged(table: Table, scatter: float, freedom: int) -> float:
+    """Return the error by which a normal distribution judges as Student's t does by a scatter.
+
+    And chi^2 as Fisher's F, whichever is larger; within a per cent.
+    """
+
+    def seen(sd: float) -> FloatArray:
+        fit = joint_fit(table, table.measured_with(np.full(len(table.runs), sd)))
+        return np.array([np.max(np.abs(local_scores(fit, tried)[0])), math.sqrt(fit.chi2)])
+
+    tried, rows = candidates(table), len(table.runs) + int(np.sum(table.has_prior))
+    rows -= len(table.nuisances)
+    score, root = seen(scatter)
+    chi2 = chdtri(rows, fdtrc(rows, freedom, root**2 / rows))
+    wanted = np.maximum([-ndtri(stdtr(freedom, -score)), math.sqrt(chi2)], 1e-3)
+    # With priors neither falls as the error grows.
+    sd = scatter
+    while (wider := float(np.max(seen(sd) / wanted))) > 1.01:
+        sd *= wider
+    return sd
 
 
 FEW_ROWS: Final = 8
@@ -123,30 +141,14 @@ def diagnose_table(table: Table, level: float = FALSE_ALARM) -> tuple[CampaignSe
     left_out: tuple[str, ...] = ()
     for _ in range(MOST_LEFT_OUT):
         errors = errors_of(table, left_out)
-        found = search(table, table.measured_with(errors.sd), level)
+        found = search(table, table.measured_with(errors.judges), level)
+        if found.missing:
+            weighed = search(table, table.measured_with(errors.sd), level)
+            found = replace(weighed, p_value=found.p_value)
         before, left_out = left_out, tuple(far.record for far in found.left_out)
         if left_out == before:
             break
-    # Leaders and rivals stand with the errors by which their sizes are known.
-    data = found.baseline.design.measured_with(errors.left[_kept(table, found)])
-    known = [
-        replace(
-            one,
-            leader=_with(one.leader, data),
-            rivals=tuple((_with(rival, data), share) for rival, share in one.rivals),
-        )
-        for one in found.found
-    ]
-    return replace(found, found=tuple(known)), errors
-
-
-def _kept(table: Table, found: CampaignSearch) -> list[int]:
-    away = {far.record for far in found.left_out}
-    return [at for at, row in enumerate(table.runs) if row.record not in away]
-
-
-def _with(fit: JointFit, data: Measured) -> JointFit:
-    return joint_fit(fit.design, data, fit.added, fit.unknowns)
+    return found, errors
 
 
 def answer_of_table(found: CampaignSearch, errors: Errors) -> Answer:
@@ -160,7 +162,7 @@ def answer_of_table(found: CampaignSearch, errors: Errors) -> Answer:
     rows = [
         ("fluids", ", ".join(_fluids(table)) * any(row.body != "printed" for row in table.runs)),
         ("not to judge by", f"{unchecked} rows, of which the digits are unsure" * bool(unchecked)),
-        ("errors", f"{_parts(table, float(np.median(errors.left)))}: {errors.origin}"),
+        ("errors", f"{_parts(table, float(np.median(errors.sd)))}: {errors.origin}"),
         ("off the others", ", ".join(map(off, found.left_out))),
         ("causes", "none of the catalogue stands out" if silent else ""),
         *causes,

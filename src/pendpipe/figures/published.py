@@ -39,7 +39,7 @@ def _panel(one: "Asked") -> Panel:
     place = np.arange(len(rows)) + [groups.index(name) for name in names]
     marks = [
         level(0.0, INK),
-        measured(place, told, factor * one.errors.left, label="as told"),
+        measured(place, told, factor * one.errors.sd, label="as told"),
     ]
     if one.found.found:
         marks.append(
