@@ -160,6 +160,7 @@ def quality_factors_of(fit: Fit, amplitudes: Sequence[float]) -> dict[float, Est
     """
     wanted, motion = np.log(amplitudes), fit.at.tangent.motion
     model, slowed = replace(fit.model, _last={"motion": motion}), _slowed(fit)
+    own_s = motion.time_s[1:-1, 0]
 
     def quality(value: FloatArray) -> FloatArray:
         pieces = model.follow(model.settled(value))
@@ -180,7 +181,9 @@ def quality_factors_of(fit: Fit, amplitudes: Sequence[float]) -> dict[float, Est
             # It begins half a cycle early, where the motion is smooth; and a shift has neighbours.
             near = 2.0 * fit.at.span.period_s
             free &= (turned_s[2:] < kicked_s - near) | (turned_s[:-2] > kicked_s + near)
-        by_loss = (log_amplitude[:-2] - log_amplitude[2:]) / slowed[: len(free)]
+        # A motion from other values may turn more often than the fit's own.
+        longer = np.interp(turned_s[1:-1], own_s, slowed)
+        by_loss = (log_amplitude[:-2] - log_amplitude[2:]) / longer
         found = math.pi / _between(-log_amplitude[1:-1][free], by_loss[free], -wanted)
         inside = (log_amplitude[-1] <= wanted) & (wanted <= log_amplitude[0])
         return np.where(inside, found, math.nan)
