@@ -33,6 +33,7 @@ COMMANDS: Final = {
     "fit": "find period, Q and the losses a, b, c of free decays",
     "diagnose": "find which physics is missing: located, named, modelled",
     "page": "write an HTML page about recordings",
+    "open": "open a page on this machine: drop recordings, see their sheets and table",
     "init": "begin a campaign of your own recordings in a folder",
     "campaign": "run a campaign, every recording of a table, by Snakemake",
     "published": "diagnose a table of published numbers as a campaign",

@@ -93,7 +93,8 @@ def _sheet(arguments: Arguments, file: str) -> Sheet:
     return Sheet(Fitted(file, replace(result, points=None, decay=None)), page, tuple(notes))
 
 
-def _of_file(arguments: Arguments, file: str) -> Sheet:
+def sheet_of(arguments: Arguments, file: str) -> Sheet:
+    """Make the page of one recording, or say why there is none."""
     try:
         return _sheet(arguments, file)
     except InputError as problem:
@@ -111,7 +112,7 @@ def _class(arguments: Arguments) -> int:
     names = [f"{name}.html" for name in distinct_names(arguments.files)]
     fits, links = [], []
     number = min(cores(), len(arguments.files))
-    sheets = in_order(partial(_of_file, arguments), arguments.files, number)
+    sheets = in_order(partial(sheet_of, arguments), arguments.files, number)
     for name, sheet in zip(names, sheets, strict=True):
         fits.append(sheet.fitted)
         links.append(f"{folder.name}/{name}" if sheet.page else None)

@@ -14,9 +14,9 @@ from markupsafe import Markup
 TEMPLATES: Final = Path(__file__).parent / "templates"
 
 
-def own_files() -> dict[str, str]:
-    """The package's own style and script; the policy names the script by its hash."""
-    script = (TEMPLATES / "script.js").read_text(encoding="utf-8").strip()
+def own_files(script_file: str = "script.js") -> dict[str, str]:
+    """The package's own style and a script; the policy names the script by its hash."""
+    script = (TEMPLATES / script_file).read_text(encoding="utf-8").strip()
     return {
         "style": Markup((TEMPLATES / "style.css").read_text(encoding="utf-8").strip()),
         "script": Markup(script),

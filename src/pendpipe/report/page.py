@@ -472,6 +472,9 @@ _SHEET: Final = Caption(
 
 
 def _inlined(figure: Figure, prefix: str, caption: Caption) -> Markup:
+    import matplotlib as mpl
+
     drawn = io.StringIO()
-    figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": "pendpipe"})
+    with mpl.rc_context({"svg.hashsalt": prefix}):  # so that the same page has the same bytes
+        figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": "pendpipe"})
     return inline_svg(drawn.getvalue(), prefix, caption.title, caption.shows)

@@ -1,0 +1,224 @@
+"""The page of `pendpipe open` answers itself alone, as `fit` does, and leaves nothing behind."""
+
+import http.client
+import json
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import pytest
+
+from pendpipe.cli import main
+from pendpipe.commands import open as opening
+from pendpipe.commands.open import Door
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ("rod-pendulum.csv", "string-pendulum.csv")
+
+
+class Browser:
+    """What a browser sends to a door, and what anybody else might."""
+
+    def __init__(self, door: Door) -> None:
+        self.door = door
+
+    def ask(
+        self, path: str, body: bytes | None = None, **headers: str
+    ) -> tuple[int, bytes, dict[str, str]]:
+        """Ask for a path behind the token; a header's name has _ for -."""
+        return self.send(f"/{self.door.token}/{path}", body, **headers)
+
+    def send(
+        self, path: str, body: bytes | None = None, **headers: str
+    ) -> tuple[int, bytes, dict[str, str]]:
+        line = http.client.HTTPConnection("127.0.0.1", self.door.server_port, timeout=60)
+        named = {name.replace("_", "-"): value for name, value in headers.items()}
+        line.request("GET" if body is None else "POST", path, body, named)
+        answer = line.getresponse()
+        found = answer.status, answer.read(), dict(answer.headers)
+        line.close()
+        return found
+
+    def drop(self, file: Path) -> int:
+        return int(self.ask(f"files/{quote(file.name)}", file.read_bytes())[1])
+
+    def read(self, number: int, **options: str) -> dict[str, Any]:
+        body = json.dumps(options).encode() if options else b""
+        return dict(json.loads(self.ask(f"read/{number}", body)[1]))
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with Door(0, tmp_path_factory.mktemp("open")) as door:
+        threading.Thread(target=door.serve_forever, daemon=True).start()
+        yield Browser(door)
+        door.end()
+
+
+def test_nobody_else_is_answered(browser: Browser) -> None:
+    """No token, a wrong one, a name that was made to point here, the page of somebody else."""
+    host = browser.door.host
+    assert browser.ask("files")[0] == 200
+    assert browser.ask("files", Origin=f"http://{host}")[0] == 200
+    for path in ("/", "/files", f"/{browser.door.token[:-1]}/files", f"/x/{browser.door.token}/"):
+        status, body, _ = browser.send(path)
+        assert (status, browser.door.token.encode() in body) == (403, False)
+    for name, value in (
+        ("Host", "evil.example"),
+        ("Host", f"evil.example:{browser.door.server_port}"),
+        ("Host", f"localhost.evil.example:{browser.door.server_port}"),
+        ("Origin", "http://evil.example"),
+        ("Origin", "null"),
+        ("Origin", f"https://{host}"),
+    ):
+        assert browser.ask("files", **{name: value})[0] == 403
+        assert browser.ask("files/a.csv", b"1,2\n", **{name: value})[0] == 403
+    assert json.loads(browser.ask("files")[1]) == []
+
+
+def test_what_is_no_upload_is_refused_before_it_is_read(browser: Browser) -> None:
+    for length in (str(opening._LARGEST + 1), "-1", "many", ""):
+        line = http.client.HTTPConnection("127.0.0.1", browser.door.server_port, timeout=10)
+        line.putrequest("POST", f"/{browser.door.token}/files/a.csv")
+        line.putheader("Content-Length", length)
+        line.endheaders()
+        assert line.getresponse().status == 413
+        line.close()
+    for path in ("sheet/99", "sheet/..%2f", "read", "class.pdf", "../files", "answer/1"):
+        assert browser.ask(path)[0] == 404
+    for path in ("read/99", "files/", "files/..", "files/%00", "forget/99", "nothing/1"):
+        assert browser.ask(path, b"1,2\n")[0] == 404
+
+
+def test_its_answers_load_nothing_from_elsewhere(browser: Browser) -> None:
+    _, page, headers = browser.ask("")
+    assert b"default-src 'none'" in page
+    assert re.findall(rb"""(?:src|href)=["']?(?:https?:)?//""", page) == []
+    assert headers["Content-Security-Policy"] == "frame-ancestors 'none'"
+    assert headers["Referrer-Policy"] == "no-referrer"
+
+
+@pytest.mark.slow
+def test_a_dropped_file_is_answered_as_by_fit_and_by_page(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Byte for byte: the sheet, and the table in every form of text."""
+    monkeypatch.chdir(tmp_path)
+    for name in EXAMPLES:
+        Path(name).write_bytes((ROOT / "examples" / name).read_bytes())
+    numbers = [browser.drop(Path(name)) for name in EXAMPLES]
+    choice = {"column": "2", "unit": "deg", "length": "1.0", "start": "10", "stop": "50"}
+    answers = [browser.read(numbers[0]), browser.read(numbers[1], **choice)]
+    assert [answer["refusal"] for answer in answers] == ["", ""]
+    assert answers[1]["columns"] == [[2, "angle (deg)"]]
+    assert len(answers[1]["picture"]["points"]) > 500
+    assert answers[1]["picture"]["points"][0][0] < 10, "the part is chosen from the whole"
+    for number, answer, name in zip(numbers, answers, EXAMPLES, strict=True):
+        words = shlex.split(answer["command"])
+        assert words[:2] == ["pendpipe", "page"]
+        assert main(words[1:]) == 0
+        assert Path(name).with_suffix(".html").read_bytes() == browser.ask(f"sheet/{number}")[1]
+        assert answer["sheet"].count("<svg") > 1
+    browser.read(numbers[1], column="")
+    assert main(["fit", *EXAMPLES, "--out", "class.csv"]) == 0
+    assert browser.ask("class.csv")[1] == Path("class.csv").read_bytes()
+    assert (
+        json.loads(browser.ask("commands")[1])
+        == f"pendpipe page --no-diagnosis {' '.join(EXAMPLES)}"
+    )
+
+
+@pytest.mark.slow
+def test_what_is_wrong_is_said_and_no_more(browser: Browser, tmp_path: Path) -> None:
+    """A file that is none, a bad option, a name that looks like an option or like a module."""
+    for name, content, said in (
+        ("-.csv", b"no\nnumbers\n", "./-.csv"),
+        ("matplotlibrc", b"backend: nonsense\n", ""),
+        ("a b.csv", b"\x89PNG", "this is a picture"),
+    ):
+        (tmp_path / name).write_bytes(content)
+        number = browser.drop(tmp_path / name)
+        answer = browser.read(number)
+        assert answer["sheet"] == ""
+        assert answer["refusal"]
+        assert said in answer["refusal"] + answer["command"]
+        assert str(browser.door._folder) not in json.dumps(answer)
+        assert browser.ask(f"forget/{number}", b"")[0] == 200
+    number = browser.drop(ROOT / "examples" / EXAMPLES[0])
+    assert "--length" in browser.read(number, length="none")["refusal"]
+    assert "no sample" in browser.read(number, start="900")["refusal"]
+    assert browser.read(number, command="rm")["refusal"] == "", "an option that is not offered"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("limit", "said"), [("_SECONDS", "more than 0 s"), ("_MEMORY", "broke off|more than 0 GB")]
+)
+def test_an_analysis_that_takes_too_much_is_ended(
+    browser: Browser, monkeypatch: pytest.MonkeyPatch, limit: str, said: str
+) -> None:
+    """The limit of memory is that of the process that is asked: here by a spawned one's words."""
+    number = browser.drop(ROOT / "examples" / EXAMPLES[0])
+    if limit == "_MEMORY":
+        monkeypatch.setattr(opening, "_work", _hungry)
+    else:
+        monkeypatch.setattr(opening, limit, 0.0)
+    assert re.search(said, browser.read(number, start="0")["refusal"])
+    assert browser.door._running == set()
+
+
+def _hungry(*given: Any) -> None:
+    """Analyse with no memory to speak of."""
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_AS, (1 << 20, 1 << 20))
+    bytearray(1 << 24)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_and_its_copies_and_so_do_two(number: int, tmp_path: Path) -> None:
+    """While a file is analysed, and whatever is sent while it ends."""
+    if sys.platform == "win32":
+        pytest.skip("signals end no process there as they do elsewhere")
+    process = subprocess.Popen(
+        [sys.executable, "-m", "pendpipe", "open"],
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**dict(__import__("os").environ), "TMPDIR": str(tmp_path)},
+    )
+    assert process.stderr is not None
+    found = re.search(r"http://(127\.0\.0\.1:(\d+))/(\S+)/", process.stderr.readline())
+    assert found
+    line = http.client.HTTPConnection(found[1], timeout=60)
+    file = ROOT / "examples" / EXAMPLES[0]
+    line.request("POST", f"/{found[3]}/files/{file.name}", file.read_bytes())
+    assert line.getresponse().read() == b"1"
+    assert [each.name for each in tmp_path.rglob("*.csv")] == [file.name]
+    line.request("POST", f"/{found[3]}/read/1", b"")
+    for _ in range(5):
+        process.send_signal(number)
+    assert process.wait(30) == 0
+    assert list(tmp_path.glob("pendpipe-*")) == []
+    assert process.stderr.read() == ""
+    process.stderr.close()
+    line.close()
+
+
+def test_a_port_that_is_taken_is_refused_in_a_line(
+    browser: Browser, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    try:
+        assert main(["open", "--port", str(browser.door.server_port)]) == 2
+    finally:
+        signal.signal(signal.SIGINT, before[0])
+        signal.signal(signal.SIGTERM, before[1])
+    assert re.fullmatch(r"pendpipe: --port \d+: .*leave it out\n", capsys.readouterr().err)
