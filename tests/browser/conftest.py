@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from pendpipe.cli import main
-from pendpipe.report.page import OWN_PAGE, render
+from pendpipe.report.page import OWN_PAGES, render
 
 ROOT = Path(__file__).parents[2]
 
@@ -46,10 +46,10 @@ def repeated(results: Path, home: Path, count: int) -> tuple[Path, list[str]]:
             shutil.copytree(results / like["record"], home / name)
 
     def own_page(record: str, page: str) -> None:
-        (home / record / OWN_PAGE).write_text(page)
+        (home / OWN_PAGES / f"{record}.html").write_text(page)
         own.append(record)
 
-    home.mkdir(exist_ok=True)
+    (home / OWN_PAGES).mkdir(parents=True, exist_ok=True)
     settings = yaml.safe_load((ROOT / "config/config.yaml").read_text())
     numbers = json.loads((results / "campaign.json").read_text())
     page = home / "report.html"
@@ -103,7 +103,7 @@ def pages(campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
         "few records": few,
         "campaign": report,
         "many records": many,
-        "record": many.parent / own[0] / "record.html",
+        "record": many.parent / OWN_PAGES / f"{own[0]}.html",
         "recording": folder / "one.html",
         "class": folder / "class.html",
         "documents": ROOT / "docs/_build/html/index.html",

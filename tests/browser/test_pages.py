@@ -214,7 +214,7 @@ def test_a_row_of_many_leads_to_its_record_s_own_page(
     with opened(chromium, pages["many records"]) as tab:
         assert tab.locator("details .record").count() == 2 * 4 + 1, "refused or amiss, four times"
         tab.get_by_role("link", name="water-high-1", exact=True).click()
-        assert tab.url.endswith("water-high-1/record.html")
+        assert tab.url.endswith("pages/water-high-1.html")
         assert tab.locator("[data-view]").count() == 1
         tab.get_by_role("link", name="Nonlinear damping").click()
         assert tab.url.endswith("report.html")

@@ -376,11 +376,11 @@ def test_beyond_a_hundred_records_only_those_that_need_a_look_are_drawn(
     assert len(page.encode()) < BUDGET_BYTES
     assert re.findall(r'class="record" id="record-(\d+)"', page) == ["1", "2", "3"]
     assert list(own) == [f"record {index:04}" for index in range(1, 120)]
-    assert '<a href="record%200119/record.html">record 0119</a>' in page
+    assert '<a href="pages/record%200119.html">record 0119</a>' in page
     outline = Outline(own["record 0014"])
     assert "data-times" in own["record 0014"], "an own page zooms"
     assert "../report.html" in outline.references
-    assert "fit.json" in outline.references
+    assert "../record%200014/fit.json" in outline.references
 
 
 @pytest.mark.slow

@@ -15,8 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from pendpipe.stages.archive import hashes
+from benchmarks.kills import hashes
 
 ROOT = Path(__file__).parents[2]
 RECORDS = int(os.environ.get("PENDPIPE_SLURM_RECORDS", "20"))

@@ -1,7 +1,9 @@
 """The workflow runs in any folder, and plans what it says."""
 
+import contextlib
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -41,16 +43,22 @@ def jobs(done: subprocess.CompletedProcess[str]) -> dict[str, int]:
     return jobs_in(done.stdout + done.stderr)
 
 
-@pytest.fixture
-def begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with a campaign of the two examples, without their diagnoses."""
-    monkeypatch.chdir(tmp_path)
-    assert main(["init", "mine"]) == 0
-    configuration = tmp_path / "mine/config/config.yaml"
+def begin(folder: Path) -> Path:
+    """Begin a campaign of the two examples, without their diagnoses."""
+    with contextlib.chdir(folder):
+        assert main(["init", "mine"]) == 0
+    configuration = folder / "mine/config/config.yaml"
     text = configuration.read_text(encoding="utf-8")
     assert "enabled: true" in text
     configuration.write_text(text.replace("enabled: true", "enabled: false"), encoding="utf-8")
-    return tmp_path / "mine"
+    return folder / "mine"
+
+
+@pytest.fixture
+def begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of a campaign that was begun, in the working folder."""
+    monkeypatch.chdir(tmp_path)
+    return begin(tmp_path)
 
 
 def set_traps(folder: Path) -> Path:
@@ -91,24 +99,34 @@ def test_a_folder_that_the_user_names_is_a_profile(begun: Path) -> None:
     assert "nowhere" in done.stdout + done.stderr
 
 
-def test_a_campaign_that_was_begun_runs_to_its_report(begun: Path) -> None:
-    sprung = set_traps(begun)
-    records = begun / "config/records.tsv"
-    with records.open("a", encoding="utf-8") as table:
+@pytest.fixture(scope="module")
+def ended(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> tuple[Path, subprocess.CompletedProcess[str]]:
+    """A campaign among traps that has run to its end: its folder, and what was said."""
+    folder = begin(tmp_path_factory.mktemp("ended"))
+    set_traps(folder)
+    with (folder / "config/records.tsv").open("a", encoding="utf-8") as table:
         table.write("lost\trecordings/rod-pendulun.csv\n")
-    done = call(begun, "pendpipe", "campaign", "--cores", "2")
+    return folder, call(folder, "pendpipe", "campaign", "--cores", "2")
+
+
+def test_a_campaign_that_was_begun_runs_to_its_report(
+    ended: tuple[Path, subprocess.CompletedProcess[str]],
+) -> None:
+    folder, done = ended
     assert done.returncode == 0, done.stdout + done.stderr
-    assert (begun / "results/report.html").is_file()
-    fit = json.loads((begun / "results/rod/fit.json").read_text(encoding="utf-8"))
+    assert (folder / "results/report.html").is_file()
+    fit = json.loads((folder / "results/rod/fit.json").read_text(encoding="utf-8"))
     assert fit["light"] == "green"
     lines = done.stderr.splitlines()
     assert any("did you mean 'rod-pendulum.csv'?" in line for line in lines), "of the lost file"
     assert "fit: 1 done" in lines
     assert "1 of 3 records were refused" in lines[-1]
-    alone = call(begun, "pendpipe", "campaign", "-n", "--record", "rod", "--", "--forcerun", "fit")
+    alone = call(folder, "pendpipe", "campaign", "-n", "--record", "rod", "--", "--forcerun", "fit")
     files = {f"{name}_files_{number}": 1 for number, name in enumerate(RECORDS_STAGES)}
     assert jobs(alone) == dict.fromkeys(RECORDS_STAGES, 1) | files | {"all": 1, "total": 11}
-    assert not sprung.exists(), f"neither the run nor the plan uses them: {sprung.read_text()}"
+    assert not (folder / "sprung").exists(), "neither the run nor the plan uses them"
 
 
 def test_a_line_a_stage_hides_no_fault(begun: Path) -> None:
@@ -122,9 +140,13 @@ def test_a_line_a_stage_hides_no_fault(begun: Path) -> None:
     assert "pendpipe: recordings/rod-pendulum.csv" in done.stderr
 
 
-def test_the_workflow_is_a_module_of_others(begun: Path) -> None:
-    """Rules under other names; no hook of a workflow is run."""
-    begun.joinpath("Snakefile").write_text(
+def test_the_workflow_is_a_module_of_others(
+    ended: tuple[Path, subprocess.CompletedProcess[str]], tmp_path: Path
+) -> None:
+    """Rules under other names, of a campaign that has ended; no hook of a workflow is run."""
+    traps = shutil.ignore_patterns("*.py", "default", "slurm", "matplotlibrc")
+    folder = shutil.copytree(ended[0], tmp_path / "mine", ignore=traps)
+    folder.joinpath("Snakefile").write_text(
         f"""
 configfile: "config/config.yaml"
 module pendpipe:
@@ -137,24 +159,19 @@ rule all:
 """,
         encoding="utf-8",
     )
-    records = begun / "config/records.tsv"
-    records.write_text("record\tsource\nrod\trecordings/rod-pendulum.csv\n", encoding="utf-8")
+    assert planned(folder) == {}, "all is done"
     targets = ("results/rod/fit.json", "results/records.csv")
-    ran = jobs(call(begun, "snakemake", "--cores", "2", *targets))
-    names = {f"pendpipe_{name}" for name in (*RECORDS_STAGES[:4], "fit_files_3", "records")}
-    assert set(ran) == names | {"total"}
-    fit, table = begun / "results/rod/fit.json", begun / "results/records.csv"
-    before = (fit.read_bytes(), table.read_bytes())
-    for path in (fit, table):
+    names = ("turning_points", "fit", "fit_files_3", "records")
+    for path in (paths := [folder / name for name in targets]):
         path.write_bytes(path.read_bytes()[:-5])
-    again = call(
-        begun, "snakemake", "--cores", "2", *targets, "--forcerun", "pendpipe_turning_points"
+    ran = call(
+        *(folder, "snakemake", "--cores", "2", *targets),
+        *("--forcerun", "pendpipe_turning_points"),
     )
-    assert set(jobs(again)) == {
-        f"pendpipe_{name}" for name in ("turning_points", "fit", "fit_files_3", "records")
-    } | {"total"}, "all else is done"
-    assert (fit.read_bytes(), table.read_bytes()) == before
-    assert len(list(fit.parent.glob("fit.json.damaged-*"))) == 1
+    assert set(jobs(ran)) == {f"pendpipe_{name}" for name in names} | {"total"}
+    for path in paths:
+        assert path.read_bytes() == (ended[0] / path.relative_to(folder)).read_bytes()
+    assert len(list(paths[0].parent.glob("fit.json.damaged-*"))) == 1
 
 
 def test_init_replaces_nothing(
@@ -188,7 +205,8 @@ def test_init_lists_recordings_of_ones_own(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        *("calibration", "figures", "logs", "chunks", "pendulums", "con", "con.a", "nul.b"),
+        *("calibration", "figures", "logs", "chunks", "pages", "pendulums"),
+        *("con", "con.a", "nul.b"),
         *(
             "n" * 150,
             "tab\there",

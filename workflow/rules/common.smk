@@ -185,6 +185,7 @@ def wanted():
         f"{RESULTS}/comparison.json",
         f"{RESULTS}/separation.json",
         f"{RESULTS}/report.html",
+        f"{RESULTS}/pages",
         f"{RESULTS}/records.parquet",
         f"{RESULTS}/records.csv",
         f"{RESULTS}/figures/drawn.json",

@@ -6,11 +6,13 @@ rule report:
         figures=[*figure_files(), f"{RESULTS}/figures/drawn.json"],
         records=[path for stage in STAGES for path in of_stage(stage)],
     output:
-        report(
+        page=report(
             f"{RESULTS}/report.html",
             category="Report",
             caption="../report/report.rst",
         ),
+        # Of records that are not wholly on that page: which they are is known when it is written.
+        own=directory(f"{RESULTS}/pages"),
     log:
         f"{RESULTS}/logs/report.log",
     conda:
@@ -25,5 +27,5 @@ rule report:
     message:
         "the page about the campaign"
     shell:
-        "pendpipe report --campaign {resources.configuration:q} --comparison {input.comparison:q}"
-        " --summary {input.campaign:q} --out {output:q} 2> {log:q}"
+        "mkdir -p {output.own:q} && pendpipe report --campaign {resources.configuration:q} --comparison {input.comparison:q}"
+        " --summary {input.campaign:q} --out {output.page:q} 2> {log:q}"

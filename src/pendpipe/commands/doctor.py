@@ -1,11 +1,11 @@
-"""Examine a campaign's results: altered and unfinished files, locks and leftovers.
+"""Examine a campaign's results for what Snakemake can't see: altered files and leftovers, a lock.
 
 Nothing is changed. Each line names a file or folder, what is wrong with it, and what is safe
 to do. The exit status is 0, unless ``--fail-on findings`` asks for 3.
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -13,20 +13,22 @@ from pendpipe.arguments import Arguments, command, print_answer
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import SET_ASIDE, damage_of
 from pendpipe.options import flags
-from pendpipe.stages.archive import FOLDER, archives, hashes, made_in, members
+from pendpipe.stages.archive import FOLDER
 
 TEMPORARY: Final = re.compile(r"\.(.+)\.[0-9a-f]{8}")
 """The name of a file that `pendpipe.files.replaced` had not finished."""
+_FOLDERS: Final = {FOLDER: ".zip", "pages": ".html"}
+"""Whose files have names of their own, by what these end with."""
 _CHALLENGE: Final = ("challenge", "challenge-sealed")
 _LEAVE: Final = "no stage reads it: keep it, or move it elsewhere"
 _RUN: Final = "snakemake makes it again"
 _NAMES: Final = (
     *("recording.csv", "calibration.json", "turning_points.csv", "fit.json", "refused.json"),
-    *("diagnosis.json", "decay.svg", "record.html", "caliper.csv", "sensor.json"),
+    *("diagnosis.json", "decay.svg", "caliper.csv", "sensor.json"),
     *("separation.json", "comparison.json", "campaign.json", "campaign_diagnosis.json"),
     *("report.html", "records.csv", "records.parquet", "drawn.json"),
 )
-"""Of results, beside the archives of chunks."""
+"""Of results, beside the archives of chunks and the records' own pages."""
 
 
 @command(
@@ -57,8 +59,7 @@ class Finding(NamedTuple):
     Parameters
     ----------
     kind
-        ``altered``, ``incomplete``, ``stale``, ``orphaned``, ``locked``, ``temporary``,
-        ``raw`` or ``set-aside``.
+        ``altered``, ``locked``, ``temporary``, ``raw`` or ``set-aside``.
     path
         Where.
     problem
@@ -93,11 +94,9 @@ def examine(results: Path) -> list[Finding]:
         if found:  # killed before the first result
             return found
         raise InputError(results, "there is no such folder", "name a folder of results")
-    homes = _homes(results)
-    found += [finding for home in homes for finding in _stale(home)]
-    found += _of_files(results, homes)
+    found += _of_files(results)
     refuse_if(
-        not (homes or found),
+        not (found or any(results.rglob(f"{FOLDER}/*.zip"))),
         results,
         "no stage has left results here",
         "name a campaign's folder of results",
@@ -105,40 +104,14 @@ def examine(results: Path) -> list[Finding]:
     return found
 
 
-def _homes(results: Path) -> dict[Path, set[str]]:
-    """The folders of campaigns' results, this one and others in it, with their records."""
-    folders = {path.parent.parent for path in results.rglob(f"{FOLDER}/*.zip")}
-    return {
-        home: {name.partition("/")[0] for path in archives(home, "*") for name in members(path)}
-        for home in sorted(folders)
-        if not _of_the_challenge(home, results)
-    }
-
-
-def _of_the_challenge(path: Path, results: Path) -> bool:
-    return bool({*path.relative_to(results).parts} & {*_CHALLENGE})
-
-
-def _stale(home: Path) -> Iterator[Finding]:
-    """Results that were made from other files than those that there are now."""
-    whole = [path for path in archives(home, "*") if damage_of(path) is None]
-    now = {name: found for path in whole for name, found in hashes(path).items()}
-    for path in whole:
-        for record, made in made_in(path).items():
-            for name, was in made["read"].items():
-                if now.get(f"{record}/{name}", was) != was:
-                    problem = f"{record} in it was made from another {name} than the one there now"
-                    yield Finding("stale", str(path), problem, _RUN)
-
-
-def _of_files(results: Path, homes: Mapping[Path, set[str]]) -> Iterator[Finding]:
-    """Results that are not as they were written, files of nobody, recordings never decoded."""
+def _of_files(results: Path) -> Iterator[Finding]:
+    """Results that are not as they were written, leftovers, recordings never decoded."""
     for path in sorted(path for path in results.rglob("*") if path.is_file()):
-        ours = path.name in _NAMES or (path.parent.name == FOLDER and path.suffix == ".zip")
+        ours = path.name in _NAMES or (path.parent.name, path.suffix) in _FOLDERS.items()
         begun = TEMPORARY.fullmatch(path.name)
-        if _of_the_challenge(path, results):
+        if {*path.relative_to(results).parts} & {*_CHALLENGE}:
             continue
-        if begun and (begun[1] in _NAMES or path.parent.name == FOLDER):
+        if begun and (begun[1] in _NAMES or path.parent.name in _FOLDERS):
             problem = "a process was killed while it wrote this"
             yield Finding("temporary", str(path), problem, "delete it when no run is alive")
         elif SET_ASIDE in path.name:
@@ -148,21 +121,6 @@ def _of_files(results: Path, homes: Mapping[Path, set[str]]) -> Iterator[Finding
             yield from _undecoded(path)
         elif ours and (damage := damage_of(path)):
             yield Finding("altered", str(path), damage.problem, _RUN)
-        elif not ours and _is_orphan(path, homes):
-            yield Finding("orphaned", str(path), "no stage has written this", _LEAVE)
-
-
-def _is_orphan(path: Path, homes: Mapping[Path, set[str]]) -> bool:
-    """Whether a file lies among a campaign's results or in a record's folder, and is nobody's.
-
-    Another folder is the user's, and so are the folders of raw recordings and of logs.
-    """
-    home = next((parent for parent in path.parents if parent in homes), None)
-    if home is None or path.name.lower() == "readme.md":
-        return False
-    first, *rest = path.relative_to(home).parts
-    of_a_record = first in homes[home] and {*rest[:-1]} <= {"diagnosis", "figures"}
-    return not rest or (of_a_record and rest[0] != "diagnosis")
 
 
 def _undecoded(raw: Path) -> Iterator[Finding]:
@@ -186,20 +144,12 @@ def _undecoded(raw: Path) -> Iterator[Finding]:
 
 
 def _of_snakemake(folder: Path) -> Iterator[Finding]:
-    """Locks, and results that Snakemake knows to be unfinished."""
+    """A lock, and whether the run that took it is alive."""
     if any(folder.glob("locks/*")):
         problem, safe = "a run was killed", "snakemake --unlock, then run again"
         if alive := _alive(folder.parent):
             problem, safe = f"Snakemake is at work (process {alive})", "wait until it ends"
         yield Finding("locked", str(folder / "locks"), problem, safe)
-    unfinished = sum(1 for path in folder.glob("incomplete/**/*") if path.is_file())
-    if unfinished:
-        yield Finding(
-            "incomplete",
-            str(folder / "incomplete"),
-            f"{unfinished} results were being written when a run was killed",
-            _RUN,
-        )
 
 
 def _alive(project: Path) -> int | None:

@@ -42,7 +42,7 @@ def run(arguments: Arguments) -> None:
     """Write the page."""
     from pendpipe.figures.data import read_compared
     from pendpipe.files import make_folder, read_json, write_whole, writing
-    from pendpipe.report.page import OF_A_RECORD, OF_THE_CAMPAIGN, OWN_PAGE, render
+    from pendpipe.report.page import OF_A_RECORD, OF_THE_CAMPAIGN, OWN_PAGES, render
     from pendpipe.report.tables import as_text, headline
     from pendpipe.stages.archive import gather
     from pendpipe.stages.chunks import SMALL
@@ -72,7 +72,7 @@ def run(arguments: Arguments) -> None:
             beside,
             figures,
             home=home,
-            own_page=lambda record, page: write_whole(folder / record / OWN_PAGE, page),
+            own_page=lambda record, page: write_whole(folder / OWN_PAGES / f"{record}.html", page),
             linked=small,
         )
         write_whole(out, page)

@@ -28,7 +28,7 @@ LONGEST_NAME: Final = 100
 """The names of files made from it stay below the 255 bytes that file systems allow."""
 _OF_WINDOWS: Final = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 _OF_THE_CAMPAIGN: Final = (
-    *("figures", "calibration", "logs", "pendulums", "challenge", "challenge-sealed"),
+    *("figures", "calibration", "logs", "pages", "pendulums", "challenge", "challenge-sealed"),
     *("campaign.json", "comparison.json", "separation.json", "report.html", "readme.md"),
     *("campaign_diagnosis.json", "chunks", "records", "records.csv", "records.parquet"),
 )

@@ -57,7 +57,8 @@ _ROW_BYTES, _RECORD_BYTES = 2_000, 4_500
 """What a record takes beside its drawings: in the tables, and in words where it is drawn."""
 
 TOGETHER: Final = "campaign_diagnosis.json"
-OWN_PAGE: Final = "record.html"
+OWN_PAGES: Final = "pages"
+"""The folder of the records' own pages, beside the records' folders."""
 OF_THE_CAMPAIGN: Final = ("records.csv", "comparison.json", TOGETHER)
 OF_A_RECORD: Final = (
     *("recording.csv", "turning_points.csv", "fit.json", "diagnosis/diagnosis.json"),
@@ -188,7 +189,7 @@ def render(
     _draw_records(folder, lines, room, links)
     for line in lines:
         if own_page is not None and below and not line["refused"] and not line["zoom"]:
-            line["page"] = links.to(line["name"], OWN_PAGE)
+            line["page"] = links.to(OWN_PAGES, f"{line['name']}.html")
             own_page(line["name"], _own_page(folder, line, home, title, shared, linked=linked))
         line["link"] = f"#{line['anchor']}" if line["drawn"] else line["page"]
     return fill_template(
@@ -272,9 +273,7 @@ class Links(NamedTuple):
         """The link to a result, by its folder and name."""
         if self.home is None:
             return None
-        return quote(
-            self.folder.joinpath(*names).absolute().relative_to(self.home.absolute()).as_posix()
-        )
+        return quote(Path(os.path.relpath(self.folder.joinpath(*names), self.home)).as_posix())
 
     def present(self, names: Iterable[str], record: str = "") -> list[tuple[str, str]]:
         """Names and links of those of a record's (or the campaign's) files that there are."""
@@ -356,13 +355,13 @@ def _own_page(
     room, place = Room(BUDGET_BYTES), folder / line["name"]
     own = {**line, "page": None, "zoom": True, "files": []}
     if linked:
-        own["files"] = Links(place, place).present(OF_A_RECORD)
+        own["files"] = Links(folder, folder / OWN_PAGES).present(OF_A_RECORD, line["name"])
     if not line["drawn"]:
         own |= _drawings(folder, line["entry"])
     own["zoom"] = own["waveform"] is not None
     own["map"] = _residual_map(folder, own, room)
     own["decay"] = _decay(place / "figures" / "decay.svg", own, room)
-    back = "" if home is None else os.path.relpath(home.absolute(), place.absolute())
+    back = "" if home is None else os.path.relpath(home, folder / OWN_PAGES)
     back = quote(Path(back).as_posix())
     return fill_template(
         "pendpipe.report", "record_page.html", line=own, home=back, campaign=campaign, **shared

@@ -10,7 +10,6 @@ import shutil
 import zipfile
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -87,12 +86,6 @@ def made_in(path: Path) -> dict[str, Made]:
     with zipfile.ZipFile(path) as archive:
         found: dict[str, Made] = json.loads(archive.read(_INDEX))
     return found
-
-
-def hashes(path: Path) -> dict[str, str]:
-    """The hash of each file in an archive."""
-    with zipfile.ZipFile(path) as archive:
-        return {name: sha256(archive.read(name)).hexdigest() for name in _members(archive)}
 
 
 def archives(results: Path, stage: str) -> list[Path]:
