@@ -505,6 +505,17 @@ SIGNS = {
         "time angle_rad\n" + each("{:.3f} - {:.5f}\n", TIME, ANGLE + 1.0), ANGLE + 1.0
     ),
     "units in the cells": Case("t,angle\n" + each("{:.2f} s,{:.3f} deg\n", TIME, DEGREES)),
+    "degrees from the axis of a picture": Case(
+        text(TIME, 270 + np.degrees(SMALL), head="t (s),theta\n"),
+        SMALL,
+        doubted="swings about 270: taken to be in degrees",
+    ),
+    "what swings about no quarter turn": Case(
+        text(TIME, 260 + np.degrees(SMALL), head="t (s),theta\n"),
+        260 + np.degrees(SMALL),
+        "1",
+        doubted="no unit: analysed in its own",
+    ),
     "degrees and decimal commas in the cells": Case(
         "Zeit;Auslenkung\n" + each("{:.2f} s;{:.3f}°\n", TIME, DEGREES).replace(".", ",")
     ),
@@ -972,7 +983,7 @@ def test_the_file_says_or_physics_shows_what_is_read(tmp_path: Path, case: str) 
     assert any("--unit" in guess for guess in recording.weak_guesses) == guessed
 
 
-@pytest.mark.parametrize("size", [0.01, 3.0, 22.3, 180.0, 1013.0])
+@pytest.mark.parametrize("size", [0.01, 3.0, 22.3, 200.0, 1013.0])
 @pytest.mark.parametrize("name", ["theta", "position", "", "signal"])
 def test_no_size_and_no_step_tells_a_unit(tmp_path: Path, size: float, name: str) -> None:
     """Small swings of any size, about any level, in the steps of an encoder: in their own unit."""

@@ -48,6 +48,16 @@ _OTHER_PERIODS: Final = 0.01
 """How often a swing lies outside: two of 190 files of others do, one a balance of 211 s."""
 
 
+_MOST_MISSING: Final = 0.02
+"""Of the rows, beyond which missing frames make any interval fit."""
+_TRIES, _ROUNDS = 21, 8
+"""Numbers of missing frames that are tried, and lines through the stamps of each count."""
+_FEW_TRIES: Final = 3
+"""Of more rows than `_LONG`, through which a line is so sure that it finds their number itself."""
+_LONG: Final = 200_000
+"""Rows, of which all tries take a second and a half."""
+
+
 @dataclass
 class TimeBase:
     """Times of the rows that are kept; which rows those are, in order; what was done.
@@ -466,9 +476,7 @@ def _rounded(time: FloatArray, lines: IntArray | None = None) -> FloatArray | No
     within what one stamp stands for (`_coarseness`), which may change on the way. Stamps lie at
     the middle of it (rounded), or at either end (cut; the arrival of a block).
 
-    Where a stamp shows that frames are missing, each row is counted one interval after the row
-    above, or as many as bring it within its stamp. The interval with which fewest are missing
-    is right.
+    Where a stamp shows that frames are missing, they are counted (`_frames`).
     """
     steps = np.diff(time)
     if len(time) < 10 or steps.min() < 0 or np.mean(steps == 0) < 0.001:
@@ -489,16 +497,8 @@ def _rounded(time: FloatArray, lines: IntArray | None = None) -> FloatArray | No
             return even
     if np.mean(steps == 0) < 0.02:
         return None
-    # The first stamps are the finest.
-    early = time[: max(10, min(30, int(np.argmax(steps == 0))))]
-    usual = (float(np.median(np.diff(early))), float(np.ptp(time)) / float(placed[-1]))
-    changes = (0.0, 1e-3, -1e-3, 5e-3, -5e-3, 1e-2, -1e-2)
-    for step, place in product(usual, places):
-        tried = [_frames(time, digit, (1.0 + c) * step, place) for c in changes]
-        if found := [even for even in tried if even is not None]:
-            # Fewest frames in all is the longest interval.
-            return max(found, key=lambda even: np.diff(even).min())
-    return None
+    counted = (_frames(time, digit, place) for place in places)
+    return next((even for even in counted if even is not None), None)
 
 
 def _coarseness(time: FloatArray) -> FloatArray:
@@ -532,33 +532,42 @@ def _last_digit(time: FloatArray) -> FloatArray:
     return np.maximum(10.0**-decimals, 10.0 ** (size - digits + 1))
 
 
-def _frames(
-    time: FloatArray, digit: FloatArray, interval: float, index: FloatArray
-) -> FloatArray | None:
-    """Count the frames from the first row to each, improving their interval on the way.
+def _frames(time: FloatArray, digit: FloatArray, index: FloatArray) -> FloatArray | None:
+    """Count the frames from the first row to each, those missing as the stamps make likeliest.
 
-    Each row is at least as many after the first as `index` says.
+    Each row is at least one frame after the row above, as many as bring it within its stamp, and at
+    least as many after the first as `index` says; a line through the stamps so counted improves
+    the interval. Rounded stamps scatter by 1/12 of their last digit squared, and each missing
+    frame may lie anywhere: -ln L is 6 sum(error/digit)^2 + (number missing) ln(rows).
 
     Returns
     -------
     time_s
-        ``None`` where some stamp contradicts the count, or more than 2 % are missing: of
+        ``None`` where some stamp contradicts each count, or more than 2 % are missing: of
         so many any interval would do.
     """
-    start, tries = float(time[0]), 8
-    while interval > 0 and tries:
-        # At least one more than the row above, and at least what the stamp asks for.
-        least = np.ceil((time - start - 0.6 * digit) / interval - 1e-9)
-        count = index + np.maximum.accumulate(np.maximum(least - index, 0.0))
-        even: FloatArray = start + interval * count
-        if count[-1] > 1.02 * len(time) + 3:
-            break
-        if np.all(np.abs(even - time) <= 0.6 * digit):
-            return even
-        fitted = np.polynomial.Polynomial.fit(count, time, 1, w=1.0 / digit).convert()
-        start, interval = fitted.coef.tolist()
-        tries -= 1
-    return None
+    slack, rows = 0.6 * digit, float(index[-1])
+    most = _MOST_MISSING * len(time) + 3.0
+    tries = _TRIES if len(time) < _LONG else _FEW_TRIES
+    missing = np.unique(np.rint(np.linspace(0.0, most, tries))).tolist()
+    least, found = np.inf, None
+    for lost in missing:
+        start, interval = float(time[0]), float(np.ptp(time)) / (rows + lost)
+        for _ in range(_ROUNDS):
+            first = np.ceil((time - start - slack) / interval - 1e-9)
+            count = index + np.maximum.accumulate(np.maximum(first - index, 0.0))
+            if count[-1] > rows + most:
+                break
+            even: FloatArray = start + interval * count
+            off = (time - even) / digit
+            score = 6.0 * float(off @ off) + float(count[-1] - rows) * np.log(len(time))
+            if score < least and np.all(np.abs(off) <= 0.6):
+                least, found = score, even
+            line = np.polynomial.Polynomial.fit(count, time, 1, w=1.0 / digit).convert()
+            start, interval = line.coef.tolist()
+            if not interval > 0.0:
+                break
+    return found
 
 
 def _keep_last(choice: Choice, base: TimeBase) -> None:
