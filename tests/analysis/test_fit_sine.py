@@ -17,13 +17,14 @@ from pendpipe.analysis.fit.by_points import fit_energies
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.printed import facts, pendulum_of
 from pendpipe.analysis.fit.start import start_values
-from pendpipe.analysis.torque import elliptic, restoring_of, sine_coefficient
+from pendpipe.analysis.torque import restoring_of, sine_coefficient
 from pendpipe.analysis.turning_points import TurningPoints, find_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, sample, turning_points
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.estimate import Estimate
 from pendpipe.files import read_json
+from pendpipe.physics.lengthening import elliptic
 from pendpipe.recording import Recording
 from pendpipe.solve import covariance
 

@@ -27,9 +27,9 @@ from pendpipe.formats.table import (
     derivative_slope,
     evenness,
     find_gaps,
-    follows_sine,
     is_uniform,
     periods,
+    sine_in,
     swing_of,
 )
 from pendpipe.formats.text import column_of_clock_times
@@ -468,18 +468,25 @@ def test_spikes_of_a_sensor_at_rest_have_no_period(spikes: int, size: float) -> 
 
 
 @given(power=st.floats(-1.0, 2.0), radians=st.sampled_from([1.0, np.pi / 180]))
-def test_the_slope_is_the_power_with_which_the_period_goes_as_k(
+def test_the_share_of_sine_is_the_power_with_which_the_period_goes_as_k(
     power: float, radians: float
 ) -> None:
-    slope = follows_sine(CENTISECONDS, decay(power) / radians, radians)
-    assert slope == pytest.approx(power, abs=0.05)
+    """To second order in the amplitude: at 0.6 rad the fourth makes up 1/25 of a share of 2."""
+    share = sine_in(CENTISECONDS, decay(power, 0.6) / radians, radians)
+    assert share is not None
+    assert share.value == pytest.approx(power, abs=0.1)
+    assert not (share.tells and abs(power - 1.0) > 0.5)
 
 
-def test_small_swings_and_loud_ones_leave_the_slope_open() -> None:
+def test_small_swings_and_loud_ones_tell_no_unit() -> None:
     noise = np.random.default_rng(5).standard_normal(len(CENTISECONDS))
-    assert follows_sine(CENTISECONDS, decay(1.0, 0.05) + 1e-2 * noise, 1.0) is None
-    assert follows_sine(CENTISECONDS[:700], decay(1.0)[:700], 1.0) is not None
-    assert follows_sine(CENTISECONDS[:400], decay(1.0)[:400], 1.0) is None
+    small = sine_in(CENTISECONDS, decay(1.0, 0.05) + 1e-2 * noise, 1.0)
+    assert small is not None
+    assert not small.tells
+    large = sine_in(CENTISECONDS[:1000], decay(1.0)[:1000], 1.0)
+    assert large is not None
+    assert large.tells
+    assert sine_in(CENTISECONDS[:400], decay(1.0)[:400], 1.0) is None
 
 
 @given(ratio=st.floats(1e-3, 1e3), upwards=st.booleans())

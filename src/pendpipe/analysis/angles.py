@@ -10,17 +10,16 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.torque import SEEN, Coefficient, may_be_sine, sine_coefficient, swing_phase
+from pendpipe.analysis.torque import may_be_sine, sine_coefficient, swing_phase
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.estimate import Estimate
+from pendpipe.physics.lengthening import SEEN, TELLS, Coefficient
 from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 from pendpipe.quantities import with_error
 from pendpipe.readings import motion_of
 from pendpipe.recording import Recording
 
-TELLS: Final = 0.2
-"""Error of the share of sin x up to which a period tells the unit."""
 _ON_EARTH: Final = 0.0015
 """Relative spread of g between the equator at 9.780 and the poles at 9.832 m/s^2, as a standard
 deviation: a range of 0.0053 over its root of twelve."""
@@ -195,7 +194,7 @@ def _scale_of(points: TurningPoints, length_m: float | None, *, named: bool) -> 
     agreeing = [
         Scale(name, factor, 0.0)
         for name, factor in (units.items() if named else ())
-        if (found := shown(factor)) is not None and found.agrees and found.sd < TELLS
+        if (found := shown(factor)) is not None and found.tells
     ]
     if len(agreeing) == 1 or length_m is None:
         return agreeing[0] if len(agreeing) == 1 else None

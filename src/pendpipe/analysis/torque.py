@@ -12,7 +12,7 @@ from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import Restoring
-from pendpipe.estimate import Z95
+from pendpipe.physics.lengthening import SEEN, Coefficient, elliptic, sine_share
 
 TORQUES: Final[tuple[Restoring, Restoring]] = ("linear", "sine")
 TOP: Final = 3.13
@@ -23,49 +23,6 @@ _LARGE: Final = 0.2
 """Of the largest amplitude: below, sin x lengthens the period by 4 % of what it does there."""
 _FEWEST: Final = 6
 """Turning points: the times have four numbers, among them the coefficient and a drift."""
-SEEN: Final = 3.0
-"""Standard deviations from which an amplitude, or a coefficient, is seen, and up to which the
-coefficient may be off: chance makes one of 400 so large."""
-_NEAR: Final = 0.2
-"""How near to 1 it must be where sin x removes most of chi^2."""
-
-
-class Coefficient(NamedTuple):
-    """How much of sin x the times of the turning points ask for: 0 nothing, 1 all of it."""
-
-    value: float
-    sd: float
-    """From the scatter of the times, and what a drift of the frequency would change."""
-    removed: float
-    """Part of chi^2 of the times that the whole of sin x removes."""
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the times alone ask for sin x.
-
-        The coefficient is seen and agrees with 1; or sin x removes most of chi^2, and the
-        coefficient is within 0.2 of 1, or as near as a drift would bring it.
-        """
-        off = abs(self.value - 1.0)
-        near = off < Z95 * self.sd and self.value > SEEN * self.sd
-        return near or (self.removed > 0.5 and off < max(_NEAR, self.sd))
-
-    @property
-    def excludes_sine(self) -> bool:
-        """Whether the whole of sin x contradicts the times, a drift of the frequency granted."""
-        return abs(self.value - 1.0) > SEEN * self.sd
-
-
-def elliptic(m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Complete elliptic integrals K and E of the parameter m = k^2 < 1, by Gauss's means."""
-    a, b = np.ones_like(m), np.sqrt(1.0 - m)
-    total = 0.5 * m
-    # Each step doubles the digits.
-    for step in range(8):
-        a, b, difference = 0.5 * (a + b), np.sqrt(a * b), 0.5 * (a - b)
-        total = total + 2.0**step * difference**2
-    k = 0.5 * math.pi / a
-    return k, k * (1.0 - total)
 
 
 def swing_phase(amplitude: FloatArray, restoring: Restoring) -> FloatArray:
@@ -192,22 +149,8 @@ def sine_coefficient(points: TurningPoints) -> Coefficient:
     amplitude, omega = part.amplitude_rad, 2.0 * math.pi * part.apparent_frequency_hz
     losses = (*loss_rates(part.time_s, amplitude, part.angle_sd_rad).tolist(), 0.5)
     plain, phase = (phases(part, amplitude, losses, omega, torque) for torque in TORQUES)
-    weight = 1.0 / part.time_sd_s
-    right = (part.time_s - part.time_s[0]) * weight
-
-    def fitted(*columns: FloatArray) -> tuple[float, float, float]:
-        """The second factor over the first, its error, and chi^2; the level's error alternates."""
-        design = np.stack([*columns, np.ones_like(plain), part.side], axis=1) * weight[:, None]
-        inverse = np.linalg.pinv(design, rcond=1e-13)
-        values = inverse @ right
-        rest = right - design @ values
-        chi2 = float(rest @ rest)
-        noise = math.sqrt(chi2 / max(len(part) - len(values), 1)) * np.linalg.norm(inverse[1])
-        return float(values[1] / values[0]), float(noise / values[0]), chi2
-
     drift = np.cumsum(np.linspace(-1.0, 1.0, len(part)) * np.diff(plain, prepend=0.0))
-    value, error, _ = fitted(plain, phase - plain)
-    drifting, *_ = fitted(plain, phase - plain, drift)
-    (*_, linear), (*_, sine) = fitted(plain), fitted(phase)
-    removed = 1.0 - sine / linear if linear > 0.0 else 0.0
-    return Coefficient(value, math.hypot(error, drifting - value), removed)
+    sides = np.ones_like(plain), part.side
+    return sine_share(
+        part.time_s - part.time_s[0], plain, phase, drift, *sides, weight=1.0 / part.time_sd_s
+    )

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.special import ellipk
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.errors import refuse_if
 from pendpipe.facts import Fact
 from pendpipe.formats.words import Role
+from pendpipe.physics.lengthening import Coefficient, elliptic, sine_share
 from pendpipe.recording import is_uniform
 
 if TYPE_CHECKING:
@@ -285,35 +285,33 @@ def periods(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArra
     return lasted[usual], 0.5 * largest[usual]
 
 
-def follows_sine(time: FloatArray, values: FloatArray, radians: float) -> float | None:
-    """How nearly the period grows with the amplitude as a pendulum's does.
+_TOP_RAD: Final = 2.8
+"""Amplitude at which 1 % more of it lengthens the period by 3 %, and beyond by ever more."""
+_FEWEST_CYCLES: Final = 8
+"""Cycles: beyond the three numbers of `sine_share` with a drift they leave five for its error."""
 
-    A pendulum's period is proportional to the complete elliptic integral K of the parameter
-    sin(A/2)^2; a reading is so many `radians` to its unit. The answer is the slope of the logarithm
-    of the measured period against that of the predicted: 1 if it is so, 0 if the period is
-    constant.
+
+def sine_in(time: FloatArray, values: FloatArray, radians: float) -> Coefficient | None:
+    """How much of sin x the periods of larger cycles ask for, a reading being so many `radians`.
 
     Returns
     -------
-    slope
-        ``None`` where noise, or too small an amplitude, leaves it open.
+    share
+        ``None`` of too few cycles.
     """
     lasted, size = periods(time, values)
     # Near the top the period has no end.
-    keep = (size > 0.3 * size.max(initial=0.0)) & (radians * size < 2.8)
+    keep = (size > 0.3 * size.max(initial=0.0)) & (radians * size < _TOP_RAD)
     lasted, angle = lasted[keep], radians * size[keep]
-    expected, found = np.log(ellipk(np.sin(0.5 * angle) ** 2)), np.log(lasted)
-    for _ in range(2):
-        if len(found) < 8:
-            return None
-        across = expected - expected.mean()
-        spread = float(across @ across) or np.nan
-        slope = float(across @ found) / spread
-        rest = found - found.mean() - slope * across
-        sd = float(np.sqrt(rest @ rest / (len(rest) - 2) / spread))
-        near = np.abs(rest) <= 4.0 * np.median(np.abs(rest))
-        expected, found = expected[near], found[near]
-    return slope if sd < 0.15 else None
+    if len(lasted) < _FEWEST_CYCLES:
+        return None
+    # A disturbed cycle is no scatter.
+    powers = np.vander(angle / angle.max(), 3)[:, ::2]
+    rest = np.abs(lasted - powers @ np.linalg.lstsq(powers, lasted)[0])
+    near = rest <= 4.0 * np.median(rest)
+    sine = 4.0 * elliptic(np.sin(0.5 * angle[near]) ** 2)[0]
+    plain = np.full_like(sine, 2.0 * np.pi)
+    return sine_share(lasted[near], plain, sine, np.linspace(-1.0, 1.0, len(sine)) * plain)
 
 
 def derivative_slope(time: FloatArray, values: FloatArray, other: FloatArray) -> float | None:

@@ -479,7 +479,7 @@ def _rounded(time: FloatArray, lines: IntArray | None = None) -> FloatArray | No
     Where a stamp shows that frames are missing, they are counted (`_frames`).
     """
     steps = np.diff(time)
-    if len(time) < 10 or steps.min() < 0 or np.mean(steps == 0) < 0.001:
+    if len(time) < 10 or steps.min() < 0 or not 0.001 <= np.mean(steps == 0) < 1.0:
         return None
     # A clock's own jitter comes on top: a tenth of an interval.
     digit = _coarseness(time) + 0.15 * float(time[-1] - time[0]) / len(time)
@@ -565,8 +565,6 @@ def _frames(time: FloatArray, digit: FloatArray, index: FloatArray) -> FloatArra
                 least, found = score, even
             line = np.polynomial.Polynomial.fit(count, time, 1, w=1.0 / digit).convert()
             start, interval = line.coef.tolist()
-            if not interval > 0.0:
-                break
     return found
 
 

@@ -1,6 +1,7 @@
 """The unit of the readings: as the file states it, else as one test of physics shows it."""
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,8 +17,8 @@ from pendpipe.formats.table import (
     ReadOptions,
     Table,
     derivative_slope,
-    follows_sine,
     periods,
+    sine_in,
 )
 from pendpipe.formats.times import TimeBase
 from pendpipe.formats.words import Unit, unit_of
@@ -27,6 +28,9 @@ from pendpipe.recording import Quantity
 _RADIAN = Unit("angle", 1.0, "rad")
 _DEGREE = Unit("angle", np.pi / 180, "rad")
 _TURN = Unit("angle", 2 * np.pi, "rad")
+_ANGLES = {"radians": _RADIAN, "degrees": _DEGREE, "turns": _TURN}
+_TWO = ("radians", "degrees")
+"""Those that a header mixes up."""
 _UNKNOWN = Unit("own", 1.0, "1")
 _QUANTITIES: dict[str, Quantity] = {
     "angle": "angle_rad",
@@ -146,8 +150,10 @@ def _unit(
 
 
 _BY_SINE: Final = 0.002
-"""How often the period of what is in another unit lengthens so: units lie a factor of 6 or more
-apart, their slopes one of 39, and a slope is known to 0.15 where it must lie within 0.35."""
+"""How often the period of what is in another unit lengthens so: the shares of sin x in units 6 or
+more apart are 39 or more, one of which is known to 0.2 where it agrees with 1."""
+_METRE_S: Final = 0.3
+"""Off 2 s, within which g/omega^2 is 1 m to 30 %, as is no other of the usual units."""
 _BY_SIZE: Final = 0.01
 """How often readings of another unit stay within a turn of 2 pi and jump by it."""
 _ASIDE: Final = 3.0
@@ -165,27 +171,24 @@ _UNITS_OF = re.compile(r"(?i)\b(?:vertical|length) units?\W+([a-zµ]+)")
 """What an oscilloscope, or a system of cameras, says above its table."""
 
 
-def _reach(finite: FloatArray) -> float:
-    """How far the readings go from their middle."""
-    if not len(finite):
-        return 0.0
-    low, middle, high = np.percentile(finite, (0.2, 50, 99.8))
-    return max(float(high - middle), float(middle - low))
+def _shown(column: Column, time_s: FloatArray, names: Iterable[str]) -> str | None:
+    """The unit of angles, among those named, in which the period lengthens as that of sin x.
+
+    It goes as K(sin(A/2)^2): to second order as 1 + A^2/16, so that of units which differ
+    by a factor of 6 or more at most one fits.
+    """
+    shares = ((name, sine_in(time_s, column.values, _ANGLES[name].factor)) for name in names)
+    return next((name for name, share in shares if share is not None and share.tells), None)
 
 
 def _contradicted(column: Column, written: Unit, time_s: FloatArray) -> _Guess | None:
     """Doubt a header that gives the one unit of angles where the period shows the other."""
-    reach = _reach(column.values[np.isfinite(column.values)])
-    for unit, headed, least, most, other, name in (
-        (_DEGREE, "degrees", 0.3, 3.0, _RADIAN, "radians"),
-        (_RADIAN, "radians", 3.6, 170.0, _DEGREE, "degrees"),
-    ):
-        doubtful = written == unit and least < reach < most
-        slope = follows_sine(time_s, column.values, other.factor) if doubtful else None
-        if slope is not None and abs(slope - 1.0) <= 0.25:
-            why = f"is headed in {headed}, but its period grows as a swing in {name} does"
-            return _Guess(other, f"{why}: taken as such", "guessed")
-    return None
+    headed = next((name for name in _TWO if _ANGLES[name] == written), None)
+    name = _shown(column, time_s, [name for name in _TWO if name != headed] if headed else ())
+    if name is None:
+        return None
+    why = f"is headed in {headed}, but its period grows as a swing in {name} does: taken as such"
+    return _Guess(_ANGLES[name], why, "guessed")
 
 
 def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray) -> _Guess | None:
@@ -234,23 +237,17 @@ def _by_centre(finite: FloatArray) -> _Guess | None:
 
 
 def _by_period(column: Column, time_s: FloatArray) -> _Guess | None:
-    """Take for radians, degrees or turns what is swung through ever faster, just as they are.
-
-    The period goes as K(sin(A/2)^2): to second order as 1 + A^2/16, so that of units which differ
-    by a factor of 39 or more at most one fits.
-    """
-    units = (_RADIAN, "radians"), (_DEGREE, "degrees"), (_TURN, "turns")
+    """Take for radians, degrees or turns what is swung through ever faster, just as they are."""
     # Of what is named a position other units may well be pixels, of any length.
-    for unit, name in units[: 1 if column.role == "length" else None]:
-        slope = follows_sine(time_s, column.values, unit.factor)
-        if slope is not None and abs(slope - 1.0) < 0.35:
-            why = f"is in {name}: its period lengthens with the swing as sin x has it"
-            # Of a pendulum 1 m long (2 s) metres look the same.
-            usual = float(np.median(periods(time_s, column.values)[0]))
-            metres = unit == _RADIAN and column.role != "angle" and abs(usual - 2.0) < 0.3
-            why += ", or in metres, with a string of 1 m" * metres
-            return _Guess(unit, why, "guessed" if metres else "shown", None if metres else _BY_SINE)
-    return None
+    name = _shown(column, time_s, _TWO[:1] if column.role == "length" else _ANGLES)
+    if name is None:
+        return None
+    why = f"is in {name}: its period lengthens with the swing as sin x has it"
+    # Of a pendulum 1 m long (2 s) metres look the same.
+    usual = float(np.median(periods(time_s, column.values)[0]))
+    if name == _TWO[0] and column.role != "angle" and abs(usual - 2.0) < _METRE_S:
+        return _Guess(_RADIAN, f"{why}, or in metres, with a string of 1 m", "guessed")
+    return _Guess(_ANGLES[name], why, "shown", _BY_SINE)
 
 
 def _by_digits(finite: FloatArray) -> _Guess | None:

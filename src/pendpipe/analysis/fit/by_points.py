@@ -17,13 +17,14 @@ from pendpipe.analysis.fit.goodness import Goodness, tail
 from pendpipe.analysis.fit.period import Period, fit_period
 from pendpipe.analysis.fit.result import FitResult, result_of
 from pendpipe.analysis.half_cycles import LEAST_HALF_CYCLES
-from pendpipe.analysis.torque import TOP, clear, elliptic
+from pendpipe.analysis.torque import TOP, clear
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import SHARE_MEAN, Restoring
 from pendpipe.levels import REFUTED
 from pendpipe.physics.decay import amplitude_and_gradient
+from pendpipe.physics.lengthening import elliptic
 from pendpipe.solve import (
     Bounds,
     Priors,

@@ -9,11 +9,11 @@ import numpy as np
 
 from pendpipe.analysis.fit.decrement import loss_of
 from pendpipe.analysis.fit.fitted import Fitted
-from pendpipe.analysis.torque import elliptic
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Release, sample
 from pendpipe.dynamics.eq8 import Drag
 from pendpipe.physics.decay import amplitude
+from pendpipe.physics.lengthening import elliptic
 
 _NODES: Final = 2000
 """Of a decay, to `_LEAST` of the first amplitude: the sums are right to 1e-6."""

@@ -1,0 +1,106 @@
+"""How much of a pendulum's sin x periods ask for: the one test of a period that lengthens so."""
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.arrays import FloatArray
+from pendpipe.estimate import Z95
+
+SEEN: Final = 3.0
+"""Standard deviations from which an amplitude, or a coefficient, is seen, and up to which the
+coefficient may be off: chance makes one of 400 so large."""
+TELLS: Final = 0.2
+"""Error of the share of sin x up to which a period tells the unit."""
+_NEAR: Final = 0.2
+"""How near to 1 it must be where sin x removes most of chi^2."""
+
+
+class Coefficient(NamedTuple):
+    """How much of sin x the times of the turning points ask for: 0 nothing, 1 all of it."""
+
+    value: float
+    sd: float
+    """From the scatter of the times, and what a drift of the frequency would change."""
+    removed: float
+    """Part of chi^2 of the times that the whole of sin x removes."""
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the times alone ask for sin x.
+
+        The coefficient is seen and agrees with 1; or sin x removes most of chi^2, and the
+        coefficient is within 0.2 of 1, or as near as a drift would bring it.
+        """
+        off = abs(self.value - 1.0)
+        near = off < Z95 * self.sd and self.value > SEEN * self.sd
+        return near or (self.removed > 0.5 and off < max(_NEAR, self.sd))
+
+    @property
+    def excludes_sine(self) -> bool:
+        """Whether the whole of sin x contradicts the times, a drift of the frequency granted."""
+        return abs(self.value - 1.0) > SEEN * self.sd
+
+    @property
+    def tells(self) -> bool:
+        """Whether it says of readings in which unit they are angles: in one where it agrees."""
+        return self.agrees and self.sd < TELLS
+
+
+def elliptic(m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Complete elliptic integrals K and E of the parameter m = k^2 < 1, by Gauss's means."""
+    a, b = np.ones_like(m), np.sqrt(1.0 - m)
+    total = 0.5 * m
+    # Each step doubles the digits.
+    for step in range(8):
+        a, b, difference = 0.5 * (a + b), np.sqrt(a * b), 0.5 * (a - b)
+        total = total + 2.0**step * difference**2
+    k = 0.5 * math.pi / a
+    return k, k * (1.0 - total)
+
+
+def sine_share(
+    lasts: FloatArray,
+    plain: FloatArray,
+    sine: FloatArray,
+    drift: FloatArray,
+    *others: FloatArray,
+    weight: FloatArray | float = 1.0,
+) -> Coefficient:
+    """Fit times, or periods, with a free coefficient of sin x.
+
+    A half swing lasts ``[pi (1 + losses) + eta (K + K' - pi)]/omega``: times are linear in
+    1/omega and in eta/omega. By what eta changes if the frequency may drift, it is uncertain too.
+
+    Parameters
+    ----------
+    lasts
+        What was measured, shape (n,).
+    plain, sine
+        Phases that it takes by x, and by sin x.
+    drift
+        What a frequency that changes evenly in time adds to `plain`.
+    others
+        Columns with factors of their own.
+    weight
+        The reciprocal of each one's standard deviation, up to a common factor.
+    """
+    right = lasts * weight
+
+    def fitted(*columns: FloatArray) -> tuple[float, float, float]:
+        """The second factor over the first, its error, and chi^2."""
+        design = np.stack([*columns, *others], axis=1) * np.reshape(weight, (-1, 1))
+        inverse = np.linalg.pinv(design, rcond=1e-13)
+        values = inverse @ right
+        rest = right - design @ values
+        chi2 = float(rest @ rest)
+        noise = math.sqrt(chi2 / max(len(lasts) - len(values), 1))
+        second = float(values[1] / values[0]) if len(columns) > 1 else 0.0
+        return second, float(noise * np.linalg.norm(inverse[1 % len(inverse)]) / values[0]), chi2
+
+    value, error, _ = fitted(plain, sine - plain)
+    drifting, *_ = fitted(plain, sine - plain, drift)
+    (*_, linear), (*_, whole) = fitted(plain), fitted(sine)
+    removed = 1.0 - whole / linear if linear > 0.0 else 0.0
+    return Coefficient(value, math.hypot(error, drifting - value), removed)
