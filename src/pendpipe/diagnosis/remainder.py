@@ -1,10 +1,7 @@
 """The misfit that remains beyond the noise: how large, where, and its effect on errors.
 
-If chi^2 stays far above the noise, the model is still wrong. The rest is then not noise, which is
-independent from reading to reading, but an unknown function of time, described by a few numbers
-(its significant Fourier coefficients). Names and errors are compared with that function, not with
-the noise: a misfit of the phase widens the error of the frequency, one of the amplitude those of
-the losses.
+If chi^2 stays far above the noise, the model is still wrong. Names and errors are then compared
+with the unknown function that is left (`analysis.misfit`), not with the noise.
 """
 
 import math
@@ -12,11 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-import numpy as np
-from scipy.fft import dct
-
-from pendpipe.analysis.demodulation import by_cycle
-from pendpipe.arrays import FloatArray
+from pendpipe.analysis.misfit import beyond_noise, misfit_of
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import CLEAN, Fit
@@ -24,13 +17,6 @@ from pendpipe.files import fields_of
 
 INCOMPLETE: Final = math.sqrt(CLEAN)
 """Residual over noise above which a model is incomplete."""
-_HARMONICS: Final = 4
-"""Of the motion that are told from what lies between them."""
-_SIGNIFICANT_POWER: Final = 9.0
-"""Squared normalised coefficient above which it is not noise."""
-_FEWEST_NUMBERS: Final = 2.0
-"""Numbers that describe a misfit: a wave has two, its cosine and its sine."""
-_PARTS: Final = ("offset", "amplitude", "phase", "harmonics", "between")
 
 
 @dataclass(frozen=True)
@@ -84,55 +70,15 @@ def remainder_of(fit: Fit, data: Data, noise: Noise) -> Remainder:
     if over <= INCOMPLETE:
         return Remainder(excess, over, float(freedom))
     in_sds = data.residual(fit.at.reading) * data.weight / noise.sd
-    parts = _in_parts(in_sds, fit.at.sampled.phase)
-    powers = [np.asarray(dct(part, axis=0, norm="ortho") ** 2).ravel() for part in parts]
-    by_noise = [power.size for power in powers[:-1]]
-    by_noise.append(max(int(np.count_nonzero(parts[-1])) - sum(by_noise), 1))
-    sums = [float(power.sum()) for power in powers]
-    beyond = np.maximum(np.subtract(sums, by_noise), 0.0)
-    shares = beyond / max(float(beyond.sum()), 1e-300)
-    sizes = [
-        max(more / _numbers(power), whole / number, 1.0)
-        for more, power, whole, number in zip(beyond, powers, sums, by_noise, strict=True)
-    ]
-    return Remainder(
-        excess,
-        over,
-        min(_numbers(np.concatenate(powers)), float(freedom)),
-        dict(zip(_PARTS, shares.tolist(), strict=True)),
-        tuple(sizes),
-    )
-
-
-def _numbers(power: FloatArray) -> float:
-    """How many independent numbers have these squared coefficients.
-
-    Squares of m normal numbers of one size have 3 (sum P)^2/sum P^2 = m.
-    """
-    loud = power[power > _SIGNIFICANT_POWER]
-    found = 3.0 * float(loud.sum()) ** 2 / float(np.sum(loud**2)) if len(loud) else 1.0
-    return max(found, _FEWEST_NUMBERS)
+    left = misfit_of(in_sds, fit.at.sampled.phase)
+    return Remainder(excess, over, min(left.numbers, float(freedom)), left.shares, left.sizes)
 
 
 def with_errors(fit: Fit, data: Data, noise: Noise) -> Fit:
-    """Return a fit with errors that allow for what it leaves beyond the noise.
-
-    What is left of each part of the motion (`Remainder`) counts as random, of the size that it
-    has: the values J^+ r then have the covariance J^+ (sum of size P) J^+', where P projects on
-    a part.
-    """
+    """Return a fit with errors that allow for what it leaves beyond the noise (`misfit`)."""
     left = remainder_of(fit, data, noise)
     if not left.systematic:
         return replace(fit, error_scale=1.0, scatter=None)
-    parts = _in_parts(fit.jacobian[:-1], fit.at.sampled.phase)
-    scatter = fit.jacobian.T @ fit.jacobian
-    for size, part in zip(left.sizes, parts, strict=True):
-        columns = part.reshape(-1, part.shape[-1])
-        scatter += (size - 1.0) * columns.T @ columns
+    beyond = beyond_noise(fit.jacobian[:-1], fit.at.sampled.phase, left.sizes)
+    scatter = fit.jacobian.T @ fit.jacobian + beyond
     return replace(fit, error_scale=left.error_scale, scatter=scatter)
-
-
-def _in_parts(residual: FloatArray, phase: FloatArray) -> list[FloatArray]:
-    """Return what lies in each of the parts of the motion, cycle by cycle, and between them."""
-    found, rest = by_cycle(residual, phase, _HARMONICS)
-    return [found[:, 0], found[:, 1], found[:, 2], found[:, 3:], rest]

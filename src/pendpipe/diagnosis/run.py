@@ -267,11 +267,13 @@ def _models(
     if _adds_nothing(found) and found.fit.error_scale == 1.0:
         return before, before, found.fit
     said = quoted(found, fit, level)
-    after = _fitted_model(found.fit, found)
-    parameters = {**parameters_of(said.leading, found.data), **said.constants}
+    # One law has one noise and one error of each number, whatever it leaves.
+    after = before
+    if not _adds_nothing(found):
+        parameters = {**parameters_of(said.leading, found.data), **said.constants}
+        after = replace(_fitted_model(found.fit, found), parameters=parameters)
     after = replace(
         after,
-        parameters=parameters,
         quality_factors=said.quality_factors,
         period_span_s=said.period_span_s,
     )

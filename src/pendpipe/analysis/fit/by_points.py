@@ -266,7 +266,7 @@ def fit_points(
         f" {period.chi2_per_dof:.3g} per point): the frequency is a mean"
     )
     return result_of(
-        *numbers_of(points, envelope, period),
+        *numbers_of(points, envelope, period, misfit),
         envelope.held,
         points,
         held.law(period.angular_frequency, envelope.value[:3].tolist(), restoring),
@@ -289,18 +289,18 @@ def fit_points(
 
 
 def numbers_of(
-    points: TurningPoints, envelope: EnvelopeFit, period: Period
+    points: TurningPoints, envelope: EnvelopeFit, period: Period, misfit: float = 1.0
 ) -> tuple[FloatArray, FloatArray, list[tuple[float, float]]]:
     """Return the seven parameters, their covariance, and the intervals of a, b, c.
 
-    Amplitudes and times are independent.
+    Amplitudes and times are independent; what the amplitudes leave is `misfit` times their noise.
     """
     _, gradient, normal = envelope.quadratic
     rates = covariance(normal, envelope.held)
     matrix = np.zeros((7, 7))
     # a, b, c, amplitude, and the level, which is what was used less its error.
     place, sign = [0, 1, 2, 4, 6], np.array([1.0, 1.0, 1.0, 1.0, -1.0])
-    matrix[np.ix_(place, place)] = rates * sign[:, None] * sign
+    matrix[np.ix_(place, place)] = misfit * rates * sign[:, None] * sign
     level = float(np.mean(points.level_rad)) - float(envelope.value[4])
     lag = points.start_s - period.time_s
     phase = period.angular_frequency * lag + (0.0 if points.side[0] > 0 else math.pi)

@@ -15,11 +15,12 @@ import numpy as np
 
 from pendpipe.analysis.fit.fitted import Baseline, DragForm
 from pendpipe.analysis.fit.fixed import Held
-from pendpipe.analysis.fit.goodness import Goodness, combined, judge
+from pendpipe.analysis.fit.goodness import Goodness, Left, combined, judge
 from pendpipe.analysis.fit.result import FitResult, result_of
 from pendpipe.analysis.fit.rounding import best_noise
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
 from pendpipe.analysis.fit.waveform import DRIFT, Waveform
+from pendpipe.analysis.misfit import beyond_noise
 from pendpipe.analysis.noise import scatter
 from pendpipe.analysis.torque import Apart
 from pendpipe.analysis.turning_points import TurningPoints
@@ -332,7 +333,6 @@ def waveform_result(
     inside = (points.time_s >= times[0]) & (points.time_s <= times[-1])
     drift, said = None, [*fitted.start.warnings]
     if DRIFT not in fitted.held:
-        drift_sd *= math.sqrt(goodness.misfit)
         drift = Estimate(float(fitted.value[DRIFT]), drift_sd, f"{samples.unit}/s")
         per = with_error(drift.value, drift.sd, drift.unit, short=True)
         said.append(f"the zero drifts by {per}; it is followed by a line")
@@ -369,11 +369,21 @@ def _numbers(
     value, held = fitted.value, fitted.held
     _, gradient, normal = fitted.quadratic(goodness)
     own = covariance(normal, held)
+    if goodness.left is not None:
+        own += own @ _beyond_noise(fitted, goodness.left, goodness.noise_rms) @ own
     (amplitude, phase), jacobian = _first_turning_point(fitted, start_s)
     frequency = 0.5 * value[OMEGA] / math.pi
     numbers = np.array([*value[:3], frequency, amplitude, phase, value[OFFSET]])
     ends = intervals95(value, normal, gradient, fitted.problem.bounds, range(3), held, own)
     return numbers, jacobian @ own @ jacobian.T, ends, math.sqrt(own[DRIFT, DRIFT])
+
+
+def _beyond_noise(fitted: Fitted, left: Left, noise_rms: float) -> FloatArray:
+    """What a misfit adds to the covariance of the gradient, shape (9, 9)."""
+    by_engine = fitted.problem.read(fitted.value, left.time_s)[1]
+    rows = by_engine @ fitted.problem.engine_by_values(fitted.value)
+    rows *= np.sqrt(left.readings)[:, None] / noise_rms
+    return beyond_noise(rows, left.phase, left.sizes)
 
 
 def _first_turning_point(fitted: Fitted, start_s: float) -> tuple[tuple[float, float], FloatArray]:

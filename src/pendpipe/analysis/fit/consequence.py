@@ -47,12 +47,10 @@ _SAME: Final = 0.01
 def judged(result: Fit, points: TurningPoints, law: Eq8, *, misfit: float) -> Fit:
     """Light a fit; where its law is refuted, measure the backbone and let the errors cover it.
 
-    Without one they are those of a noise as large as what is left.
-
     Parameters
     ----------
     result
-        A fit with its ``decrement_check``, and with the errors of its noise.
+        A fit with its ``decrement_check``, and with the errors of its noise and misfit.
     points, law
         What was fitted.
     misfit
@@ -63,25 +61,22 @@ def judged(result: Fit, points: TurningPoints, law: Eq8, *, misfit: float) -> Fi
         # Of a law that contradicts the decay nothing is quoted, and another may be tried.
         shown = backbone_of(points, law, result.bent)
     if shown is not None:
-        result = replace(_spread(result, shown), shown=shown)
+        result = replace(_off_by(result, shown), shown=shown)
     elif misfit > 1.0:
-        result = _with_errors(result, misfit * result.covariance)
+        result = _with_errors(result, result.covariance)
     clear = int(np.sum(points.amplitude_rad > CLEAR * points.angle_sd_rad))
     quotable, problems = _quotable(result, clear)
     light, reason = _light(result, problems)
     return replace(result, light=light, light_reason=reason, quotable=quotable)
 
 
-def _spread(result: Fit, shown: Backbone) -> Fit:
-    """Give the numbers of a law the errors that the backbone asks for.
+def _off_by(result: Fit, shown: Backbone) -> Fit:
+    """Add to the errors of a misfit what the backbone shows a law to be off by.
 
-    They are those of the noise, as the turning points scatter; and what a, b, c and the frequency
-    are off by: the least change of them that takes the law's loss to the backbone's.
+    Of a, b, c and the frequency: the least change of them that takes the law's loss to the
+    backbone's.
     """
-    order = PARAMETERS
-    times = [name in ("frequency", "phase") for name in order]
-    root = np.sqrt(np.where(times, shown.period_scatter, shown.decrement_scatter))
-    covariance = result.covariance * root[:, None] * root
+    order, covariance = PARAMETERS, result.covariance.copy()
     own = [order.index(name) for name in "abc"]
     by_loss = _asked(result, shown, covariance[np.ix_(own, own)])
     covariance[np.ix_(own, own)] += by_loss

@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.demodulation import harmonic_columns, normal_equations
+from pendpipe.analysis.misfit import misfit_of
 from pendpipe.analysis.noise import TOLD, scatter, undithered_rms
 from pendpipe.analysis.turning_points.measure import invert
 from pendpipe.arrays import FloatArray
@@ -27,6 +28,8 @@ _BLOCKS: Final = 128
 _SLOW: Final = 8
 """Polynomials that follow a slow change along the record."""
 
+_ROWS: Final = 1 << 17
+"""Rows of derivatives at once, at most: 10 MB."""
 _IN_PHASE: Final = 0.05
 """Part of the motion that a residual may have at its frequency where its third harmonic is read: a
 phase of 0.05 that changes in a cycle leaves a hundredth of itself there."""
@@ -44,6 +47,17 @@ class Question(NamedTuple):
     freedom: float
 
 
+class Left(NamedTuple):
+    """What a refuted law leaves, for the error model: readings, or their means in a cycle."""
+
+    time_s: FloatArray
+    phase: FloatArray
+    readings: FloatArray
+    """That each stands for, shape (m,)."""
+    sizes: tuple[float, ...]
+    """Of the parts of the motion (`misfit.Misfit`)."""
+
+
 class Goodness(NamedTuple):
     """How well a law describes the readings."""
 
@@ -59,6 +73,8 @@ class Goodness(NamedTuple):
     bent: FloatArray | None = None
     """Third harmonic of the residual in phase with the first of the motion, over the largest
     amplitude Y: a constant, and by (y/Y)^3; shape (2,)."""
+    left: Left | None = None
+    """Where more than noise is left of the readings."""
 
     @property
     def p_value(self) -> float:
@@ -120,7 +136,7 @@ def judge(
     """
     n, freedom = len(residual), max(len(residual) - fitted - lines, 1)
     square = float(residual @ residual)
-    phase, sums, weights = _binned(time_s, residual, turn_s, half_cycle)
+    phase, times, sums, weights = _binned(time_s, residual, turn_s, half_cycle)
     cycles = (phase[-1] - phase[0]) / (2.0 * math.pi)
     harmonics = int(min(max((n / max(cycles, 1.0) - 2.0) / 3.0, 1.0), 3.0))
     size = 1 + 2 * harmonics
@@ -148,13 +164,18 @@ def judge(
     if harmonics > 2 and np.sum(near) > 2:
         cubes = y[near, None] ** np.array([0.0, 3.0])
         bent = np.linalg.lstsq(cubes, found.value[near, 5] / large)[0]
-    return Goodness(noise, ratio, p_values, max(ratio, own, 1.0), bent)
+    sizes = misfit_of(sums / np.sqrt(weights) / noise, phase).sizes
+    # Derivatives change slowly: in a long record every so many cycles stand for the others.
+    every = len(phase) // _ROWS + 1
+    some = np.floor(phase / (2.0 * math.pi)) % every == 0
+    left = Left(times[some], phase[some], every * weights[some], sizes)
+    return Goodness(noise, ratio, p_values, max(ratio, own, 1.0), bent, left)
 
 
 def _binned(
     time_s: FloatArray, residual: FloatArray, turn_s: FloatArray, half_cycle: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Phase, sum and number of readings: of each reading, or of many in a part of a cycle."""
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Phase, time, sum and number of readings: of each, or of many in a part of a cycle."""
     turns = half_cycle * math.pi
     pace = np.diff(turns[[0, -1]])[0] / (turn_s[-1] - turn_s[0])
     span = float(time_s[-1] - time_s[0])
@@ -162,7 +183,7 @@ def _binned(
     turn_s = np.concatenate([[turn_s[0] - span], turn_s, [turn_s[-1] + span]])
     turns = np.concatenate([[turns[0] - pace * span], turns, [turns[-1] + pace * span]])
     if len(time_s) * 2.0 * math.pi < 2 * _BINS * pace * span:
-        return np.interp(time_s, turn_s, turns), residual, np.ones(len(residual))
+        return np.interp(time_s, turn_s, turns), time_s, residual, np.ones(len(residual))
     first, last = np.interp(time_s[[0, -1]], turn_s, turns).tolist()
     edges = np.linspace(first, last, math.ceil((last - first) / (2.0 * math.pi) * _BINS) + 1)
     place = np.searchsorted(time_s, np.interp(edges, turns, turn_s))
@@ -171,7 +192,8 @@ def _binned(
     weights = np.diff(place).astype(np.float64)
     some = weights > 0.0
     middle = 0.5 * (edges[1:] + edges[:-1])
-    return middle[some], np.diff(running[place])[some], weights[some]
+    times = np.interp(middle[some], turns, turn_s)
+    return middle[some], times, np.diff(running[place])[some], weights[some]
 
 
 class _Blocks(NamedTuple):
