@@ -347,7 +347,7 @@ def diagnose(
     ('consistent', 'circular-error', True)
     """
     from pendpipe.diagnosis import silent
-    from pendpipe.diagnosis.run import diagnose_decay, diagnose_recording
+    from pendpipe.diagnosis.run import diagnose_recording
     from pendpipe.diagnosis.several import diagnose_several
 
     length = _measured("length_m", length_m, "m")
@@ -384,11 +384,8 @@ def diagnose(
         return replace(found, drawn_by=_FIGURES_OF_A_DIAGNOSIS)
     common |= {"fixed": fixed, "place": name or _place(recording)}
     motion = _motion(recording, volts_per_radian)
-    if points is None:
-        found = diagnose_recording(motion, length=length, **common)
-    else:
-        decay = motion.between(points.start_s, points.stop_s)
-        found = diagnose_decay(decay, points, length=length, whole=motion, **common)
+    decay = motion if points is None else motion.between(points.start_s, points.stop_s)
+    found = diagnose_recording(decay, points=points, length=length, whole=motion, **common)
     return replace(found, drawn_by=_FIGURES_OF_A_DIAGNOSIS)
 
 

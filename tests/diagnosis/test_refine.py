@@ -201,7 +201,7 @@ def test_a_start_beyond_all_numbers_is_none() -> None:
     fit, data, noise = null_fit()
     beyond = fit.value.copy()
     beyond[OFFSET] = 1e200
-    # Trial models overflow, as in `diagnose_decay`.
+    # Trial models overflow, as in `diagnose_recording`.
     with np.errstate(over="ignore", invalid="ignore"):
         assert best_fit(fit.model, data, noise, [beyond]) is None
         found = best_fit(fit.model, data, noise, [beyond, fit.value])

@@ -12,7 +12,7 @@ from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.cycles import SmallSwings, small_swings
 from pendpipe.diagnosis.result import Diagnosis
-from pendpipe.diagnosis.run import diagnose_decay, diagnose_recording
+from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.eq8 import A, B, C, Restoring
 from pendpipe.effects.catalogue import by_identifier
@@ -144,7 +144,9 @@ def test_gaps_of_the_whole_recording_are_told_though_the_decay_has_none() -> Non
     points, part = measure_recording(record, "the test")
     rest = np.arange(TIME_S[0] - 12.0, TIME_S[0] - 7.0, TIME_S[1])
     whole = Recording(np.append(rest, TIME_S), np.append(0.0 * rest, record.values), "angle_rad")
-    told, silent = (diagnose_decay(part, points, whole=given).warnings for given in (whole, record))
+    told, silent = (
+        diagnose_recording(part, points=points, whole=given).warnings for given in (whole, record)
+    )
     (gap,) = set(told) - set(silent)
     assert f"a gap of {TIME_S[0] - rest[-1]:.4g} s" in gap
 

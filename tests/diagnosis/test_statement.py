@@ -4,6 +4,7 @@ import json
 import math
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.found import FittedModel, FoundEffect, Location, Mate, verdict_of
 from pendpipe.diagnosis.held_out import HeldOut
 from pendpipe.diagnosis.location import curve_told, locate, mains_of
@@ -78,13 +80,26 @@ def named(identifier: str, **parameters: Estimate) -> FoundEffect:
 BEFORE = FittedModel({"b": Estimate(0.0123, 0.0002, "1/s")}, 2e-4, 4.0, 1e-4)
 
 
+def searched(unexplained: float, remainder: Remainder | None = None) -> Any:
+    """What a diagnosis asks of the search behind it."""
+    return SimpleNamespace(
+        unexplained=unexplained,
+        remainder=remainder,
+        data=SimpleNamespace(unit="rad", step=0.0),
+        baseline=SimpleNamespace(model=SimpleNamespace(restoring="linear")),
+        first=SimpleNamespace(leads=[Lead(each) for each in CATALOGUE]),
+        notes={},
+    )
+
+
 def details(effect: FoundEffect) -> list[str]:
-    return Diagnosis("eq8", BEFORE, BEFORE, 0.0, (effect,), None, 0.5).details.splitlines()
+    found = Diagnosis("eq8", BEFORE, BEFORE, 0.0, (effect,), None, search=searched(0.5))
+    return found.details.splitlines()
 
 
 def undisturbed(p_value: float) -> str:
     model = FittedModel({}, 1e-4, 1.0, 1e-4)
-    return Diagnosis("eq8", model, model, p_value, (), None, p_value).details
+    return Diagnosis("eq8", model, model, p_value, (), None, search=searched(p_value)).details
 
 
 def test_a_line_says_whether_the_law_holds_one_each_effect_and_one_what_is_left() -> None:
@@ -208,11 +223,10 @@ def parameters(frequency_hz: float) -> dict[str, Estimate]:
     }
 
 
-def diagnosis(*effects: FoundEffect, **more: Any) -> Diagnosis:
+def diagnosis(*effects: FoundEffect, left: Remainder | None = None, **more: Any) -> Diagnosis:
     before = FittedModel(parameters(0.9), 2e-4, 4.0)
     after = FittedModel(parameters(0.91), 1e-4, 1.0, 1e-4)
     held = HeldOut(1000.0, 1050.0, 5.0, 2e-4, 1.1e-4, 12, 11)
-    scanned = tuple((each.identifier, 0.5) for each in CATALOGUE)
     return Diagnosis(
         "eq8",
         before,
@@ -220,8 +234,7 @@ def diagnosis(*effects: FoundEffect, **more: Any) -> Diagnosis:
         0.0 if effects else 0.9,
         effects,
         held,
-        0.9,
-        scanned=scanned,
+        search=searched(0.9, left),
         **more,
     )
 
@@ -303,7 +316,7 @@ def test_a_name_is_given_from_one_half_on(
 
 @pytest.mark.structure
 def test_the_answer_has_a_dozen_lines_in_the_order_of_the_questions() -> None:
-    found = diagnosis(likely("impulse", 0.9, ("backlash", 0.06)), remainder=REST, name="a.csv")
+    found = diagnosis(likely("impulse", 0.9, ("backlash", 0.06)), left=REST, name="a.csv")
     lines = str(found).splitlines()
     assert len(lines) <= 12
     order = [

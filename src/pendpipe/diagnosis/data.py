@@ -105,6 +105,10 @@ class Data:
         origin, noise = self.lattice
         return self.values - reading - rounding_bias(reading - origin, self.step, noise)
 
+    def rms_left(self, reading: FloatArray) -> float:
+        """Return the rms of what a model leaves of the readings that count."""
+        return float(np.sqrt(np.mean(self.residual(reading)[self.weight > 0.0] ** 2)))
+
     def rms_of_reading(self, rms: float) -> float:
         """Return the rms of single readings from that of their means."""
         return math.hypot(rms, self.within_rms)

@@ -12,8 +12,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
-import numpy as np
-
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import (
     CATALOGUE_SHARE,
@@ -205,8 +203,8 @@ def adding(state: Hypothesis, step: Step) -> Hypothesis:
             drawn=winner.drawn,
         )
         lower, steps = lower - worse, (*state.steps, replace(step, predicted_worse=worse))
-    unit = state.data.unit
-    before, after = (compact(_rms(fit, state.data), unit) for fit in (state.fit, winner.fit))
+    rms = [state.data.rms_left(fit.at.reading) for fit in (state.fit, winner.fit)]
+    before, after = (compact(each, state.data.unit) for each in rms)
     words = f"adding {winner.name}: residual {before} → {after} rms"
     return replace(state, fit=winner.fit, steps=steps, held=held, lower=lower, words=words)
 
@@ -216,12 +214,6 @@ def shares_a_misfit(step: Step, state: Hypothesis) -> bool:
     best = step.winner
     before, left = (remainder_of(fit, state.data, state.noise) for fit in (state.fit, best.fit))
     return best.gain > _GOOD_PART * before.excess and left.systematic and not best.drawn
-
-
-def _rms(fit: Fit, data: Data) -> float:
-    """Root mean square of the readings that count less the model."""
-    residual = data.residual(fit.at.reading)[data.weight > 0.0]
-    return float(np.sqrt(np.mean(residual**2)))
 
 
 def _drops(state: Hypothesis) -> Iterator[Hypothesis]:

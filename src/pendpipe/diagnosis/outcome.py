@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -38,26 +39,20 @@ class Outcome:
         What the baseline has, and the missing in the order in which they were added.
     held_out
         None where nothing was added.
-    unexplained_p_value
-        Of what the improved model leaves.
-    remainder
-        The same in parts: its size over the noise, and where it lies.
     small_swings
         How the frequency differs from the improved model's at the smallest amplitudes, if it does.
     name
         Of the recording.
     fit
         The fit that the diagnosis began with.
-    scanned
-        What was looked for, with its p-value on the baseline's residual.
     search
-        The fits and readings behind it, for the figures.
+        The fits and readings behind it; None where nothing could be fitted.
     alone, recordings
         Of several recordings: each one's own diagnosis, and what is said of it.
     drawn_by
         Imports what draws it (`pendpipe.api`): a result knows no figures.
-    restoring, drag_form
-        The baseline's torque, and the form of drag that the readings prefer.
+    drag_form
+        That the readings prefer.
     level
         The p-value from which chance explains a misfit.
     """
@@ -68,16 +63,12 @@ class Outcome:
     p_value: float
     effects: tuple[FoundEffect, ...]
     held_out: HeldOut | None
-    unexplained_p_value: float
     warnings: tuple[str, ...] = ()
-    remainder: Remainder | None = None
     small_swings: SmallSwings | None = None
-    restoring: Restoring = "linear"
     drag_form: str = "energy"
     provenance: Mapping[str, Any] = field(default_factory=dict)
     name: str = ""
     fit: FitResult | None = field(default=None, repr=False, compare=False)
-    scanned: tuple[tuple[str, float], ...] = ()
     search: Hypothesis | None = field(default=None, repr=False, compare=False)
     alone: tuple[Outcome, ...] = field(default=(), repr=False, compare=False)
     recordings: tuple[dict[str, Any], ...] = ()
@@ -93,6 +84,31 @@ class Outcome:
     def verdict(self) -> Verdict:
         """Whether something is missing: the baseline is consistent where chance explains it."""
         return verdict_of(self.missing, self.p_value, self.level)
+
+    @property
+    def unexplained_p_value(self) -> float:
+        """Of what the improved model leaves."""
+        return math.nan if self.search is None else self.search.unexplained
+
+    @property
+    def remainder(self) -> Remainder | None:
+        """What it leaves in parts: its size over the noise, and where it lies."""
+        return None if self.search is None else self.search.remainder
+
+    @property
+    def restoring(self) -> Restoring:
+        """The baseline's torque; of several recordings together that of the first."""
+        if self.alone:
+            return self.alone[0].restoring
+        return "linear" if self.search is None else self.search.baseline.model.restoring
+
+    @property
+    def scanned(self) -> tuple[tuple[str, float], ...]:
+        """What was looked for, with its p-value on the baseline's residual."""
+        first = None if self.search is None or self.alone else self.search.first
+        return (
+            tuple((lead.effect.identifier, lead.p_value) for lead in first.leads) if first else ()
+        )
 
     @property
     def noise_rms_rad(self) -> float:

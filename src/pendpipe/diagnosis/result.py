@@ -153,7 +153,7 @@ def not_analysable(
     """
     nothing = FittedModel({}, math.nan, math.nan, math.nan)
     answer = f"This recording can't be analysed: {reason}."
-    empty = Diagnosis(baseline, nothing, nothing, math.nan, (), None, math.nan).to_dict()
+    empty = Diagnosis(baseline, nothing, nothing, math.nan, (), None).to_dict()
     return dict(
         plain(
             {

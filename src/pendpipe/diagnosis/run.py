@@ -51,6 +51,8 @@ from pendpipe.readings import motion_of
 from pendpipe.recording import Recording
 
 
+# Trial models far from the motion overflow; they are computed and rejected.
+@np.errstate(over="ignore", divide="ignore", invalid="ignore")
 def diagnose_recording(
     recording: Recording,
     *,
@@ -63,6 +65,8 @@ def diagnose_recording(
     place: str | Path = "recording",
     provenance: Mapping[str, Any] | None = None,
     progress: Progress = silent,
+    points: TurningPoints | None = None,
+    whole: Recording | None = None,
 ) -> Diagnosis:
     """Find where Eq. 8 and a recording differ, and what effect is missing.
 
@@ -89,6 +93,10 @@ def diagnose_recording(
         Goes into the result.
     progress
         Receives one line for each step.
+    points
+        Those of the recording, where it is a free decay that is measured already.
+    whole
+        The recording that this decay was cut from; only its time stamps are used.
 
     Raises
     ------
@@ -110,92 +118,21 @@ def diagnose_recording(
     """
     from pendpipe.analysis.free_decay import measure_recording
 
-    check_fixed(fixed or {}, baseline)
-    progress("finding the free decay and its turning points")
-    motion = motion_of(recording, place=place)
-    points, part = measure_recording(motion, place, length_m=length.value if length else None)
-    refuse_if(
-        points.mostly_cut,
-        place,
-        f"most of it was cut: {points.mostly_cut}, of which nothing is said",
-        "cut it with --start and --stop, or see pendpipe inspect",
-        NotAnalysableError,
-    )
-    for cut in points.cuts:
-        progress(f"left out: {stretch(cut.start_s, cut.stop_s)}, {cut.reason}")
-    return diagnose_decay(
-        part,
-        points,
-        baseline=baseline,
-        fixed=fixed,
-        seed=seed,
-        level=level,
-        restoring=restoring,
-        length=length,
-        place=place,
-        provenance=provenance,
-        progress=progress,
-        whole=recording,
-    )
-
-
-def _angle_of(
-    part: Recording, points: TurningPoints, length: Estimate | None, place: str | Path
-) -> Recording:
-    """The angle arcsin((s - s0)/L) of a pendulum's position s, with the s0 and L of its fit."""
-    from pendpipe.analysis.fit import fit_recording, fitted_arm
-
-    arm = fitted_arm(points.readings or prepare(part, place), points, length, scale_of(part))
-    fit = fit_recording(part, points=points, restoring="sine", length=arm, place=place)
-    sine = (part.values - fit.value("offset")) / arm.value
-    step = None if part.resolution is None else part.resolution / arm.value
-    note = f"read as arcsin(s/L): L = {with_error(arm.value, arm.sd, 'm', short=True)}"
-    return replace(
-        part,
-        values=np.arcsin(np.clip(sine, -1.0, 1.0)),
-        quantity="angle_rad",
-        resolution=step,
-        notes=(*part.notes, note),
-    )
-
-
-# Trial models far from the motion overflow; they are computed and rejected.
-@np.errstate(over="ignore", divide="ignore", invalid="ignore")
-def diagnose_decay(
-    part: Recording,
-    points: TurningPoints,
-    *,
-    baseline: Baseline = "eq8",
-    fixed: Mapping[str, float] | None = None,
-    seed: int = 0,
-    level: float = FALSE_ALARM,
-    restoring: Restoring | None = None,
-    length: Estimate | None = None,
-    place: str | Path = "recording",
-    provenance: Mapping[str, Any] | None = None,
-    progress: Progress = silent,
-    whole: Recording | None = None,
-) -> Diagnosis:
-    """Diagnose a free decay whose turning points are known.
-
-    Parameters
-    ----------
-    part, points
-        The free decay, and its turning points.
-    baseline, fixed, seed, level, restoring, length, place, provenance, progress
-        As for `diagnose_recording`.
-    whole
-        The recording that the decay was cut from; only its time stamps are used.
-
-    Raises
-    ------
-    InputError
-        If a parameter can't be held, or the decay can't be analysed.
-    """
-    from pendpipe.analysis.free_decay import measure_recording
-
-    fixed = fixed or {}
+    fixed, part = fixed or {}, recording
     check_fixed(fixed, baseline)
+    if points is None:
+        progress("finding the free decay and its turning points")
+        motion = motion_of(recording, place=place)
+        points, part = measure_recording(motion, place, length_m=length.value if length else None)
+        refuse_if(
+            points.mostly_cut,
+            place,
+            f"most of it was cut: {points.mostly_cut}, of which nothing is said",
+            "cut it with --start and --stop, or see pendpipe inspect",
+            NotAnalysableError,
+        )
+        for cut in points.cuts:
+            progress(f"left out: {stretch(cut.start_s, cut.stop_s)}, {cut.reason}")
     if restoring == "sine" and part.unit == "m":
         # The search reads angles, whoever has measured the position.
         angles, part = measure_recording(_angle_of(part, points, length, place), place)
@@ -221,8 +158,8 @@ def diagnose_decay(
     printed = None if beginning.model.parts else fit
     stands = printed if printed and printed.light != "red" else None
     before, after, leading = _models(found, printed, level)
-    drag_form, swung = stands.drag_form if stands else "energy", found.baseline.model.restoring
-    gap = gap_note((whole or part).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
+    drag_form = stands.drag_form if stands else "energy"
+    gap = gap_note((whole or recording).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
     stamps = tuple(note for note in (gap, *found.notes.values()) if note)
     return Diagnosis(
         baseline,
@@ -231,20 +168,34 @@ def diagnose_decay(
         found.p_value,
         (*_presumed(found, drag_form), *effects),
         _left_out(found, beginning.held, progress) if verdict != "consistent" else None,
-        found.unexplained,
         warnings=(*points.notes, *stamps),
-        remainder=found.remainder,
         small_swings=_small_swings(leading, found),
-        restoring=swung,
         drag_form=drag_form,
         provenance=dict(provenance or {}),
         fit=fit,
         name=Path(place).name if str(place) != "recording" else "",
-        scanned=tuple((lead.effect.identifier, lead.p_value) for lead in found.first.leads)
-        if found.first
-        else (),
         search=found,
         level=level,
+    )
+
+
+def _angle_of(
+    part: Recording, points: TurningPoints, length: Estimate | None, place: str | Path
+) -> Recording:
+    """The angle arcsin((s - s0)/L) of a pendulum's position s, with the s0 and L of its fit."""
+    from pendpipe.analysis.fit import fit_recording, fitted_arm
+
+    arm = fitted_arm(points.readings or prepare(part, place), points, length, scale_of(part))
+    fit = fit_recording(part, points=points, restoring="sine", length=arm, place=place)
+    sine = (part.values - fit.value("offset")) / arm.value
+    step = None if part.resolution is None else part.resolution / arm.value
+    note = f"read as arcsin(s/L): L = {with_error(arm.value, arm.sd, 'm', short=True)}"
+    return replace(
+        part,
+        values=np.arcsin(np.clip(sine, -1.0, 1.0)),
+        quantity="angle_rad",
+        resolution=step,
+        notes=(*part.notes, note),
     )
 
 
@@ -376,10 +327,7 @@ def _fitted_model(fit: Fit, found: Hypothesis) -> FittedModel:
     Residual, chi^2 and noise are those of a reading.
     """
     data = found.data
-    left, by_baseline = (
-        float(np.sqrt(np.mean(data.residual(each.at.reading)[data.weight > 0.0] ** 2)))
-        for each in (fit, found.baseline)
-    )
+    left, by_baseline = (data.rms_left(each.at.reading) for each in (fit, found.baseline))
     return FittedModel(
         parameters_of(fit, data),
         data.rms_of_reading(left),

@@ -155,14 +155,11 @@ def diagnose_several(
         p_value,
         effects,
         held,
-        found.unexplained,
         warnings=tuple(
             f"{name}: {line}"
             for name, outcome in zip(names, outcomes, strict=True)
             for line in outcome.warnings
         ),
-        remainder=found.remainder,
-        restoring=outcomes[0].restoring,
         drag_form=outcomes[0].drag_form,
         provenance=dict(provenance or {}),
         name=f"{listed(names)} together",
