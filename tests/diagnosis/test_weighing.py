@@ -24,14 +24,14 @@ from pendpipe.diagnosis.detect import (
     prepare,
 )
 from pendpipe.diagnosis.found import Finding
-from pendpipe.diagnosis.hypothesis import Hypothesis, Step, applicable
+from pendpipe.diagnosis.hypothesis import Hypothesis, applicable
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.projection import local_p_values, scores_and_lengths, tangent_basis
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.rivals import Rival, Scale, class_width, evidence, probabilities
 from pendpipe.diagnosis.run import diagnose_recording
-from pendpipe.diagnosis.weighing import fault_named, weigh, with_likelier
+from pendpipe.diagnosis.weighing import fault_named, weigh
 from pendpipe.dynamics.eq8 import B
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
@@ -50,7 +50,6 @@ from .records import (
     other_engine,
     prepared,
     recording,
-    scanned,
 )
 
 # The rivals that share the probability of an effect: those that the final noise allows.
@@ -220,113 +219,13 @@ def test_a_random_torque_that_explains_no_more_than_a_smooth_misfit_is_not_confi
     assert chances[3] < 0.01
 
 
-# The reported effect is the likelier one in the end, whichever was added first.
-
-
-@functools.cache
-def wrong_loss() -> Diagnosis:
+@pytest.mark.slow
+def test_a_parameter_that_is_held_wrongly_is_named_and_comes_out_right() -> None:
     """A prediction with a wrong b: nothing is missing."""
     given = {"b": 1.1 * float(TRUTH[B])}
-    return diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
-
-
-def having_taken(outcome: Diagnosis, name: str) -> Hypothesis:
-    """The same search as if it had added another of the refitted effects."""
-    found = outcome.search
-    (step,) = found.steps
-    first = next(rival for rival in step.rivals if rival.identifier == name)
-    rest = tuple(rival for rival in step.rivals if rival is not first)
-    held = found.held
-    if step.winner.effect.kind == "parameter":
-        held = (*held, B)
-    # Its refit was judged by the noise of that moment.
-    fit = refine(first.fit.model, found.data, found.noise, first.fit.value, held=held)
-    return replace(
-        found,
-        fit=fit,
-        steps=(replace(step, rivals=(first, *rest)),),
-        held=held,
-        without_curve=None,
-    )
-
-
-def exchanged(found: Hypothesis) -> tuple[Hypothesis, tuple[Step, ...]]:
-    """Put likelier rivals in, until there is none."""
-    seen = set()
-    while True:
-        seen.add(found.key)
-        weighed = tuple(weighing.weigh(found, step) for step in found.steps)
-        after = with_likelier(found, weighed, seen)
-        if after is None:
-            return found, weighed
-        found = after
-
-
-def led(outcome: Diagnosis, name: str) -> tuple[Step, float, dict[str, float], Hypothesis]:
-    """Return the final leader if another was added first, and all probabilities."""
-    found, (weighed,) = exchanged(having_taken(outcome, name))
-    (step,) = found.steps
-    own, *others = weighed.weights[:-1]
-    mates = {mate.identifier: each for mate, each in zip(weighed.mates, others, strict=True)}
-    return step, own, mates, found
-
-
-@pytest.mark.parametrize("taken", ["cubic-stiffness", "clock-drift", "unnamed-restoring"])
-@pytest.mark.structure
-def test_a_likelier_effect_replaces_the_one_that_was_added(taken: str) -> None:
-    """All fit a pendulum whose torque is sin x; the prior knows that it is."""
-    step, own, mates, found = led(scanned("circular-error"), taken)
-    assert step.winner.identifier == "circular-error"
-    assert own > max(mates.values())
-    assert taken in mates
-    assert [effect.identifier for effect in found.fit.model.effects] == ["circular-error"]
-    assert found.fit.chi2 == pytest.approx(scanned("circular-error").search.fit.chi2)
-
-
-@pytest.mark.parametrize(
-    ("name", "taken"),
-    [
-        ("frequency-drift", "cubic-stiffness"),
-        ("frequency-drift", "clock-drift"),
-        ("sensor-cubic", "sensor-cubic"),
-    ],
-)
-@pytest.mark.structure
-def test_a_name_as_likely_as_its_rivals_stays(name: str, taken: str) -> None:
-    step, own, mates, _ = led(diagnosed(name), taken)
-    assert step.winner.identifier == taken
-    assert 1.5 * own >= max(mates.values())
-
-
-@pytest.mark.structure
-def test_the_class_of_a_likelier_name_is_that_of_the_last_model() -> None:
-    """Its rivals were refitted beside 1.4 times the noise, which is worth half of a gain."""
-    found = having_taken(scanned("circular-error"), "cubic-stiffness")
-    (step,) = found.steps
-    earlier = [
-        replace(each, worth=each.worth / 2, evidence=each.evidence / 2) for each in step.rivals
-    ]
-    weighed = [
-        exchanged(replace(found, steps=(replace(step, rivals=rivals),)))[1][0]
-        for rivals in (step.rivals, tuple(earlier))
-    ]
-    same, again = ({mate.identifier for mate in each.mates} for each in weighed)
-    assert "cubic-stiffness" in again
-    assert again == same
-    np.testing.assert_allclose(weighed[1].weights, weighed[0].weights, atol=1e-3)
-
-
-@pytest.mark.slow
-@pytest.mark.structure
-def test_a_wrong_parameter_replaces_missing_physics() -> None:
-    """It is fitted then, and comes out right."""
-    taken = next(
-        rival.identifier
-        for rival in wrong_loss().search.steps[0].rivals
-        if rival.effect.kind != "parameter"
-    )
-    step, _, _, found = led(wrong_loss(), taken)
-    assert step.winner.identifier == "parameter-b"
+    outcome = diagnose_recording(recording(other_engine(TRUTH), 6), fixed=given)
+    found, (effect,) = outcome.search, outcome.missing
+    assert effect.identifier == "parameter-b"
     assert B not in found.held
     sd = float(found.fit.covariance()[B, B]) ** 0.5
     assert abs(found.fit.value[B] - TRUTH[B]) < 4.0 * sd

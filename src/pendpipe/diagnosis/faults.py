@@ -15,7 +15,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data, at_even_times
 from pendpipe.diagnosis.detect import TESTS_SHARE
-from pendpipe.diagnosis.forensics import FINDERS, RANDOM_TORQUE, Finder
+from pendpipe.diagnosis.forensics import FINDERS, Finder
 from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.found import Finding
 from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Task, is_further, price_of_another
@@ -201,11 +201,3 @@ def _measured_anew(found: list[Finding], state: Hypothesis, task: Task) -> Hypot
         elif finding.kind == "note" and finding.time_s is None:
             notes[finding.identifier] = finding.summary
     return replace(state, faults=tuple(faults), quiet=quiet, notes=notes)
-
-
-def random_torque(state: Hypothesis, task: Task) -> Hypothesis | None:
-    """Apply the test for random kicks, whatever the model leaves."""
-    if state.samples is None:
-        return None
-    finding = _asked(RANDOM_TORQUE, _evidence(state), state)
-    return _applied(finding, state, task) if finding else None

@@ -7,14 +7,13 @@ from typing import Final
 import numpy as np
 
 from pendpipe.diagnosis.begin import Beginning
-from pendpipe.diagnosis.faults import correct, examine, random_torque
+from pendpipe.diagnosis.faults import correct, examine
 from pendpipe.diagnosis.hypothesis import (
     MOST_EFFECTS,
     Hypothesis,
     Step,
     Task,
     first_noise,
-    is_gross,
 )
 from pendpipe.diagnosis.neighbours import (
     adding,
@@ -26,10 +25,10 @@ from pendpipe.diagnosis.neighbours import (
     with_other_noise,
 )
 from pendpipe.diagnosis.refine import Fit, best_fit, fitted_from, refine
-from pendpipe.diagnosis.remainder import remainder_of, with_errors
+from pendpipe.diagnosis.remainder import with_errors
 from pendpipe.diagnosis.rivals import NO_SCAN, Rival, Scale
 from pendpipe.diagnosis.summary import BASELINES
-from pendpipe.diagnosis.weighing import weigh, with_likelier
+from pendpipe.diagnosis.weighing import weigh
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.dynamics.eq8 import C
 
@@ -57,8 +56,7 @@ def baseline_fitted(beginning: Beginning, task: Task) -> Hypothesis:
 def run_search(state: Hypothesis, task: Task) -> Hypothesis:
     """Go to a neighbour of a smaller score, until there is none that was not seen.
 
-    Cheap neighbours come first, and the first kind that has a better one is taken. Last, where all
-    are weighed, the most probable name of a class leads it.
+    Cheap neighbours come first, and the first kind that has a better one is taken.
     """
     seen = set()
     if state.beginning.starts:
@@ -81,12 +79,7 @@ def run_search(state: Hypothesis, task: Task) -> Hypothesis:
                 break
         else:
             state = _judged(examine(state, task))
-            weighed = tuple(weigh(state, step) for step in state.steps)
-            other = with_likelier(state, weighed, seen)
-            if other is None:
-                return replace(state, steps=weighed)
-            task.progress(f"{' and '.join(step.winner.name for step in other.steps)} is likelier")
-            state = other
+            return replace(state, steps=tuple(weigh(state, step) for step in state.steps))
 
 
 def _starts(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:
@@ -114,7 +107,7 @@ def _starts(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:
 
 
 def _additions(state: Hypothesis, task: Task, *, names_first: bool = False) -> Iterator[Hypothesis]:
-    """Add the effect that leads, or random kicks; or two names that share a misfit."""
+    """Add the effect that leads; or two names that share a misfit."""
     drawn, chance = _ends_with_curve(state), state.scan.p_value > task.threshold
     if chance or drawn or len(state.steps) >= MOST_EFFECTS:
         return
@@ -123,26 +116,11 @@ def _additions(state: Hypothesis, task: Task, *, names_first: bool = False) -> I
         return
     one = adding(state, step)
     yield one
-    yield from _kicks(state, task, one)
     # Of two laws that share a misfit neither may pay its price before the other is there.
     if one.lower < -one.steps[-1].predicted_worse and shares_a_misfit(step, state):
         trial = task.scanned(correct(one.settle(one.fit), task))
         for more in _additions(trial, task, names_first=True):
             yield _from(state, more)
-
-
-def _kicks(state: Hypothesis, task: Task, instead: Hypothesis) -> Iterator[Hypothesis]:
-    """Let random kicks explain the residual, instead of an effect that leaves more than noise.
-
-    They leave none of it: both gains count against the noise.
-    """
-    winner = instead.steps[-1].winner
-    left = remainder_of(winner.fit, state.data, state.noise)
-    if left.systematic and not is_gross(state.fit, state.data):
-        kicked = random_torque(state, task)
-        if kicked is not None:
-            ahead = kicked.lower - (winner.gain - winner.charge)
-            yield replace(kicked, lower=instead.lower + ahead)
 
 
 def _from(state: Hypothesis, after: Hypothesis) -> Hypothesis:

@@ -1,7 +1,7 @@
 """Final probabilities of each effect and its rivals; the most probable leads."""
 
 import math
-from collections.abc import Collection, Container, Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final
@@ -41,8 +41,6 @@ _OF_A_FURTHER_NAME: Final = 2.2
 names were right, 76 % of those beside another, 45 % of those beside two."""
 _SEEN_IN_RESIDUAL: Final = (*RANDOM, "coloured-noise")
 """Faults detected in a residual: the misfit of a curve can look like any of them."""
-_LIKELIER: Final = 1.5
-"""Ratio of probabilities from which another name leads a class."""
 _SAME_GAIN: Final = 0.02
 """Relative change of a gain below which the rivals are not refitted."""
 
@@ -262,50 +260,3 @@ def _is_of(fit: Fit, without: Fit, effect: Effect, found: Hypothesis) -> bool:
         now = refine(fit.model, found.data, found.noise, fit.value, rounds=0)
         return abs(now.chi2 - fit.chi2) < SETTLED
     return False
-
-
-def with_likelier(
-    found: Hypothesis, weighed: Sequence[Step], seen: Container[object]
-) -> Hypothesis | None:
-    """Let the most probable name of a class lead it, if that hypothesis is new.
-
-    The prior, later effects, or the final noise may have changed the odds since one was added.
-    Names beside a curve stay: their probabilities show how little they explain.
-    """
-    present = {effect.key for effect in found.fit.model.effects}
-    for number in reversed(range(0 if found.without_curve else len(found.steps))):
-        each = weighed[number]
-        names = [
-            (weight, mate)
-            for mate, weight in zip(each.mates, each.weights[1:-1], strict=True)
-            if not mate.drawn and mate.effect.key not in present
-        ]
-        weight, mate = max(names, key=lambda one: one[0], default=(0.0, None))
-        if mate is not None and weight > _LIKELIER * each.weights[0]:
-            after = _exchanged(found, number, mate, each)
-            if after is not None and after.key not in seen:
-                return after
-    return None
-
-
-def _exchanged(found: Hypothesis, number: int, mate: Rival, step: Step) -> Hypothesis | None:
-    """Replace a step's winner by a rival; None where the model has no such motion."""
-    effect, held = mate.effect, set(found.held)
-    own = step.winner.effect
-    # A held part of b has no index: the model itself holds it.
-    if isinstance(own, ReleasedParameter) and own.index is not None:
-        held.add(own.index)
-    if isinstance(effect, ReleasedParameter):
-        held = set(effect.without(held))
-    fit = refitted(step.before, found, mate, math.inf)
-    if fit is None:
-        return None
-    # All of one model and noise: those of an earlier model would be far behind this one.
-    rest = [rival for rival in step.rivals if rival.effect.key != effect.key]
-    steps = list(found.steps)
-    steps[number] = replace(step, rivals=(mate, *rest))
-    if number + 1 < len(steps):
-        # The next step is tested without its own effect: start from this model.
-        steps[number + 1] = replace(steps[number + 1], before=mate.fit)
-    fit = with_errors(fit, found.data, found.noise)
-    return replace(found, fit=fit, steps=tuple(steps), held=tuple(sorted(held)))

@@ -66,7 +66,6 @@ def _last(name: str, find: Callable[[Evidence], Finding | None]) -> Finder:
     return Finder(name, find, CLEAN, LARGE_PHASE_ERROR, last=True)
 
 
-RANDOM_TORQUE: Final = _last("broadband-drive", colour.find_random_torque)
 FINDERS: Final = (
     Finder("time-stamps", sampling_times.find_irregular, most_phase_rad=_IN_PHASE),
     Finder("dropped-samples", lost_samples.find, repeats=True),
@@ -81,7 +80,7 @@ FINDERS: Final = (
     _last("coarse-quantisation", converter.find_coarse_steps),
     _last("jitter", sampling_times.find_jitter),
     _last("coloured-noise", colour.find_coloured_noise),
-    RANDOM_TORQUE,
+    _last("broadband-drive", colour.find_random_torque),
     Finder("changing-noise", colour.note_level, last=True),
     Finder("wandering-zero", colour.note_wander, last=True),
 )
