@@ -15,7 +15,7 @@ from scipy.interpolate import make_interp_spline
 import pendpipe as pp
 from pendpipe.analysis.calibrate import calibrate
 from pendpipe.analysis.compare import theory_curve
-from pendpipe.analysis.fit import result
+from pendpipe.analysis.fit import goodness, result
 from pendpipe.analysis.fit.consequence import unsure
 from pendpipe.analysis.fit.decrement import Check
 from pendpipe.analysis.fit.quality import TOLD_APART
@@ -66,6 +66,24 @@ def test_a_loud_even_harmonic_of_the_sensor_moves_neither_period_nor_q() -> None
     assert abs(fit["period"].value / PERIOD - 1.0) < 1e-5
     assert "from the turning points" in str(fit)
     assert "(error ×" not in str(fit)
+
+
+def test_some_cycles_of_a_long_record_tell_the_errors_of_its_misfit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Every third of 76, of a bent sensor whose gain wanders: as all of them to a tenth.
+
+    They are counted from the first reading, half a cycle from where their phase is 0.
+    """
+    values = viscous(TIME)
+    values = (values * (1.0 + 0.01 * np.sin(0.2 * TIME)) + 0.05 * values**2)[26:]
+    every = fitted(values)
+    monkeypatch.setattr(goodness, "_ROWS", len(TIME) // 2)
+    some = fitted(values)
+    assert every.refuted
+    for name, estimate in every.parameters.items():
+        assert some.parameters[name].sd == pytest.approx(estimate.sd, rel=0.1)
+    assert some["frequency"].sd != every["frequency"].sd
 
 
 def test_a_period_that_drifts_is_what_the_swings_of_each_amplitude_show() -> None:

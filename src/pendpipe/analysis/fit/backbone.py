@@ -83,8 +83,8 @@ class Backbone:
         The period extrapolated to no amplitude, that of Eq. 8's frequency.
     seen_rad
         The largest and the smallest amplitude of the turning points.
-    period_scatter, decrement_scatter
-        Variance of the times, and of ln y, about the curves, over that of their own errors.
+    period_scatter
+        Variance of the times about the curve, over that of their own errors.
     """
 
     amplitude_rad: FloatArray
@@ -95,7 +95,6 @@ class Backbone:
     small_period: Estimate
     seen_rad: tuple[float, float]
     period_scatter: float = 1.0
-    decrement_scatter: float = 1.0
 
     def period(self, amplitude: float) -> Estimate:
         """Period at an amplitude, s; NaN where nothing shows it."""
@@ -144,7 +143,6 @@ class Backbone:
             small_period=Estimate.from_json(content["small_period"]),
             seen_rad=tuple(content["seen_rad"]),
             period_scatter=content["period_scatter"],
-            decrement_scatter=content["decrement_scatter"],
         )
 
 
@@ -209,7 +207,6 @@ def backbone_of(points: TurningPoints, law: Eq8, bent: FloatArray | None = None)
         small,
         (largest, smallest),
         scatter,
-        loss.scatter,
     )
 
 

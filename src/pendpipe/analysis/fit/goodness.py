@@ -28,8 +28,8 @@ _BLOCKS: Final = 128
 _SLOW: Final = 8
 """Polynomials that follow a slow change along the record."""
 
-_ROWS: Final = 1 << 17
-"""Rows of derivatives at once, at most: 10 MB."""
+_ROWS: Final = 1 << 14
+"""Rows of derivatives at most: of 500 cycles, over each of which a derivative changes by 0.2 %."""
 _IN_PHASE: Final = 0.05
 """Part of the motion that a residual may have at its frequency where its third harmonic is read: a
 phase of 0.05 that changes in a cycle leaves a hundredth of itself there."""
@@ -167,7 +167,7 @@ def judge(
     sizes = misfit_of(sums / np.sqrt(weights) / noise, phase).sizes
     # Derivatives change slowly: in a long record every so many cycles stand for the others.
     every = len(phase) // _ROWS + 1
-    some = np.floor(phase / (2.0 * math.pi)) % every == 0
+    some = np.floor((phase - phase[0]) / (2.0 * math.pi)) % every == 0
     left = Left(times[some], phase[some], every * weights[some], sizes)
     return Goodness(noise, ratio, p_values, max(ratio, own, 1.0), bent, left)
 
