@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -246,7 +247,7 @@ def test_errors_that_nobody_tells_are_the_scatter_of_repeated_rows() -> None:
 def test_of_tables_without_errors_that_lack_nothing_few_raise_an_alarm(name: str) -> None:
     """One in a hundred by design, however few the rows: of fifty, three come twice in a hundred."""
     random, told = np.random.default_rng(5), {"air": 1.46e-5}
-    table = read_table(PUBLISHED / name / "table.tsv", told, 0.02)
+    table = read_table(PUBLISHED / name / "config/table.tsv", told, 0.02)
     unknowns = np.where(table.has_prior, 0.0, -5.0)
     scaled = predict(table, (), unknowns)[:, 0]
     missing = [
@@ -284,7 +285,7 @@ def test_of_tables_without_errors_that_lack_nothing_few_raise_an_alarm(name: str
 def test_a_cell_that_is_wrong_is_refused_in_a_line(
     tmp_path: Path, column: str, text: str, said: str
 ) -> None:
-    lines = (PUBLISHED / "baily-1832-rods/table.tsv").read_text().splitlines()
+    lines = (PUBLISHED / "baily-1832-rods/config/table.tsv").read_text().splitlines()
     cells = dict(zip(lines[0].split("\t"), lines[1].split("\t"), strict=True)) | {column: text}
     path = tmp_path / "table.tsv"
     path.write_text("\n".join(["\t".join(cells), "\t".join(cells.values()), *lines[2:]]))
@@ -306,26 +307,26 @@ def test_a_table_that_is_none_is_refused_in_a_line(
     tmp_path: Path, change: Callable[[str], str], said: str
 ) -> None:
     path = tmp_path / "table.tsv"
-    path.write_text(change((PUBLISHED / "baily-1832-rods/table.tsv").read_text()))
+    path.write_text(change((PUBLISHED / "baily-1832-rods/config/table.tsv").read_text()))
     with pytest.raises(InputError) as refused:
         read_table(path, {"air": 1e-5}, 0.1)
     assert str(refused.value).startswith(f"{path}{said}")
 
 
 def test_a_case_in_which_no_row_counts_is_refused(tmp_path: Path) -> None:
-    for name in ("published.yaml", "table.tsv"):
-        text = (PUBLISHED / "bessel-1826" / name).read_text("utf-8")
-        (tmp_path / name).write_text(text.replace("unverified: true", ""), "utf-8")
+    copied = tmp_path / "bessel"
+    shutil.copytree(PUBLISHED / "bessel-1826", copied)
+    path = copied / "config/config.yaml"
+    path.write_text(path.read_text("utf-8").replace("unverified: true", ""), "utf-8")
     with pytest.raises(InputError, match="no row counts in 'air as Stokes held it'"):
-        ask(tmp_path)
+        ask(copied)
 
 
 def test_a_folder_without_a_table_is_refused_in_a_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="there is no such configuration"):
         ask(tmp_path)
-    (tmp_path / "published.yaml").write_bytes(
-        (PUBLISHED / "baily-1832-rods/published.yaml").read_bytes()
-    )
+    (tmp_path / "config").mkdir()
+    shutil.copy(PUBLISHED / "baily-1832-rods/config/config.yaml", tmp_path / "config")
     with pytest.raises(InputError, match="there is no such table"):
         ask(tmp_path)
 

@@ -268,6 +268,33 @@ def test_what_is_wrong_is_said_before_snakemake_starts(
     assert said in line
 
 
+def test_a_table_of_published_numbers_is_a_campaign_of_one_job(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answer_of: Any
+) -> None:
+    folder = tmp_path / "newton"
+    shutil.copytree(ROOT / "examples/published/newton-1687", folder)
+    words = ("--snakefile", str(SNAKEFILE))
+    assert planned(folder, *words) == {"published": 1, "all": 1, "total": 2}
+    done = call(folder, "pendpipe", "campaign", "--cores", "1")
+    assert done.returncode == 0, done.stdout + done.stderr
+    content = json.loads((folder / "results/campaign_diagnosis.json").read_text("utf-8"))
+    (case,) = content["cases"]
+    assert case["statement"] in (folder / "results/campaign_diagnosis.txt").read_text("utf-8")
+    assert (folder / "results/figures/left.svg").is_file()
+    assert planned(folder, *words) == {}
+    table = folder / "config/table.tsv"
+    table.write_text(table.read_text("utf-8").replace("164", "165"), "utf-8")
+    assert planned(folder, *words)["published"] == 1
+    monkeypatch.chdir(folder)
+    assert "in order" in answer_of(["config"], 0).out
+    refused = answer_of(["campaign", "-n", "--record", "from 2 inches"], 2).err
+    assert "a table of numbers has no records" in refused
+    (folder / "config/config.yaml").write_text("title: Newton\ncases: 3\n", "utf-8")
+    status, said = snakemake(folder, *words, "-n")
+    assert status
+    assert "config.yaml, source" in said
+
+
 def test_a_row_says_how_its_file_is_read(begun: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A comma, a unit and a part that the reader is told of; the fit's torque too."""
     lines = (begun / "recordings/rod-pendulum.csv").read_text(encoding="utf-8").splitlines()

@@ -1,44 +1,21 @@
-# What the rules share: the checked configuration, and names. No rule, no physics.
+# What the rules of recordings share: the checked configuration, and names. No rule, no physics.
 import os
 import re
 import shlex
 from pathlib import Path
 
-from snakemake.exceptions import WorkflowError
-
 from pendpipe.configuration import jobs
-from pendpipe.configuration.load import NAME, load_campaign, read_configuration
-from pendpipe.errors import InputError
+from pendpipe.configuration.load import NAME, load_campaign
 from pendpipe.files import check_writable
 from pendpipe.provenance import code_version
 from pendpipe.report.captions import CAPTIONS
 from pendpipe.stages import chunks
 from pendpipe.stages.watch import Watch
 
-jobs.prepare_environment()
-
-
-def checked(call, *arguments):
-    """Call what may find the user's input wrong; an error is one line, without a traceback."""
-    try:
-        return call(*arguments)
-    except InputError as error:
-        raise WorkflowError(str(error)) from None
-
-
-# Snakemake itself takes the last of two keys of one name.
-for path in filter(os.path.isfile, workflow.configfiles):
-    checked(read_configuration, path)
-CAMPAIGN = checked(
-    load_campaign, config, ", ".join(map(str, workflow.configfiles)) or "--config"
-)
+CAMPAIGN = checked(load_campaign, config, PLACE)
 # The rules hand the file on as a resource: unlike a parameter, that is nothing to rerun for.
 # What a rule takes from the configuration is digested in its own parameters.
-OURS = ".snakemake/pendpipe"
-CONFIGURATION = checked(jobs.store, CAMPAIGN, OURS)
-ENVIRONMENT = checked(
-    jobs.environment, OURS, workflow.source_path("../envs/pendpipe.yaml")
-)
+CONFIGURATION = checked(jobs.store, CAMPAIGN.configuration, OURS)
 RESULTS = CAMPAIGN.configuration.results
 # With `only` the campaign's own stages are not run: they need all records.
 RECORDS = [record.record for record in CAMPAIGN.selected]
@@ -162,11 +139,6 @@ def figure_files():
     names = [name for name in CAPTIONS if name.startswith("fig") or name == "walls"]
     names += ["causes"] if campaign_diagnosis() else []
     return expand(f"{RESULTS}/figures/{{name}}.{{form}}", name=names, form=FORMS)
-
-
-def doubled(number):
-    """A resource, MB or minutes, that is doubled where a cluster ended the first attempt."""
-    return lambda wildcards, attempt: number * attempt
 
 
 def option(name, value):

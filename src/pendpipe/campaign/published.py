@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from pydantic import Field, ValidationError
 from scipy.special import chdtri, fdtrc, ndtri, stdtr
 
 from pendpipe.answer import Answer, percent, printed
@@ -28,8 +27,7 @@ from pendpipe.campaign.diagnose import (
 )
 from pendpipe.campaign.fit import JointFit, Measured, candidates, chi2_near, joint_fit, predict
 from pendpipe.campaign.table import QUANTITIES, Row, Table, read_table
-from pendpipe.configuration.load import as_input_error, read_configuration
-from pendpipe.configuration.models import Section
+from pendpipe.configuration.published import CONFIGURATION, Case, Published, load_published
 from pendpipe.errors import refuse_if
 from pendpipe.estimate import LISTED, chi_square_p_value
 from pendpipe.levels import FALSE_ALARM
@@ -230,24 +228,6 @@ def _rows(one: Found) -> list[tuple[str, str]]:
     ]
 
 
-class Case(Section):
-    """One question to a table: the fluids as they are held to be, and which rows count."""
-
-    title: str = Field(description="what is asked")
-    viscosity_m2_per_s: dict[str, float] = Field(description="kinematic viscosity of each fluid")
-    relative_sd: float = Field(gt=0.0, description="its relative standard deviation")
-    without: list[str] = Field([], description="groups of rows that do not count")
-    unverified: bool = Field(False, description="whether rows of unsure digits count")
-
-
-class Published(Section):
-    """The file ``published.yaml`` of a folder, beside its ``table.tsv``."""
-
-    title: str = Field(description="who measured what, and when")
-    source: str = Field(description="where it is printed")
-    cases: list[Case] = Field(min_length=1, description="the questions")
-
-
 def counts(case: Case, table: Table) -> BoolArray:
     """Which rows count: those that were observed, and of sure digits unless all are asked for."""
     sure = table.of("verified", "no") < 1.0
@@ -332,14 +312,10 @@ def by_group(asked: Sequence[Asked]) -> list[tuple[str, ...]]:
     return [tuple(cell for cell, show in zip(row, shown, strict=True) if show) for row in rows]
 
 
-def ask(folder: Path) -> tuple[Published, list[Asked]]:
-    """Ask a folder's table all its questions."""
-    place = folder / "published.yaml"
-    try:
-        published = Published.model_validate(read_configuration(place))
-    except ValidationError as fault:
-        raise as_input_error(place, fault, Published) from None
-    return published, [_asked(folder / "table.tsv", case) for case in published.cases]
+def ask(folder: Path, published: Published | None = None) -> tuple[Published, list[Asked]]:
+    """Ask a folder's table all its questions, by its own configuration or another."""
+    published = published or load_published(folder / CONFIGURATION)
+    return published, [_asked(folder / published.table, case) for case in published.cases]
 
 
 def _asked(path: Path, case: Case) -> Asked:

@@ -24,13 +24,14 @@ from pendpipe.arguments import (
     print_answer,
     tell_written,
 )
-from pendpipe.errors import refuse_if
+from pendpipe.errors import InputError, refuse_if
 from pendpipe.options import ALTERNATIVES, INPUT, OUTPUT, flags, flags_of, given
 from pendpipe.project import CONFIGURATION, PROJECT, SNAKEFILE
 from pendpipe.reading import inspect as describe, read
 from pendpipe.simulation.verbs import simulate as simulated
 
 if TYPE_CHECKING:
+    from pendpipe.configuration.load import Campaign
     from pendpipe.formats import Inspection
 
 
@@ -191,15 +192,16 @@ def catalogue_manual() -> str:
 )
 def config(arguments: Arguments) -> None:
     """Check a campaign's configuration, or print its schema or the manual's tables."""
-    from pendpipe.configuration.load import load_campaign, read_configuration
+    from pendpipe.configuration.load import read_configuration
 
     if arguments.schema:
         print(schema(), end="")
     elif arguments.manual:
         print(configuration_manual())
     else:
-        campaign = load_campaign(read_configuration(arguments.file), arguments.file)
-        print(f"{arguments.file}: in order, {len(campaign.records)} records")
+        campaign = _checked(read_configuration(arguments.file), arguments.file)
+        count = f", {len(campaign.records)} records" if campaign else ""
+        print(f"{arguments.file}: in order{count}")
 
 
 BEGIN: Final = "<!-- made by `pendpipe config --manual`: begin -->"
@@ -344,8 +346,6 @@ def campaign(arguments: Arguments) -> int:
     pendpipe campaign --record air-01           runs that record's own stages
     pendpipe campaign -- --forcerun fit         repeats the fits and what depends on them
     """
-    from pendpipe.configuration.load import load_campaign
-
     given: Path = arguments.config
     refuse_if(
         not given.is_file(),
@@ -353,8 +353,10 @@ def campaign(arguments: Arguments) -> int:
         "there is no such configuration",
         "pendpipe init writes one" if given == CONFIGURATION else "check the path",
     )
-    campaign = load_campaign(_merged(given), given)
+    campaign = _checked(_merged(given), given)
     for name in arguments.record:
+        if campaign is None:
+            raise InputError(given, "a table of numbers has no records", "drop --record")
         campaign.record(name)
     command = [sys.executable, "-P", "-m", "snakemake", "--snakefile", str(SNAKEFILE)]
     command += ["--workflow-profile", str(_profile(arguments.profile))]
@@ -371,6 +373,17 @@ def campaign(arguments: Arguments) -> int:
             # Snakemake was interrupted as well, and ends its jobs first.
             snakemake.wait()
             raise
+
+
+def _checked(content: dict[str, Any], place: str | Path) -> "Campaign | None":
+    """Check a configuration; None of a table of published numbers."""
+    from pendpipe.configuration.load import load_campaign
+    from pendpipe.configuration.published import load_published
+
+    if "cases" not in content:
+        return load_campaign(content, place)
+    load_published(place, content)
+    return None
 
 
 def _merged(given: Path) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from typing import Any
 
 from pendpipe import files
 from pendpipe.configuration.load import Campaign, Record
+from pendpipe.configuration.models import Section
 from pendpipe.process import leave_the_folder_out, one_thread
 
 
@@ -30,14 +31,14 @@ def digest(content: Any) -> str:
     return files.digest(content)[:12]
 
 
-def store(campaign: Campaign, folder: str | Path) -> str:
+def store(configuration: Section, folder: str | Path) -> str:
     """Write the checked configuration under a name made of its content, unless it is there.
 
     Snakemake merges files and ``--config`` (which hands numbers on as text); the jobs read
     what the check made of them, defaults and all. The name is not a parameter of the rules,
     so that a change reruns only what it touches.
     """
-    content = campaign.configuration.model_dump(mode="json")
+    content = configuration.model_dump(mode="json")
     path = Path(folder) / f"configuration-{digest(content)}.json"
     if not path.exists():
         files.write_json(path, content)

@@ -311,7 +311,7 @@ def load_campaign(content: Mapping[str, Any], place: str | Path) -> Campaign:
         configuration = Configuration.model_validate(given)
     except ValidationError as fault:
         raise as_input_error(place, fault, Configuration) from None
-    _check_results(configuration.results, place)
+    check_results(configuration.results, place)
     records = tuple(read_records(configuration.records))
     campaign = Campaign(configuration, records)
     for entry in records:
@@ -322,7 +322,7 @@ def load_campaign(content: Mapping[str, Any], place: str | Path) -> Campaign:
     return campaign
 
 
-def _check_results(results: str, place: str | Path) -> None:
+def check_results(results: str, place: str | Path) -> None:
     """Refuse a folder whose name shells, Snakemake's wildcards or Windows read otherwise."""
     where = f"{place}, results"
     refuse_if(

@@ -1,0 +1,37 @@
+# A campaign in print: a row of its table has no recording, and so no job of its own.
+from pendpipe.configuration.published import load_published
+from pendpipe.provenance import code_version
+
+PUBLISHED = checked(load_published, PLACE, config)
+RESULTS = PUBLISHED.results
+FIGURES = expand(f"{RESULTS}/figures/left.{{form}}", form=["svg", "png"])
+
+
+def wanted():
+    """The targets of `all`."""
+    return rules.published.output
+
+
+rule published:
+    input:
+        PUBLISHED.table,
+    output:
+        diagnosis=f"{RESULTS}/campaign_diagnosis.json",
+        answer=f"{RESULTS}/campaign_diagnosis.txt",
+        figures=report(FIGURES, category="Figures"),
+    log:
+        f"{RESULTS}/logs/published.log",
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=doubled(1000),
+        runtime=doubled(10),
+        configuration=checked(jobs.store, PUBLISHED, OURS),
+    params:
+        depends=jobs.digest(PUBLISHED.model_dump(mode="json")),
+        code=code_version("pendpipe.commands.published"),
+    message:
+        "theory beside the printed numbers, and what is missing"
+    shell:
+        "pendpipe published . --campaign {resources.configuration:q} --out {output.diagnosis:q}"
+        " --figure {output.figures[0]:q} > {output.answer:q} 2> {log:q}"
