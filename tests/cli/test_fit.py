@@ -189,6 +189,50 @@ def test_a_table_in_latex_keeps_losses_and_remarks(
     assert "loses most by" in text
     assert " & refused & " in text
     assert "samples only" in text
+    assert r"\par T0: 2 files scatter by" in text
+    assert "…" not in text, "a remark is whole where there is room"
+
+
+def test_each_pendulum_of_a_class_has_its_length(
+    of_a_class: list[str], tmp_path: Path, answer_of: Any
+) -> None:
+    """By a small table; the others have that of all."""
+    table, out = tmp_path / "lengths.csv", tmp_path / "class.csv"
+    own, other = of_a_class[1], of_a_class[2]
+    table.write_text(f"file;length (m)\n{Path(own).name};0.613(1)\n")
+    asked = ["fit", own, other, "--lengths", str(table), "--length", "0.5", "--out", str(out)]
+    answer_of(asked)
+    with out.open() as stream:
+        rows = list(csv.DictReader(stream))
+    for row, length in zip(rows, (pp.Estimate(0.613, 0.001, "m"), 0.5), strict=True):
+        g = pp.fit(row["file"], length_m=length)["g"]
+        assert (float(row["g_m_per_s2"]), float(row["g_sd_m_per_s2"])) == (g.value, g.sd)
+    for content, said in (
+        ("other.csv,0.6\n", "line 1: no FILE is called 'other.csv'"),
+        (f"file,m\n{own},long\n", "line 2: 'long'"),
+    ):
+        table.write_text(content)
+        assert said in answer_of(asked, 2).err
+
+
+def test_a_file_says_what_follows_from_it(tmp_path: Path, answer_of: Any) -> None:
+    time_s = np.arange(0, 40, 0.05)
+    for unit, said in (
+        ("m", "with --length angle, T0 and g"),
+        ("rad/s", "the angle by the motion"),
+        ("m/s^2", "no angle"),
+        ("deg", "T0, the period of small swings"),
+    ):
+        swing = np.exp(-0.01 * time_s) * np.cos(5 * time_s)
+        file = tmp_path / "swing.csv"
+        table = np.column_stack([time_s, swing])
+        np.savetxt(file, table, delimiter=",", header=f"t (s),swing ({unit})", comments="")
+        (line,) = [
+            each for each in answer_of(["inspect", str(file)]).out.splitlines() if "gives" in each
+        ]
+        assert said in line
+        # The header as it stands is a name.
+        answer_of(["inspect", str(file), "--column", f"swing ({unit})"])
 
 
 def test_q_is_one_number_in_text_json_table_and_python(answer_of: Any) -> None:

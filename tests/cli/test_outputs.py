@@ -49,11 +49,12 @@ COMMANDS: dict[str, list[str]] = {
     "page": ["page", "{recording}", "--no-diagnosis", "--out", "{out}"],
     "refused": ["fit", "{recording}", "--out", "{other}", "--refused", "{out}"],
     "simulate": ["simulate", "{model}", "{out}"],
+    "simulate by option": ["simulate", "{model}", "--out", "{out}"],
     "calibrate": ["calibrate", "{table}", "--out", "{out}"],
 }
 """Commands with an output, each with its own input."""
 FORM = {"page": "mine.html"}
-INPUT = {"simulate": "model", "calibrate": "table"}
+INPUT = {"simulate": "model", "simulate by option": "model", "calibrate": "table"}
 
 
 @pytest.fixture

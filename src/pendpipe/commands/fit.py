@@ -12,11 +12,13 @@ red: the law contradicts the decay; then Q and the period of the turning points 
 and the exit status is 2 unless --accept is given. Of several FILEs it is 2 if none could be fitted.
 """
 
+import csv
+from argparse import ArgumentTypeError
 from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from pendpipe import api
 from pendpipe.analysis.fit.fixed import parse_fixed
@@ -29,11 +31,12 @@ from pendpipe.analysis.turning_points import (
 )
 from pendpipe.answer import WIDTH
 from pendpipe.arguments import FILES, Arguments, command, name_of, print_answer, read_motion, tell
-from pendpipe.errors import InputError, refuse_if
+from pendpipe.errors import InputError, nearest, refuse_if
 from pendpipe.estimate import over
 from pendpipe.files import is_stream, read_json, write_json
 from pendpipe.options import (
     ALTERNATIVES,
+    INPUT,
     NATURAL,
     OUTPUT,
     flags,
@@ -52,7 +55,13 @@ OPTIONS: Final = (
             "metavar": "HZ",
             "help": "frequency of small swings, Hz, instead of the period",
             "heading": ALTERNATIVES,
+        },
+        "--lengths": {
+            "type": Path,
+            "metavar": "CSV",
+            "help": "with several FILEs: a table of file and length in m, a row each",
         }
+        | INPUT,
     }
     | flags("--calibration")
 )
@@ -97,6 +106,7 @@ OPTIONS: Final = (
 )
 def run(arguments: Arguments) -> int:
     """Fit and print; write what is asked for."""
+    take_lengths(arguments)
     if arguments.out and arguments.record is None:
         form_of(arguments.out)
     if len(arguments.files) > 1:
@@ -143,6 +153,35 @@ def _stage(arguments: Arguments) -> None:
     )
 
 
+def take_lengths(arguments: Arguments) -> None:
+    """Read the table of lengths, in place of its path; a row is found by the file's name."""
+    path, arguments.lengths = arguments.lengths, {}
+    text = path.read_text("utf-8-sig") if path else ""
+    delimiter = max(",;\t", key=text.partition("\n")[0].count)
+    for number, row in enumerate(csv.reader(text.splitlines(), delimiter=delimiter), 1):
+        name, size = [cell.strip() for cell in (*row, "", "")][:2]
+        try:
+            length = measured_number(size)
+        except ArgumentTypeError as problem:
+            # Of the first row, or of an empty one, none is expected.
+            if number == 1 or not name:
+                continue
+            remedy = "give metres, as 0.600 or 0.600(1)"
+            raise InputError(f"{path}, line {number}", str(problem), remedy) from None
+        found = [file for file in arguments.files if name in (file, name_of(file))]
+        known = [name_of(file) for file in arguments.files]
+        missing = f"no FILE is called '{name}'"
+        refuse_if(
+            not found, f"{path}, line {number}", missing, nearest(name, known, "check the name")
+        )
+        arguments.lengths |= dict.fromkeys(found, length)
+
+
+def length_of(arguments: Arguments) -> Any:
+    """The length that is given for FILE, or for all."""
+    return (arguments.lengths or {}).get(arguments.file, arguments.length_m)
+
+
 def fitted(
     arguments: Arguments,
     say: Callable[[str], None] = tell,
@@ -156,6 +195,7 @@ def fitted(
     period, frequency = arguments.period, arguments.frequency
     options = given(arguments, api.fit) | {
         "fixed": fixed,
+        "length_m": length_of(arguments),
         "scale_percent": _scale_percent(arguments),
         "name": arguments.file,
         "period": over(1.0, frequency, "s") if frequency else period,

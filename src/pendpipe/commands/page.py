@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from pendpipe import api
 from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.arguments import FILES, Arguments, command, name_of, tell
-from pendpipe.commands.fit import OPTIONS, fitted
+from pendpipe.commands.fit import OPTIONS, fitted, length_of, take_lengths
 from pendpipe.errors import InputError, NotAnalysableError, refuse_if
 from pendpipe.options import OUTPUT
 from pendpipe.process import cores, in_order
@@ -47,6 +47,7 @@ def run(arguments: Arguments) -> int:
     from pendpipe.files import check_output, is_stream, write_whole
 
     out = arguments.out
+    take_lengths(arguments)
     refuse_if(
         out and not is_stream(out) and Path(out).suffix.lower() not in (".html", ".htm"),
         f"--out {out}",
@@ -81,7 +82,7 @@ def _sheet(arguments: Arguments, file: str) -> Sheet:
             outcome = api.diagnose(
                 recording,
                 restoring="sine" if arguments.gravity else arguments.restoring,
-                length_m=arguments.length_m,
+                length_m=length_of(arguments),
                 baseline=arguments.baseline,
                 fixed=parse_fixed(arguments.fixed, arguments.baseline),
                 name=file,

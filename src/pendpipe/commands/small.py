@@ -48,6 +48,16 @@ def inspect(arguments: Arguments) -> None:
     print_answer(arguments, found.as_json(), "\n".join(text))
 
 
+_GIVES: Final = {
+    "rad": "T0, the period of small swings, and Q by the angle",
+    "rad/s": "the angle by the motion, so T0, the period of small swings, and Q by the angle",
+    "m": "Q, and the period of these swings; with --length angle, T0 and g",
+    "m/s^2": "Q, and the period of these swings, longer than T0; no angle",
+    "V": "Q, and the period of these swings; with --volts-per-radian angle and T0",
+}
+"""What follows from readings in a unit; see `pendpipe.api.fit`."""
+
+
 def _lines(file: str, found: "Inspection") -> list[str]:
     """Print it in words, a fact a line; what is uncertain first."""
     from pendpipe.quantities import after_number
@@ -56,6 +66,7 @@ def _lines(file: str, found: "Inspection") -> list[str]:
     read = [
         ("read", f"{found.chosen}, in{after_number(found.unit) or ' no known unit'}"),
         ("hangs at", f"{found.level:.6g}{after_number(found.unit)}"),
+        ("gives", _GIVES.get(found.unit, "Q, and the period of these swings")),
     ]
     facts = [
         ("format", found.format),
@@ -113,10 +124,14 @@ def convert(arguments: Arguments) -> None:
     tell_written(arguments.out, f"{len(recording)} samples, {recording.quantity}")
 
 
+_SIMULATED: Final = {"metavar": "OUT.csv", "type": Path, "help": "the recording"} | OUTPUT
+
+
 @command(
     {
         "model": {"metavar": "MODEL.toml", "help": "what to simulate"} | INPUT,
-        "out": {"metavar": "OUT.csv", "type": Path, "help": "the recording, plain form"} | OUTPUT,
+        "out": _SIMULATED | {"nargs": "?"},
+        "--out": _SIMULATED | {"dest": "named", "help": "the same"},
     }
     | flags_of(simulated)
 )
@@ -129,9 +144,11 @@ def simulate(arguments: Arguments) -> None:
     """
     from pendpipe.recording import write_plain
 
+    out = arguments.named or arguments.out
+    refuse_if(out is None, "--out", "no file is named", "give --out OUT.csv")
     recording = simulated(arguments.model, **given(arguments, simulated))
-    write_plain(arguments.out, recording)
-    tell_written(arguments.out, f"{len(recording)} samples in {recording.unit}")
+    write_plain(out, recording)
+    tell_written(out, f"{len(recording)} samples in {recording.unit}")
 
 
 @command({"--list": {"action": "store_true", "help": "one line per effect"}} | flags("--json"))

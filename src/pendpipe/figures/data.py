@@ -199,8 +199,9 @@ class Decay:
         if len(turned.time_s) < 4:
             raise NothingToDrawError("the fitted law stops within two cycles")
         y = np.abs(turned.angle_rad)
-        time_s, quality = turned.time_s[1:-1], np.pi / np.log(y[:-2] / y[2:])
-        slope = (quality[1] - quality[0]) / (time_s[1] - time_s[0])
+        with np.errstate(divide="ignore", invalid="ignore"):  # no loss: Q is infinite
+            time_s, quality = turned.time_s[1:-1], np.pi / np.log(y[:-2] / y[2:])
+            slope = (quality[1] - quality[0]) / (time_s[1] - time_s[0])
         return (
             np.interp(elapsed_s, turned.time_s, y),
             np.interp(elapsed_s, [0.0, *time_s], [quality[0] - slope * time_s[0], *quality]),

@@ -17,7 +17,7 @@ from pendpipe.facts import Fact, How
 from pendpipe.formats.circle import on_a_circle, pivot_of
 from pendpipe.formats.lists import Listed, counts_samples, list_in, one_way
 from pendpipe.formats.table import Column, ReadOptions, Table, derivative_slope, evenness
-from pendpipe.formats.words import Role, Unit, counts_swings, plain, role_of, unit_of
+from pendpipe.formats.words import Role, Unit, counts_swings, plain, role_of, split_header, unit_of
 from pendpipe.readings import amplitudes_in, sizes_of
 
 _WORTH: Final[Mapping[Role, float]] = {
@@ -164,11 +164,15 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
 
 
 def find(table: Table, columns: Sequence[Column], key: str, numbers: Sequence[int] = ()) -> Column:
-    """Find a column by its name (in any case), or by its number: in the file, or as given."""
+    """Find a column by its name (in any case; its unit may follow), or by its number.
+
+    The number is that in the file, or as given.
+    """
     names = [f"{n} {c.label}" for n, c in zip(numbers, columns, strict=False)]
     numbers = numbers or [column.number for column in columns]
     called = [(name, c) for c in columns for name in (c.name, c.label, c.of)]
     alike = [c for form in (str, str.lower) for name, c in called if form(name) == form(key)]
+    alike += [c for c in columns if (c.name, c.unit) == split_header(key)]
     alike += [c for c, number in zip(columns, numbers, strict=True) if str(number) == key]
     known = listing(names or [column.label for column in columns])
     refuse_if(not alike, table.place, f"there is no column '{key}'", f"choose from: {known}")

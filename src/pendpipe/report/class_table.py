@@ -194,12 +194,16 @@ def _together(name: str, kept: Sequence[Estimate], of: int, *, mean: bool) -> To
 HEAD: Final = ("file", "light", "period", "Q", "at", "loses most by", "remark")
 WIDE: Final = ("a", "b", "c")
 _REMARK: Final = 60
-"""Characters of a remark, so that a row fits a page on its side."""
+"""Characters of a remark, so that a row fits a terminal."""
 
 
 def printed(fits: Sequence[Fitted], *, wide: bool = False, mean: bool = False) -> str:
     """Lay a class out, one line per file; then what the files say together."""
-    rows = [_row(each, wide=wide) for each in fits]
+    rows = [
+        (*cells, remark if each.fit is None or len(remark) <= _REMARK else f"{remark[:_REMARK]}…")
+        for each in fits
+        for *cells, remark in [_row(each, wide=wide)]
+    ]
     head = (*HEAD[:-1], *(WIDE if wide else ()), HEAD[-1])
     kept = sum(each.fit is not None and each.fit.light != "red" for each in fits)
     red = sum(each.fit is not None and each.fit.light == "red" for each in fits)
@@ -209,6 +213,7 @@ def printed(fits: Sequence[Fitted], *, wide: bool = False, mean: bool = False) -
 
 
 def _row(fitted: Fitted, *, wide: bool) -> tuple[str, ...]:
+    """The cells of one recording under `HEAD`, the remark whole."""
     fit, blank = fitted.fit, ("",) * (len(WIDE) if wide else 0)
     if fit is None:
         return (fitted.file, "refused", *[""] * 4, *blank, fitted.refusal)
@@ -227,7 +232,7 @@ def _row(fitted: Fitted, *, wide: bool) -> tuple[str, ...]:
         short_size(large.amplitude_rad, unit) if large else "",
         f"{percent(large.losses[loss])} {SHORT[loss]}" if large and loss else "",
         *rates,
-        remark if len(remark) <= _REMARK else f"{remark[: _REMARK - 1]}…",
+        remark,
     )
 
 
@@ -344,6 +349,7 @@ def _latex(fits: Sequence[Fitted]) -> str:
             *lines,
             r"\hline",
             r"\end{tabular}",
+            *(rf"\par {latex(str(each))}" for each in together(fits)),
             "",
         ]
     )
