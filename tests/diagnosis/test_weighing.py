@@ -1,12 +1,10 @@
 """Chances, scores, and the rivals that share the probability of an effect."""
 
 import functools
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
 from scipy.stats import binom, chi2, kstest
 
 from pendpipe.arrays import FloatArray
@@ -14,28 +12,22 @@ from pendpipe.diagnosis import blocks, weighing
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import (
     Bank,
-    Chance,
     Lead,
     Scanner,
-    Trials,
     build_bank,
     detect,
     draw_chance,
     prepare,
 )
-from pendpipe.diagnosis.found import Finding
-from pendpipe.diagnosis.hypothesis import Hypothesis, applicable
+from pendpipe.diagnosis.hypothesis import applicable
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.projection import local_p_values, scores_and_lengths, tangent_basis
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.diagnosis.result import Diagnosis
-from pendpipe.diagnosis.rivals import Rival, Scale, class_width, evidence, probabilities
+from pendpipe.diagnosis.rivals import class_width
 from pendpipe.diagnosis.run import diagnose_recording
-from pendpipe.diagnosis.weighing import fault_named, weigh
 from pendpipe.dynamics.eq8 import B
-from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
-from pendpipe.effects.curves import CURVES
 from pendpipe.effects.model import Model
 
 from .faults import Pendulum, fitted
@@ -63,11 +55,6 @@ def jumped() -> Diagnosis:
     """The equilibrium jumps; the estimate of the noise changes with the model."""
     model = Model(TIME_S, INTERVAL_S, (by_identifier("equilibrium-step"),))
     return diagnose_recording(recording(model.reading(np.append(TRUTH, [JUMP_RAD, INSTANT_S])), 3))
-
-
-def rival(effect: Effect, worth: float) -> Rival:
-    """An effect that gains so much, its scan not counted."""
-    return Rival(effect, null_fit()[0], worth, worth, worth)
 
 
 def test_a_jump_of_ten_times_the_noise_is_no_red_noise_and_has_no_rival() -> None:
@@ -106,67 +93,6 @@ def test_a_rival_is_compared_by_its_gain_with_the_final_noise(place: int) -> Non
     assert (one.identifier in {mate.identifier for mate in step.mates}) == within
 
 
-@pytest.mark.parametrize("loss", [1.0, 30.0, 3e4])
-@pytest.mark.structure
-def test_a_negative_gain_stays_negative(loss: float) -> None:
-    """Later, under a smaller noise, it must not be credited with what it had lost."""
-    fit, _, _ = null_fit()
-    effect = by_identifier("circular-error")
-    worth = evidence(effect, fit, -loss, Chance(Trials(1.0, 0.0), {}))
-    assert worth == pytest.approx(-loss)
-    later = Rival(effect, fit, -loss, -loss, worth).again(
-        fit, fit.chi2 - 0.5 * loss, Scale(fit.chi2)
-    )
-    assert later.evidence == pytest.approx(-0.5 * loss)
-
-
-@pytest.mark.parametrize("gain", [1e4, 1e5, 1e6])
-@pytest.mark.structure
-def test_a_prior_raises_no_effect_that_the_readings_reject(gain: float) -> None:
-    """Circular error has a higher prior than a cubic torque; but not if it is far behind."""
-    cubic = rival(by_identifier("cubic-stiffness"), gain)
-    near, far = (rival(by_identifier("circular-error"), gain - behind) for behind in (0.0, 101.0))
-    own, other, _ = probabilities([cubic, near], gain - 5.0)
-    assert other > 2.0 * own
-    own, other, _ = probabilities([cubic, far], gain - 5.0)
-    assert other <= own
-
-
-@pytest.mark.structure
-def test_a_pendulum_is_one_though_its_torque_is_off_by_less_than_a_hundredth() -> None:
-    """At a gain of 10^8 anything else that is small, an encoder's eccentricity say, weighs more."""
-    cubic = rival(by_identifier("cubic-stiffness"), 1e8)
-    near, far = (rival(by_identifier("circular-error"), 1e8 - behind) for behind in (5e3, 2e4))
-    own, other, _ = probabilities([cubic, near], 1e8 - 5.0)
-    assert other > 2.0 * own
-    own, other, _ = probabilities([cubic, far], 1e8 - 5.0)
-    assert other <= own
-
-
-@pytest.mark.structure
-def test_a_curve_that_fits_better_does_not_lower_a_name() -> None:
-    """A real law differs from the catalogue's form by more than that at a gain of 10^5."""
-    curve = rival(CURVES[0](null_fit()[0].at.span), 1e5)
-    name = rival(by_identifier("cubic-stiffness"), 1e5 - 101.0)
-    drawn, named, _ = probabilities([curve, name], 1e5 - 5.0)
-    assert named > drawn
-
-
-@pytest.mark.structure
-def test_each_of_several_names_is_less_certain_than_one() -> None:
-    """The same effect with the same gain, where one name, and where three, leave only noise."""
-    found = jumped().search
-    (step,) = found.steps
-    alone = weigh(found, step).weights
-    others = [
-        replace(step, rivals=(rival(by_identifier(name), 50.0),))
-        for name in ("impulse", "second-mode")
-    ]
-    # The comparison of one step does not look at what the others explain.
-    doubted = weigh(replace(found, steps=(step, *others)), step).weights
-    assert doubted[-1] / doubted[0] == pytest.approx(np.exp(2.2) * alone[-1] / alone[0], rel=1e-2)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("order", "off"), [(2.0, 0.3), (3.0, 0.02)])
 def test_a_line_near_a_harmonic_is_doubted_by_the_chance_that_it_is_so_near(
@@ -185,38 +111,6 @@ def test_a_line_near_a_harmonic_is_doubted_by_the_chance_that_it_is_so_near(
     by_chance = min(2.0 * off, 6.0 * (1.0 / 3.0 - off))
     named = 1.0 / (1.0 + np.exp(-2.5) / by_chance)
     assert effect.probability == pytest.approx(named, abs=0.02)
-
-
-def jumped_with(none: float) -> Hypothesis:
-    """The jump, where "none of these" has this probability."""
-    found = jumped().search
-    steps = tuple(replace(step, weights=(1.0 - none, none)) for step in found.steps)
-    return replace(found, steps=steps)
-
-
-@pytest.mark.parametrize("none", [0.0, 0.3, 0.9])
-@pytest.mark.parametrize("name", ["broadband-drive", "missing-codes"])
-@pytest.mark.structure
-def test_a_random_cause_is_no_more_probable_than_the_names_beside_it(
-    name: str, none: float
-) -> None:
-    """It takes what a wrong name leaves; what the codes show it does not touch."""
-    fault = Finding(name, 1e-7, delta_chi2=100.0)
-    beside, alone = (fault_named(jumped_with(p), fault).probability for p in (none, 0.0))
-    assert beside / alone == pytest.approx(1.0 - none if name == "broadband-drive" else 1.0)
-
-
-@pytest.mark.structure
-def test_a_random_torque_that_explains_no_more_than_a_smooth_misfit_is_not_confident() -> None:
-    """What a law lacks changes amplitude and phase too."""
-    found = jumped_with(0.0)
-    margins = (math.inf, 10.0, 0.0, -10.0)
-    findings = [Finding("broadband-drive", 1e-7, 100.0, margin=margin) for margin in margins]
-    chances = [fault_named(found, each).probability for each in findings]
-    assert chances == sorted(chances, reverse=True)
-    assert chances[1] > 0.98 * chances[0]
-    assert chances[2] < 0.5
-    assert chances[3] < 0.01
 
 
 @pytest.mark.slow
@@ -248,24 +142,6 @@ def bank_of(columns: FloatArray) -> Bank:
 def scanner_of(bank: Bank) -> Scanner:
     """A scan of it without tones."""
     return Scanner(bank, WHITE, NOTHING)
-
-
-@pytest.mark.parametrize("number", [1, 7, 100])
-@pytest.mark.structure
-def test_the_global_p_value_of_the_smallest_of_independent_ones_is_uniform(number: int) -> None:
-    smallest = np.random.default_rng(number).random((2000, number)).min(axis=1)
-    found = [Trials(float(number), 0.0).global_p_value(float(local)) for local in smallest]
-    assert kstest(found, "uniform").pvalue > 1e-3
-
-
-@given(st.floats(1e-300, 1.0), st.floats(1.0, 1e5), st.floats(0.0, 0.1))
-@pytest.mark.structure
-def test_looking_at_more_makes_nothing_rarer(local: float, trials: float, growth: float) -> None:
-    found = Trials(trials, growth).global_p_value(local)
-    assert local * (1.0 - 1e-9) <= found <= 1.0
-    assert found <= Trials(2.0 * trials, growth).global_p_value(local)
-    assert found <= Trials(trials, growth).global_p_value(min(2.0 * local, 1.0)) * (1.0 + 1e-9)
-    assert Trials(trials, growth).global_p_value(0.0) == 0.0
 
 
 @pytest.mark.parametrize("shapes", [3, 12, 48])
@@ -313,30 +189,6 @@ def test_false_alarms_of_the_whole_catalogue_are_as_frequent_as_the_p_value() ->
         below = int(np.count_nonzero(found < level))
         # The number of trials is itself drawn, to a tenth.
         assert binom.ppf(1e-3, count, 0.9 * level) <= below <= binom.isf(1e-3, count, 1.1 * level)
-
-
-@pytest.mark.parametrize("name", ["equilibrium-step", "offset-drift"])
-@pytest.mark.structure
-def test_a_gain_too_large_for_p_values_is_worth_as_much_more_as_it_is_larger(name: str) -> None:
-    """P-values underflow at a chi^2 of 1331; the rarer, the more trials are charged beyond it."""
-    fit, _, _ = null_fit()
-    chance = Chance(Trials(1.0, 0.0), {name: Trials(60.0, 0.5)})
-    effect = by_identifier(name)
-    below, above = (evidence(effect, fit, gain, chance) for gain in (1325.0, 1345.0))
-    assert above - below == pytest.approx(20.0, abs=0.3)
-
-
-@pytest.mark.structure
-def test_who_is_behind_stays_as_far_behind_whatever_else_was_left_at_first() -> None:
-    """Found while fifty times the noise was left, both are refitted where none of that is."""
-    fit, _, _ = null_fit()
-    effect = by_identifier("circular-error")
-    best, other = (Rival(effect, fit, gain, gain / 50.0, gain / 50.0 - 8.0) for gain in (9e5, 6e5))
-    scale = Scale(fit.chi2)
-    better = best.again(fit, fit.chi2 + 400.0, scale)
-    worse = other.again(fit, fit.chi2 + 350.0, scale)
-    assert better.evidence == pytest.approx(400.0 - 8.0)
-    assert better.evidence - worse.evidence == pytest.approx(50.0)
 
 
 # Scores: unit columns orthogonal to the derivatives by the baseline's parameters.
