@@ -263,9 +263,9 @@ class Recording:
 
 
 def _column(name: str, values: ArrayLike) -> FloatArray:
-    """Return readings as a one-dimensional array of numbers."""
+    """Return readings as a one-dimensional array of numbers, one beside the other."""
     try:
-        column = np.asarray(values, dtype=np.float64)
+        column = np.asarray(values, dtype=np.float64, order="C")
     except (TypeError, ValueError):
         raise InputError("Recording", f"{name} holds no numbers", "give numbers") from None
     refuse_if(
@@ -345,7 +345,7 @@ def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
     names = [name.strip() for name in lines[first].split(",")]
     quantity, picked = _columns(place, first + 1, names)
     table = _numbers(place, lines, first + 1, [*picked.values()], len(names))
-    column = dict(zip(picked, np.ascontiguousarray(table.T), strict=True))
+    column = dict(zip(picked, table.T, strict=True))
     quality = None
     if "quality" in column:
         # What is no quality becomes 255, which `check` refuses.

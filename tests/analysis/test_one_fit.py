@@ -77,6 +77,22 @@ def test_the_minimum_is_that_of_the_noise_that_was_found() -> None:
     assert abs(pull(result, "frequency", 1.0)) < 4.0
 
 
+@pytest.mark.parametrize(("size", "period_s", "quality"), [(0.05, 0.8, 60), (0.3, 2.1, 400)])
+def test_numbers_without_noise_are_fitted_as_exactly_as_motions_are_computed(
+    size: float, period_s: float, quality: float
+) -> None:
+    """In columns of one array, which do not stand one beside the other."""
+    time_s, omega = np.arange(4000) * 0.01, 2.0 * np.pi / period_s
+    rate = 0.5 * omega / quality
+    angle = size * np.exp(-rate * time_s) * np.cos(math.sqrt(omega**2 - rate**2) * time_s + 0.7)
+    columns = np.column_stack([time_s, angle])
+    fitted = pp.fit(pp.Recording(time_s=columns[:, 0], displacement_m=columns[:, 1]))
+    assert fitted.light == "green"
+    assert fitted.parameters["b"].value == pytest.approx(rate, rel=1e-9)
+    assert 1.0 / fitted.parameters["frequency"].value == pytest.approx(period_s, rel=1e-12)
+    assert fitted.parameters["frequency"].sd > 1e-16 / period_s
+
+
 def test_rounded_stamps_of_even_times_are_even() -> None:
     """Sixty readings a second, stamped with two decimals."""
     true = np.arange(3600) / 60.0

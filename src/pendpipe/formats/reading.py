@@ -276,8 +276,8 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
         said = f"{cut} reading(s) at the end of the sensor's range: its turns are cut off"
         facts.append(Fact("saturation", f"{cut} readings", "shown", said))
     recording = Recording(
-        time_s=np.ascontiguousarray(base.time_s),
-        values=np.ascontiguousarray(values),
+        time_s=base.time_s,
+        values=values,
         quantity=found.quantity,
         quality=quality if quality.any() else None,
         metadata=metadata,

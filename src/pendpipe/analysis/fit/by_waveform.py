@@ -53,6 +53,8 @@ _MOST: Final = 12
 """Minima at most until the noise is their own."""
 _OTHER: Final = 0.9
 """Of the noise that was weighed with: below, the minimum was not looked for closely enough."""
+_EXACT: Final = 1e-10
+"""Of the largest reading, as exactly as `dynamics` computes a motion: no less is taken as noise."""
 _DRIFTS: Final = 1e-4
 """Probability of the level's answers below which a straight drift of the zero is fitted."""
 _CLEAR_DRIFT: Final = 5.0
@@ -260,9 +262,10 @@ def _settled(found: Fitted, samples: Samples) -> Fitted:
         problem = found.problem
         if not math.isfinite(found.chi2):
             return found
-        if not found.noise_rms < _OTHER * problem.noise_rms:
+        noise = max(found.noise_rms, _EXACT * float(np.max(np.abs(problem.values))))
+        if not noise < _OTHER * problem.noise_rms:
             break
-        problem = replace(problem, noise_rms=found.noise_rms)
+        problem = replace(problem, noise_rms=noise)
         found = _fitted(problem, found.value, found.held, found.start)
     return _rounded(found, samples)
 
@@ -285,7 +288,7 @@ def _judged(fitted: Fitted, samples: Samples, points: TurningPoints) -> Goodness
         lines=lines,
         amplitude=points.amplitude_rad * problem.amplitude_scale(value),
         step=samples.step,
-        floor=1e-15 * largest,
+        floor=_EXACT * largest,
     )
 
 
