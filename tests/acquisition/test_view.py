@@ -46,11 +46,9 @@ class Recorder:
                 [sys.executable, "-c", code, *words, "--out", str(self.out)], stderr=stream
             )
         self.until(lambda: "http" in self.said.read_text())
-        self.address = re.findall(r"http://[\d.:]+/", self.said.read_text())[0]
+        self.address = re.findall(r"http://[\d.:]+/\S+/", self.said.read_text())[0]
         children = psutil.Process(self.process.pid).children(recursive=True)
-        (self.viewer,) = [
-            each for each in children if "pendpipe.acquisition.view" in each.cmdline()
-        ]
+        (self.viewer,) = [each for each in children if "--live" in each.cmdline()]
 
     def until(self, met: Callable[[], bool]) -> None:
         """Wait for what the recorder does; if it ends before, that is the answer."""
@@ -60,7 +58,7 @@ class Recorder:
 
     def data(self) -> dict[str, Any]:
         """What the page asks for."""
-        with urllib.request.urlopen(f"{self.address}data") as answer:
+        with urllib.request.urlopen(f"{self.address}live") as answer:
             return dict(json.load(answer))
 
     def kept(self) -> int:
@@ -82,9 +80,10 @@ def recorder(tmp_path: Path) -> Iterator[Recorder]:
 def test_nothing_that_happens_to_the_view_costs_a_scan(recorder: Recorder) -> None:
     """A browser that asks and takes no answer, a viewer that stands still, one that is killed."""
     recorder.until(lambda: recorder.data()["scans"] > 200)
-    port = int(recorder.address.rstrip("/").rpartition(":")[2])
+    host, token = recorder.address.removeprefix("http://").split("/")[:2]
+    port = int(host.partition(":")[2])
     with socket.create_connection(("127.0.0.1", port)) as deaf:
-        deaf.sendall(b"GET /data HTTP/1.0\r\nHost: 127.0.0.1:1\r\n\r\n" * 50)
+        deaf.sendall(f"GET /{token}/live HTTP/1.0\r\nHost: {host}\r\n\r\n".encode() * 50)
         for happens in (lambda: None, recorder.viewer.suspend, recorder.viewer.kill):
             happens()
             before = recorder.kept()
@@ -102,12 +101,17 @@ def test_the_page_is_for_this_machine_alone_and_ends_with_its_recorder(recorder:
     """A page of the web that resolves its name to 127.0.0.1 gets nothing."""
     with urllib.request.urlopen(recorder.address) as answer:
         assert b"The last minute" in answer.read()
-    for host, path in (("evil.example:80", "data"), ("127.0.0.1:1", "etc/passwd")):
+    own = recorder.address.split("/")[2]
+    for host, path, status in (
+        ("evil.example:80", "live", 403),
+        ("127.0.0.1:1", "live", 403),
+        (own, "etc/passwd", 404),
+    ):
         asked = urllib.request.Request(recorder.address + path, headers={"Host": host})
         with pytest.raises(urllib.error.HTTPError) as fault:
             urllib.request.urlopen(asked)
         fault.value.close()
-        assert fault.value.code == 404
+        assert fault.value.code == status
     os.kill(recorder.process.pid, signal.SIGKILL)
     recorder.process.wait()
     recorder.viewer.wait()

@@ -145,6 +145,26 @@ def test_axe_finds_nothing_and_a_phone_needs_not_scroll(chromium: Any, door: Doo
         assert tab.locator("#sheet .copy").is_visible()
 
 
+def test_a_recording_is_shown_while_it_is_made(chromium: Any, tmp_path: Path) -> None:
+    from axe_playwright_python.sync_playwright import Axe
+
+    from pendpipe.acquisition.recorder import acquire_simulated, example_signal
+
+    raw = tmp_path / "live.raw"
+    options = {"channels": (1,), "rate_hz": 110.0, "duration_s": 90.0, "raw_path": raw}
+    with Door(0, tmp_path, live=raw) as serving:
+        threading.Thread(target=serving.serve_forever, daemon=True).start()
+        with opened(chromium, serving, 390) as tab:
+            assert tab.locator("#now").inner_text() == "Nothing has come yet."
+            acquire_simulated("di2108", example_signal(1, 3.85), clock_scale=200.0, **options)
+            tab.locator("#now", has_text="of 1 min 30 s").wait_for()
+            assert len(tab.locator("#last path").last.get_attribute("d")) > 1000
+            found = Axe().run(tab, options={"preload": False})
+            assert found.violations_count == 0, found.generate_report()
+            assert tab.evaluate("() => document.documentElement.scrollWidth") <= 390
+        serving.end()
+
+
 def test_what_is_refused_is_said_with_its_reason(chromium: Any, door: Door, tmp_path: Path) -> None:
     (tmp_path / "<i>no.csv").write_text("nothing\n")
     with opened(chromium, door) as tab:

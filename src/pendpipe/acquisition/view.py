@@ -1,17 +1,14 @@
-"""A page that shows a recording while it is made: the last minute, the amplitude, the time left.
+"""What a page shows of a recording while it is made: the last minute, the amplitude, the time left.
 
-It is a process of its own that opens nothing but the raw file, and that for reading: closed, slow,
-stopped or killed, it can't keep the recorder from anything. It ends with the recorder, whose
-end of a pipe then closes, however the recorder ended.
+The page (`pendpipe open --live`) is a process of its own that opens nothing but the raw file, and
+that for reading: closed, slow, stopped or killed, it can't keep the recorder from anything. It ends
+with the recorder, whose end of a pipe then closes, however the recorder ended.
 """
 
-import json
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,7 +18,6 @@ from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.raw import RawReader
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
-from pendpipe.templates import render
 
 _LAST_S: Final = 60.0
 """Seconds that are shown as they came."""
@@ -37,7 +33,7 @@ _SHORTEST_STRETCH_S: Final = 5.0
 def shown(raw: Path) -> Iterator[None]:
     """Show a recording that is being made; its page's address goes to standard error."""
     viewer = subprocess.Popen(
-        [sys.executable, "-P", "-m", "pendpipe.acquisition.view", str(raw)],
+        [sys.executable, "-P", "-m", "pendpipe", "open", "--live", str(raw)],
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         start_new_session=True,  # Ctrl-C is the recorder's
@@ -115,45 +111,3 @@ def thinned(time_s: FloatArray, values: FloatArray) -> list[tuple[float, float]]
         index = sorted(set[int]().union(*keep))
         time_s, values = time_s[index], values[index]
     return list(zip(time_s.tolist(), values.tolist(), strict=True))
-
-
-class _Handler(BaseHTTPRequestHandler):
-    shown: Shown
-    page: bytes
-    lock = threading.Lock()
-
-    def do_GET(self) -> None:
-        """Answer a browser of this machine."""
-        host = self.headers.get("Host", "").rpartition(":")[0]
-        if host not in ("127.0.0.1", "localhost") or self.path not in ("/", "/data"):
-            self.send_error(404)
-            return
-        kind, content = "text/html; charset=utf-8", self.page
-        if self.path == "/data":
-            with self.lock:
-                kind, content = "application/json", json.dumps(self.shown.state()).encode()
-        self.send_response(200)
-        self.send_header("Content-Type", kind)
-        self.send_header("Cache-Control", "no-store")
-        self.end_headers()
-        self.wfile.write(content)
-
-    def log_message(self, *_: Any) -> None:
-        """Say nothing: the terminal is the recorder's."""
-
-
-def main(raw: str) -> None:
-    """Serve the page of a raw file until standard input ends."""
-    _Handler.shown = Shown(Path(raw))
-    _Handler.page = render("pendpipe.acquisition", "view.html", file=Path(raw).name).encode()
-    with ThreadingHTTPServer(("127.0.0.1", 0), _Handler) as server:
-        server.daemon_threads = True
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        address = f"http://127.0.0.1:{server.server_address[1]}/"
-        print(f"pendpipe: the recording is shown at {address}", file=sys.stderr, flush=True)
-        sys.stdin.read()
-        server.shutdown()
-
-
-if __name__ == "__main__":
-    main(sys.argv[1])

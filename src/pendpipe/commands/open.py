@@ -26,6 +26,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 from urllib.parse import unquote
 
+from pendpipe.acquisition.view import Shown, thinned
 from pendpipe.arguments import Arguments, command, tell
 from pendpipe.commands.main import parse
 from pendpipe.commands.page import Sheet, sheet_of
@@ -61,6 +62,12 @@ _HEADERS: Final = {
             "default": 0,
             "help": "port of the page (0: any that is free)",
         },
+        "--live": {
+            "type": Path,
+            "metavar": "RAW",
+            "help": "also show a recording that is made to this raw file; the page ends with"
+            " standard input (acquire --view)",
+        },
     }
 )
 def run(arguments: Arguments) -> None:
@@ -71,18 +78,26 @@ def run(arguments: Arguments) -> None:
         signal.signal(number, lambda *_: stop.set())
     with TemporaryDirectory(prefix="pendpipe-") as folder:
         try:
-            door = Door(arguments.port, Path(folder), arguments.files)
+            door = Door(arguments.port, Path(folder), arguments.files, arguments.live)
         except (OSError, OverflowError) as fault:
             raise InputError(
                 f"--port {arguments.port}", f"it can't be used ({fault})", "leave it out"
             ) from None
         with door:
             threading.Thread(target=door.serve_forever, daemon=True).start()
+            if arguments.live:
+                threading.Thread(target=_until_input_ends, args=(stop,), daemon=True).start()
             tell(f"pendpipe: {door.address} (this machine alone; Ctrl-C ends it)")
             if sys.stderr.isatty() and (os.name == "nt" or _has_screen()):
                 webbrowser.open(door.address)
             stop.wait()
             door.end()
+
+
+def _until_input_ends(stop: threading.Event) -> None:
+    """End with the recorder, however it ends."""
+    os.read(0, 1)
+    stop.set()
 
 
 def _has_screen() -> bool:
@@ -102,7 +117,6 @@ class Answer(NamedTuple):
 
 def answer_to(words: Sequence[str], file: str) -> Answer:
     """Analyse a file as ``pendpipe page WORDS FILE`` does."""
-    from pendpipe.acquisition.view import thinned
     from pendpipe.reading import inspect, read
 
     with redirect_stderr(io.StringIO()) as said:
@@ -159,11 +173,15 @@ class Door(ThreadingHTTPServer):
         For copies of what is dropped.
     files
         Recordings to begin with.
+    live
+        A raw file that grows, to be shown as well. It is opened for reading alone.
     """
 
     daemon_threads = True
 
-    def __init__(self, port: int, folder: Path, files: Sequence[str] = ()) -> None:
+    def __init__(
+        self, port: int, folder: Path, files: Sequence[str] = (), live: Path | None = None
+    ) -> None:
         super().__init__(("127.0.0.1", port), _Handler)
         self.host = f"127.0.0.1:{self.server_port}"
         self.token = secrets.token_urlsafe(16)
@@ -173,12 +191,13 @@ class Door(ThreadingHTTPServer):
             number: (None, file) for number, file in enumerate(files, 1)
         }
         self._answers: dict[int, tuple[dict[str, str], Answer]] = {}
+        self._live, self._shown = live, Shown(live) if live else None
         self._places = threading.BoundedSemaphore(cores())
         self._lock, self._ended, self._running = threading.Lock(), False, set[Any]()
         forks = "forkserver" in multiprocessing.get_all_start_methods()
         self._processes: Any = multiprocessing.get_context("forkserver" if forks else "spawn")
         self._processes.set_forkserver_preload(["pendpipe.commands.open", *_USED])
-        if forks:  # else each of them imports for itself
+        if forks and not live:  # the recorder comes first
             importlib.import_module("multiprocessing.forkserver").ensure_running()
 
     def handle_error(self, *given: Any) -> None:
@@ -201,7 +220,10 @@ class Door(ThreadingHTTPServer):
             posts = {"files": self._take, "read": self._read, "forget": self._forget}
             return _json(posts[what](which, body))
         if what == "" and not which:
-            return _html(_page())
+            return _html(_page(self._live))
+        if what == "live" and self._shown:
+            with self._lock:
+                return _json(self._shown.state())
         if what == "files":
             return _json(list(self._files))
         if what == "sheet":
@@ -358,11 +380,12 @@ def _words(options: Mapping[str, str]) -> list[str]:
     return words if options.get("diagnosis") else ["--no-diagnosis", *words]
 
 
-def _page() -> str:
+def _page(live: Path | None) -> str:
     from pendpipe.report import own_files
     from pendpipe.templates import render
 
-    return render("pendpipe.report", "open.html", largest=_LARGEST, **own_files("open.js"))
+    shown = {"largest": _LARGEST, "live": live and live.name}
+    return render("pendpipe.report", "open.html", **shown, **own_files("open.js"))
 
 
 def _html(text: str) -> tuple[str, bytes]:

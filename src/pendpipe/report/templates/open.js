@@ -199,6 +199,23 @@ for (const kind of ["dragover", "dragleave", "drop"]) {
   });
 }
 
+const clock = (s) => `${Math.floor(s / 60)} min ${String(Math.floor(s % 60)).padStart(2, "0")} s`;
+const watch = async () => {
+  const asked = Date.now();
+  let d;
+  try { d = await (await fetch("live")).json(); } catch { $("now").textContent += " The recorder has ended, or its view has."; return; }
+  if (d.scans) {
+    const values = d.last.map((p) => p[1]), low = Math.min(...values), high = Math.max(...values), left = Math.max(0, d.duration_s - d.elapsed_s);
+    $("now").textContent = `${d.model}: ${clock(d.elapsed_s)} of ${clock(d.duration_s)}, ${clock(left)} left; ${d.scans} scans, ${d.lost} lost, ${(d.bytes / 1e6).toFixed(2)} MB`
+      + (d.reason ? `; ${d.reason}` : "");
+    $("done").value = Math.min(1, d.elapsed_s / d.duration_s);
+    if (values.length) draw($("last"), d.last, low, high, Math.max(0, d.elapsed_s - 60), Math.max(60, d.elapsed_s));
+    if (d.amplitude.length) draw($("amplitude"), d.amplitude, 0, 1.05 * Math.max(1e-9, ...d.amplitude.map((p) => p[1])), 0, d.duration_s);
+  }
+  setTimeout(watch, Math.max(1000, 9 * (Date.now() - asked)));
+};
+if ($("live")) watch();
+
 (async () => {
   const numbers = await (await fetch("files")).json();
   if (!numbers.length) return;
