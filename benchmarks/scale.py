@@ -85,7 +85,8 @@ def cost(folder: Path, *words: str, command: str = "campaign") -> Cost:
     done = subprocess.run(
         [sys.executable, "-c", code, sys.executable, "-m", "pendpipe", command, *words],
         cwd=folder,
-        env=os.environ | {"PYTHONPATH": str(ROOT / "src")},
+        # Compiled modules are kept, as they are where users run them.
+        env=os.environ | {"PYTHONPATH": str(ROOT / "src"), "PYTHONDONTWRITEBYTECODE": ""},
         capture_output=True,
         text=True,
         check=False,

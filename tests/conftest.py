@@ -17,6 +17,10 @@ from hypothesis import settings
 # Snakemake's plugin for Slurm asks the cluster as it is imported, and waits ten seconds for one
 # that is down; with no configuration it asks none.
 os.environ["SLURM_CONF"] = os.devnull
+# Here and in what tests start compiled modules are kept, as they are where users run them: without,
+# tests take twice as long to be found, and each of some 200 processes half as long again to begin.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 settings.register_profile("untimed", deadline=None)
 settings.register_profile("same", settings.get_profile("untimed"), derandomize=True)
 settings.load_profile("same")
