@@ -290,23 +290,25 @@ def named_by(table: Table) -> str:
 
 
 def by_group(asked: Sequence[Asked]) -> list[tuple[str, ...]]:
-    """Return the means of each group: observed, calculated then, and by each case; heads first."""
+    """Return means of each group, heads first: observed, then, by each case, with what it found."""
     whole = max((one.table for one in asked), key=lambda table: len(table.runs))
-    cases = [(one.table, one.told) for one in asked]
-    numbers = [(whole, whole.column("value")), (whole, whole.column("then")), *cases]
+    columns = [("observed", whole, whole.column("value")), ("then", whole, whole.column("then"))]
+    for one in asked:
+        columns.append((one.case.title, one.table, one.told))
+        columns += [("found", one.table, one.best)] if one.found.found else []
     what = named_by(whole)
-    heads = (what.replace("record", "row"), "rows", "quantity", "observed", "then")
-    rows = [(*heads, *(one.case.title for one in asked))]
+    rows = [
+        ("row" if what == "record" else what, "rows", "quantity", *(head for head, _, _ in columns))
+    ]
     for name, quantity in dict.fromkeys((getattr(row, what), row.quantity) for row in whole.runs):
-        means, count = [], 0
-        for table, each in numbers:
-            own = (table.of(what, name) * table.of("quantity", quantity)) > 0.0
-            mean = each[own].mean() if own.any() else math.nan
-            count = count or int(own.sum())
+        means, form = [], QUANTITIES[quantity].form
+        for _, table, each in columns:
+            own = each[table.of(what, name) * table.of("quantity", quantity) > 0.0]
             # An exponential decay has 0 in the middle but for rounding.
-            form, exact = QUANTITIES[quantity].form, round(mean, 12) or 0.0
-            means.append("" if math.isnan(mean) else format(exact, form))
-        rows.append((name, f"{count}", quantity, *means))
+            mean = round(float(own.mean()), 12) or 0.0 if own.size else math.nan
+            means.append("" if math.isnan(mean) else format(mean, form))
+        count = whole.of(what, name) @ whole.of("quantity", quantity)
+        rows.append((name, f"{count:.0f}", quantity, *means))
     # Neither an empty column nor one of ones says anything.
     shown = [{*column[1:]} not in ({""}, {"1"}) for column in zip(*rows, strict=True)]
     return [tuple(cell for cell, show in zip(row, shown, strict=True) if show) for row in rows]
