@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import pendpipe as pp
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, machine_code
 from pendpipe.dynamics.kernel import Kernel, Matrix, _tell, folders, kernel, shipped
@@ -25,6 +26,8 @@ from pendpipe.dynamics.layout import (
 )
 from pendpipe.dynamics.march import march
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
+FILES = [str(EXAMPLES / f"{name}-pendulum.csv") for name in ("rod", "string")]
 FIRST_CALL = """
 import sys
 from pendpipe.dynamics import Eq8, Release, turning_points
@@ -294,3 +297,24 @@ def test_the_engine_writes_only_where_it_may(directions: int, samples: int, end_
     for array in guarded:
         np.testing.assert_array_equal(array[:guard], np.pi)
         np.testing.assert_array_equal(array[-guard:], np.pi)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hidden", ["numba llvmlite", "numba"])
+def test_without_a_compiler_a_fit_prints_the_same_digits(hidden: str, tmp_path: Path) -> None:
+    """The engine runs as plain Python where neither is, or where no code is kept for this one."""
+    code = (
+        f"import sys; sys.modules.update(dict.fromkeys({hidden.split()!r}))\n"
+        "import pendpipe as pp; from pendpipe.dynamics import kernel\n"
+        "kernel.SHIPPED = kernel.Path('none')\n"
+        f"print(*map(pp.fit, {FILES!r}), sep='\\n')"
+    )
+    found = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code],
+        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert found.stdout == "".join(f"{pp.fit(file)}\n" for file in FILES)
+    assert list(tmp_path.iterdir()) == [], "nothing is compiled"

@@ -11,17 +11,20 @@ import contextlib
 import ctypes
 import functools
 import hashlib
+import math
 import os
 import sys
 from collections.abc import Callable, Iterator
 from functools import cached_property
+from importlib.util import find_spec
 from pathlib import Path
+from types import FunctionType, SimpleNamespace
 from typing import Any, Final, TypeAlias, TypeVar, cast
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray
-from pendpipe.dynamics.layout import KINDS, WORD, Kind
+from pendpipe.dynamics.layout import KINDS, WORD, WORK, Kind
 
 _F = TypeVar("_F", bound="Callable[..., Any]")
 
@@ -64,7 +67,9 @@ class Kernel:
         functools.update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
-        """Run the machine code."""
+        """Run the machine code, or where none can be had the function as it stands."""
+        if self.machine_code is None:
+            return self._without_machine_code(*arguments)
         words: list[Any] = []
         for argument, (item, axes, own) in zip(arguments, self.kinds, strict=True):
             if item is None:
@@ -86,6 +91,33 @@ class Kernel:
         noted = self.function.__annotations__
         return [KINDS[kind] for name, kind in noted.items() if name != "return"]
 
+    def _without_machine_code(self, *arguments: Any) -> Any:
+        """Run the plain function, the fields of a workspace as attributes."""
+        record, given = None, arguments
+        if "Work" in self.function.__annotations__.values():  # it comes first
+            record = arguments[0].view(WORK)[0]
+            fields = SimpleNamespace(**{name: record[name] for name in WORK.names or ()})
+            given = fields, *arguments[1:]
+        with np.errstate(all="ignore"):
+            result = self.plain(*given)
+        if record is not None:
+            for name, value in vars(fields).items():  # of arrays these are views
+                record[name] = value
+        return result
+
+    @cached_property
+    def plain(self) -> Callable[..., Any]:
+        """The function for Python, where log(-1) is nan as in machine code, and no fault."""
+        function = self.function
+        as_in_c = {name: getattr(np, name) for name in dir(math) if hasattr(np, name)}
+        as_in_c |= {"floor": math.floor, "ceil": math.ceil}  # whole numbers
+        own = function.__globals__ | {"math": SimpleNamespace(**as_in_c)}
+        made = FunctionType(function.__code__, own, None, function.__defaults__)
+        for name in function.__code__.co_names:
+            if isinstance(called := own.get(name), Kernel):
+                own[name] = made if called is self else called.plain
+        return made
+
     @cached_property
     def returns(self) -> Kind:
         """The kind of what is returned."""
@@ -105,7 +137,12 @@ class Kernel:
 
     @cached_property
     def machine_code(self) -> Any:
-        """The kept or newly compiled code, as a function of addresses and numbers."""
+        """The kept or newly compiled code, as a function of addresses and numbers.
+
+        None without llvmlite, or without Numba where nothing is kept.
+        """
+        if find_spec("llvmlite") is None:
+            return None
         # It brings llvmlite, which who calls nothing compiled can do without.
         from pendpipe.dynamics import machine_code
 
@@ -117,6 +154,8 @@ class Kernel:
             if loaded is not None:
                 break
         else:
+            if find_spec("numba") is None:
+                return None
             loaded = self._compiled(name)
         found, self._owner = loaded
         return ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, *words)(found)
