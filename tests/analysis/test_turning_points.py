@@ -422,6 +422,16 @@ def exact_errors(points: TurningPoints, rate: float) -> tuple[FloatArray, FloatA
     return points.angle_rad - angle, points.time_s - turning
 
 
+def test_fast_swings_before_a_decay_do_not_end_it() -> None:
+    """As bursts of noise are: most half cycles hang together behind them."""
+    time_s = np.arange(3000) / 50.0
+    slow = 0.5 * np.exp(-time_s / 60.0) * np.cos(2.0 * np.pi * (time_s - 1.0) / 0.8)
+    angle = np.where(time_s < 1.0, 0.5 * np.cos(2.0 * np.pi * time_s / 0.125), slow)
+    points = find_turning_points(Recording(time_s=time_s, angle_rad=angle))
+    assert len(points) > 140
+    assert np.median(np.diff(points.time_s)) == pytest.approx(0.4, rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("quality", "half_cycles"),
     [(5000.0, 3000), (1000.0, 2600)],

@@ -96,18 +96,15 @@ def numbered(samples: Samples) -> tuple[Rough, int]:
         time, value, side = time[whole], value[whole], side[whole]
     if len(time) < LEAST_HALF_CYCLES:
         return Rough(np.arange(len(time)), time, side, float(np.median(piece))), stride
-    begin = 0
-    while True:
+    # A beat may begin at a node, and noise in bursts tear half cycles apart: most hang together.
+    number, begin, cut = np.zeros(len(time), dtype=np.int64), 0, slice(0, 0)
+    while len(time) - begin >= LEAST_HALF_CYCLES:
         rest = slice(begin, None)
-        usual = float(np.median(np.diff(time[rest][:6])))
-        number = np.zeros(len(time) - begin, dtype=np.int64)
-        count = count_half_cycles(time[rest], side[rest], gap_before[rest], usual, number)
-        if count >= LEAST_HALF_CYCLES or len(time) - begin - count < LEAST_HALF_CYCLES:
-            break
-        # A beat may begin at a node, where a half cycle or two hang together with nothing.
+        usual = float(np.median(np.diff(time[begin : begin + 6])))
+        count = count_half_cycles(time[rest], side[rest], gap_before[rest], usual, number[rest])
+        cut = max(cut, slice(begin, begin + count), key=lambda part: part.stop - part.start)
         begin += count
-    cut = slice(begin, begin + count)
-    return Rough(number[:count], time[cut], side[cut], _level(value[cut])), stride
+    return Rough(number[cut], time[cut], side[cut], _level(value[cut])), stride
 
 
 def _beside_gaps(time: FloatArray, index: IntArray) -> tuple[np.ndarray, IntArray]:
