@@ -432,6 +432,7 @@ def test_fast_swings_before_a_decay_do_not_end_it() -> None:
     assert np.median(np.diff(points.time_s)) == pytest.approx(0.4, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("quality", "half_cycles"),
     [(5000.0, 3000), (1000.0, 2600)],

@@ -22,6 +22,7 @@ from pendpipe_challenge.score import CONFIDENT, Solved, questions
 # A folder grows where its row says why, and the ways to one thing are those that stand there.
 
 
+@pytest.mark.slow
 def test_a_folder_keeps_its_budget_of_statements_or_its_row_says_why_it_was_raised() -> None:
     sizes, table = house.by_folder(ROOT), {row["folder"]: row for row in house.rows("budgets.tsv")}
     assert sizes.keys() == table.keys()

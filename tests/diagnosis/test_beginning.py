@@ -52,6 +52,7 @@ def swinging(restoring: Restoring) -> FloatArray:
     return sample(law, Release(start_s, angle, offset), TIME_S)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_begins_with_the_fit_that_is_printed() -> None:
     record = recording(swinging("sine"), 4)
     points, part = measure_recording(record, "the test")
