@@ -197,6 +197,26 @@ def test_the_strength_of_a_tone_may_swing(tmp_path: Path) -> None:
     assert any("a tone whose strength swings" in note for note in recording.notes)
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "library"),
+    [
+        ("a.xls", OLE + b"\0" * 600, "xlrd"),
+        ("a.tdms", b"TDSm" + b"\0" * 600, "nptdms"),
+        ("a.h5", b"\x89HDF\r\n\x1a\n" + b"\0" * 600, "h5py"),
+    ],
+)
+def test_a_file_whose_library_is_missing_is_refused_with_what_installs_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, content: bytes, library: str
+) -> None:
+    """It is told from a damaged one."""
+    for part in [each for each in sys.modules if each.partition(".")[0] == library]:
+        monkeypatch.delitem(sys.modules, part)
+    monkeypatch.setitem(sys.modules, library, None)
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=r"is not installed; pip install 'pendpipe\[formats\]'"):
+        read(tmp_path / name)
+
+
 CELL = "<table:table-cell office:value='1234567.5' table:number-columns-repeated='64'/>"
 
 

@@ -199,6 +199,12 @@ def table_of(place: Path, data: bytes, options: ReadOptions) -> Table:
             reason = fault
         except InputError:
             raise
+        except ImportError:
+            raise InputError(
+                place,
+                f"what reads the {dialect.name} is not installed",
+                "pip install 'pendpipe[formats]', or export CSV",
+            ) from None
         except Exception as fault:
             said = " ".join(str(fault).split())[:200]
             raise InputError(
