@@ -45,7 +45,7 @@ what bends the model by e standard deviations makes it differ by about 2 e."""
 _SLOW: Final = 12.5
 """Tolerances: a search ends after three rounds that gain less."""
 _FAR_OFF: Final = 50.0
-"""Tolerances from which a step is worth several tries."""
+"""Tolerances below which a step that gained less than one is the last."""
 _LAST_STEPS: Final = 3
 """Last steps from which the gain of further ones is extrapolated."""
 _TRIES: Final = 6
@@ -124,9 +124,7 @@ class Linear(NamedTuple):
         floor, ceiling = room.lower[self.free] * self.scale, room.upper[self.free] * self.scale
         best, damping = self._damped(radius)
         if np.any(best < floor) or np.any(best > ceiling):
-            matrix = np.vstack([self.triangle, math.sqrt(damping) * np.eye(len(best))])
-            right = np.append(self.right, np.zeros(len(best)))
-            best = bounded_least_squares(matrix, right, floor, ceiling)
+            best = self._within(floor, ceiling, radius, damping)
         step[self.free] = best / self.scale
         return room.clip(step), float(np.linalg.norm(best))
 
@@ -142,6 +140,35 @@ class Linear(NamedTuple):
         pull, squares = (singular * (left.T @ self.right))[seen], singular[seen] ** 2
         damping = damping_for(pull, squares, radius)
         return turned[seen].T @ (pull / (squares + damping)), damping
+
+    def _within(
+        self, floor: FloatArray, ceiling: FloatArray, radius: float, damping: float
+    ) -> FloatArray:
+        """The best step within bounds, of a length.
+
+        What meets a bound no longer makes up for the others, whose steps may be longer then than
+        without bounds: they take a damping of their own.
+        """
+        nothing = np.zeros(len(floor))
+        while True:
+            matrix = np.vstack([self.triangle, math.sqrt(damping) * np.eye(len(floor))])
+            right = np.append(self.right, nothing)
+            best = bounded_least_squares(matrix, right, floor, ceiling)
+            if float(np.linalg.norm(best)) <= (1.0 + 2.0 * _RADIUS_MET) * radius:
+                return best
+            inside = (best > floor) & (best < ceiling)
+            left = radius**2 - float(best[~inside] @ best[~inside])
+            # What is held at its bounds is longer by itself: it has to come off them.
+            more = _LONGER * max(damping, _LEAST_DAMPING)
+            if left > 0.0:
+                rest = self.right - self.triangle[:, ~inside] @ best[~inside]
+                axes, singular, _ = np.linalg.svd(self.triangle[:, inside], full_matrices=False)
+                seen = singular > _PRECISE * np.max(singular, initial=0.0)
+                pull, squares = (singular * (axes.T @ rest))[seen], singular[seen] ** 2
+                more = max(
+                    damping_for(pull, squares, math.sqrt(left)), (1.0 + _RADIUS_MET) * damping
+                )
+            damping = more
 
 
 def damping_for(pull: FloatArray, squares: FloatArray, radius: float) -> float:
@@ -587,7 +614,7 @@ class Search(Generic[AnyPoint]):
             if gained > -0.5 * self._tolerance:
                 break
             tries += 1
-            if tries > (_TRIES if expected > _FAR_OFF * enough else 1) or expected < enough:
+            if tries > _TRIES or expected < enough:
                 self._ended, self.converged = True, expected < 10.0 * enough
                 return
         assert there is not None

@@ -26,6 +26,7 @@ from pendpipe.solve import (
     damping_for,
     intervals95,
     minimise,
+    of_normal,
     squares,
 )
 
@@ -287,6 +288,24 @@ def test_least_squares_within_bounds(count: int, seed: int) -> None:
     assert np.all((found >= floor) & (found <= ceiling))
     cost, least = (float(np.sum((matrix @ x - right) ** 2)) for x in (found, best))
     assert cost == pytest.approx(least, rel=1e-5, abs=1e-6)
+
+
+@given(st.integers(2, 9), st.integers(0, 2**32 - 1), st.floats(1e-3, 1.0))
+def test_a_step_within_bounds_is_no_longer_than_the_radius(
+    count: int, seed: int, shorter: float
+) -> None:
+    """What a bound stops no longer makes up for the others, which may be long by themselves."""
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(count, count)) * 10.0 ** rng.uniform(-4.0, 0.0, count)
+    normal, gradient = root.T @ root, root.T @ rng.normal(size=count)
+    problem, room = of_normal(normal, gradient), rng.exponential(size=count)
+    room[0] *= 1e-3
+    bounds = Bounds(-room, room)
+    whole, length = problem.step(bounds)
+    step, limited = problem.step(bounds, shorter * length)
+    assert np.all(np.abs(step) <= room)
+    assert limited <= (1.0 + 0.02 + 1e-9) * shorter * length
+    assert 0.0 <= problem.falls(step) <= (1.0 + 1e-6) * problem.falls(whole) + 1e-9
 
 
 def test_far_from_bounds_the_interval_is_symmetric() -> None:
