@@ -533,7 +533,7 @@ def _last_digit(time: FloatArray) -> FloatArray:
 
 
 def _frames(time: FloatArray, digit: FloatArray, index: FloatArray) -> FloatArray | None:
-    """Count the frames from the first row to each, those missing as the stamps make likeliest.
+    """Count the frames from the first row to each, those missing as the stamps make most probable.
 
     Each row is at least one frame after the row above, as many as bring it within its stamp, and at
     least as many after the first as `index` says; a line through the stamps so counted improves
