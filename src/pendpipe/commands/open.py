@@ -143,13 +143,13 @@ def _refused(file: str, reason: str) -> Answer:
     return Answer(Sheet(Fitted(file, None, reason), ""))
 
 
-def _work(pipe: Any, folder: Path | None, words: Sequence[str], file: str) -> None:
+def _work(pipe: Any, memory: int, folder: Path | None, words: Sequence[str], file: str) -> None:
     """Answer through a pipe, in a process of its own."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the door ends it
     with suppress(ImportError):
         import resource
 
-        resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
+        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     import pendpipe.figures.decays
     import pendpipe.report.page  # noqa: F401
 
@@ -159,7 +159,7 @@ def _work(pipe: Any, folder: Path | None, words: Sequence[str], file: str) -> No
     try:
         pipe.send(answer_to(words, file))
     except MemoryError:
-        pipe.send(_refused(file, f"it takes more than {_MEMORY >> 30} GB; give a part of it"))
+        pipe.send(_refused(file, f"it takes more than {memory >> 30} GB; give a part of it"))
 
 
 class Door(ThreadingHTTPServer):
@@ -282,7 +282,7 @@ class Door(ThreadingHTTPServer):
         """Let a process of its own answer, within its limits."""
         with self._places:
             ours, theirs = self._processes.Pipe(duplex=False)
-            job = self._processes.Process(target=_work, args=(theirs, folder, words, file))
+            job = self._processes.Process(target=_work, args=(theirs, _MEMORY, folder, words, file))
             with self._lock:
                 if self._ended:
                     return _refused(file, "the page has ended")
