@@ -65,7 +65,7 @@ def test_the_lines_of_the_readme_answer(capsys: pytest.CaptureFixture[str], tmp_
 
 
 SET_UP = re.compile(r"\.venv|pip install|\bmake ")
-INSTRUMENT = re.compile(r"--port|--anew")
+INSTRUMENT = re.compile(r"--port|--anew|^pendpipe open\b")
 CAMPAIGN = re.compile(r"^pendpipe campaign\b", re.MULTILINE)
 
 
@@ -78,7 +78,7 @@ CAMPAIGN = re.compile(r"^pendpipe campaign\b", re.MULTILINE)
     ids=lambda page: page.name,
 )
 def test_the_commands_of_the_pages_run(page: Path, tmp_path: Path) -> None:
-    """Those that need an instrument have options that there are; CI does what the set-up says.
+    """Those that wait for a device or a browser have options that there are; CI does the set-up.
 
     A campaign is planned: `tests/workflow` runs one that `init` began. What records takes 2 s.
     """
