@@ -43,7 +43,9 @@ class Recorder:
         )
         with self.said.open("wb") as stream:
             self.process = subprocess.Popen(
-                [sys.executable, "-c", code, *words, "--out", str(self.out)], stderr=stream
+                [sys.executable, "-c", code, *words, "--out", str(self.out)],
+                stderr=stream,
+                env=os.environ | {"TMPDIR": str(folder)},  # what a killed view leaves
             )
         self.until(lambda: "http" in self.said.read_text())
         self.address = re.findall(r"http://[\d.:]+/\S+/", self.said.read_text())[0]
