@@ -199,7 +199,7 @@ def test_each_pendulum_of_a_class_has_its_length(
     """By a small table; the others have that of all."""
     table, out = tmp_path / "lengths.csv", tmp_path / "class.csv"
     own, other = of_a_class[1], of_a_class[2]
-    table.write_text(f"file;length (m)\n{Path(own).name};0.613(1)\n")
+    table.write_text(f"{Path(own).name};0,613(1)\n")  # as a spreadsheet may write it
     asked = ["fit", own, other, "--lengths", str(table), "--length", "0.5", "--out", str(out)]
     answer_of(asked)
     with out.open() as stream:
@@ -210,8 +210,11 @@ def test_each_pendulum_of_a_class_has_its_length(
     for content, said in (
         ("other.csv,0.6\n", "line 1: no FILE is called 'other.csv'"),
         (f"file,m\n{own},long\n", "line 2: 'long'"),
+        (f"{own},60 cm\n", "line 1: '60 cm'"),
+        (f'"{own},0.6\n', "it has no length"),
+        (f"Datei;Länge\n{own};0.6\n", "it can't be read"),
     ):
-        table.write_text(content)
+        table.write_text(content, encoding="latin-1")
         assert said in answer_of(asked, 2).err
 
 

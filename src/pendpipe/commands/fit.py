@@ -33,7 +33,7 @@ from pendpipe.answer import WIDTH
 from pendpipe.arguments import FILES, Arguments, command, name_of, print_answer, read_motion, tell
 from pendpipe.errors import InputError, nearest, refuse_if
 from pendpipe.estimate import over
-from pendpipe.files import is_stream, read_json, write_json
+from pendpipe.files import is_stream, read_json, read_text, write_json
 from pendpipe.options import (
     ALTERNATIVES,
     INPUT,
@@ -156,25 +156,29 @@ def _stage(arguments: Arguments) -> None:
 def take_lengths(arguments: Arguments) -> None:
     """Read the table of lengths, in place of its path; a row is found by the file's name."""
     path, arguments.lengths = arguments.lengths, {}
-    text = path.read_text("utf-8-sig") if path else ""
-    delimiter = max(",;\t", key=text.partition("\n")[0].count)
+    if path is None:
+        return
+    remedy = "give metres, as 0.600 or 0.600(1)"
+    text = read_text(path, "give a table of file and length in m")
+    # As many semicolons as commas: the commas are decimal.
+    delimiter = max(";\t,", key=text.count)
+    known = [name_of(file) for file in arguments.files]
     for number, row in enumerate(csv.reader(text.splitlines(), delimiter=delimiter), 1):
         name, size = [cell.strip() for cell in (*row, "", "")][:2]
-        try:
-            length = measured_number(size)
-        except ArgumentTypeError as problem:
-            # Of the first row, or of an empty one, none is expected.
-            if number == 1 or not name:
-                continue
-            remedy = "give metres, as 0.600 or 0.600(1)"
-            raise InputError(f"{path}, line {number}", str(problem), remedy) from None
         found = [file for file in arguments.files if name in (file, name_of(file))]
-        known = [name_of(file) for file in arguments.files]
+        try:
+            length = measured_number(size if delimiter == "," else size.replace(",", "."))
+        except ArgumentTypeError as problem:
+            # Of a head, or of an empty row, none is expected.
+            if not name or (number == 1 and not found):
+                continue
+            raise InputError(f"{path}, line {number}", str(problem), remedy) from None
         missing = f"no FILE is called '{name}'"
         refuse_if(
             not found, f"{path}, line {number}", missing, nearest(name, known, "check the name")
         )
         arguments.lengths |= dict.fromkeys(found, length)
+    refuse_if(not arguments.lengths, path, "it has no length", remedy)
 
 
 def length_of(arguments: Arguments) -> Any:
