@@ -114,6 +114,15 @@ def test_a_magnet_may_be_a_restoring_torque_without_a_name() -> None:
 
 
 @pytest.mark.structure
+def test_two_names_for_one_law_give_way_to_a_curve() -> None:
+    state = state_with(pulled() + white(6), "frequency-drift", "cubic-stiffness")
+    before = state.fit.chi2
+    state = simplified(state)
+    assert [step.winner.identifier for step in state.steps] == ["unnamed-restoring"]
+    assert state.fit.chi2 < before + FURTHER + 18.0
+
+
+@pytest.mark.structure
 def test_each_further_name_has_its_price_and_sin_x_has_none() -> None:
     fit, _, _ = null_fit()
 

@@ -109,7 +109,6 @@ def curve_told(fit: Fit, effect: Curve, unit: str) -> dict[str, Any]:
 
 
 _MAINS_HZ: Final = (50.0, 60.0)
-"""IEC 60038."""
 _MAINS_SD: Final = 4e-4
 """Relative standard deviation of a grid's frequency: 20 mHz at 50 Hz."""
 _BY_CHANCE: Final = 0.05

@@ -133,6 +133,8 @@ def _charge(state: Hypothesis, rivals: Sequence[Rival]) -> float:
 
 _GOOD_PART: Final = 1.0 / 3.0
 """Of a misfit, that one of a few laws takes which share it."""
+_MOST_RARE: Final = 2
+"""Rare names that may take the place of one curve."""
 
 
 def compared(here: Hypothesis, there: Sequence[Hypothesis]) -> Iterator[Hypothesis]:
@@ -148,8 +150,14 @@ def compared(here: Hypothesis, there: Sequence[Hypothesis]) -> Iterator[Hypothes
 
 
 def simpler(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:
-    """Drop an effect, or exchange a curve for events."""
-    return compared(state, [*_drops(state), *_events_for_a_curve(state, task)])
+    """Drop an effect, or exchange all names for a curve, or a curve for rare names or events."""
+    there = [
+        *_drops(state),
+        *_curve_for_names(state),
+        *_rare_for_a_curve(state, task.rare(state)),
+        *_events_for_a_curve(state, task),
+    ]
+    return compared(state, there)
 
 
 def leading(state: Hypothesis, task: Task, *, names_first: bool) -> Step | None:
@@ -219,6 +227,40 @@ def _drops(state: Hypothesis) -> Iterator[Hypothesis]:
             others = tuple(other for other in state.steps if other is not step)
             words = f"{effect.name} is no longer needed"
             yield replace(state, fit=without, steps=others, words=words)
+
+
+def _curve_for_names(state: Hypothesis) -> Iterator[Hypothesis]:
+    """Put one curve in the place of several names."""
+    names = [step for step in state.steps if is_further(step)]
+    if len(names) < 2 or any(step.winner.drawn for step in state.steps):
+        return
+    bare = state.without(*names)
+    fits = _with_curves(bare, state) if bare else []
+    if bare is None or not fits:
+        return
+    scale = Scale.of(min((*fits, state.fit), key=lambda fit: fit.chi2), state.data, state.noise)
+    rivals = ranked([_rival(bare, fit, scale) for fit in fits])
+    kept = [step for step in state.steps if step not in names]
+    words = f"{rivals[0].name} alone does as well as {len(names)} effects"
+    step = Step(tuple(rivals), names[0].p_value, bare)
+    yield replace(state, fit=rivals[0].fit, steps=(*kept, step), words=words)
+
+
+def _rare_for_a_curve(state: Hypothesis, rare: Sequence[Effect]) -> Iterator[Hypothesis]:
+    """Put a rare name, or two, in the place of a curve: a camera is oblique, and has a shutter."""
+    for step in [step for step in state.steps if step.winner.drawn]:
+        fit = state.without(step)
+        steps = [other for other in state.steps if other is not step]
+        for _ in range(_MOST_RARE):
+            fits = _with_each(fit, rare, state) if fit else []
+            if fit is None or not fits:
+                break
+            scale = Scale.of(state.fit, state.data, state.noise)
+            names = ranked([_rival(fit, each, scale) for each in fits])
+            steps.append(Step(tuple(names), step.p_value, fit))
+            fit = names[0].fit
+            words = f"{names[0].name} in place of {step.winner.name}"
+            yield replace(state, fit=fit, steps=tuple(steps), words=words)
 
 
 def _events_for_a_curve(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:

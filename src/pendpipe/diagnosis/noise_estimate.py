@@ -64,7 +64,7 @@ _READINGS_AT_ENDS: Final = 100.0
 """Readings over which the leakage of the ends of a filtered record adds up."""
 _SLOWEST_LINE: Final = 6
 """The cosine with three cycles in the record: what is slower is a drift and no line."""
-_BESIDE: Final = 12  # a choice: a stand's resonance of Q 15 is wider from 30 cycles on
+_BESIDE: Final = 12
 _LINE: Final = 2
 """Cosines beside a line, and how far the line itself reaches: two to 1/duration."""
 _MEDIAN_OF_A_SQUARE: Final = 0.455

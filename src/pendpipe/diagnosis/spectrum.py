@@ -15,7 +15,7 @@ from pendpipe.estimate import Z95
 
 _OVERSAMPLING: Final = 2
 """Frequencies in an interval of 1/duration."""
-_BESIDE: Final = 12.0  # a choice: the resonance of a stand, Q of 3 to 15, is wider
+_BESIDE: Final = 12.0
 _LINE: Final = 2.0
 """Frequencies beside a line, in 1/duration: how far they reach, and how far the line does."""
 OFF_HARMONIC: Final = 0.1

@@ -37,7 +37,6 @@ from pendpipe.solve import Priors
 Seen = Literal["angle", "rate", "position"]
 """What of the motion is read: the angle, its rate, or a position L sin x."""
 HYSTERETIC, VISCOUS = "hysteretic", "viscous"
-# No loss is negative, and 1e-12 rad/s, a swing in 200,000 years, is none.
 LOWER: Final = np.array([0.0, 0.0, 0.0, 0.0, 1e-12, -np.inf, -np.inf, -np.inf])
 UPPER: Final = np.array([np.inf, np.inf, np.inf, 1.0, np.inf, np.inf, np.inf, np.inf])
 """Least and greatest values, in the order of `BASELINE`."""

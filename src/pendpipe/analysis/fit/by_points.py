@@ -39,7 +39,6 @@ from pendpipe.solve import (
 ENVELOPE: Final = ("a", "b", "c", "amplitude", "level")
 Decay = Callable[..., tuple[FloatArray, FloatArray]]
 BOUNDS: Final = Bounds(np.array([0.0, 0.0, 0.0, 0.0, -np.inf]), np.full(5, np.inf))
-"""No loss and no amplitude is negative."""
 
 
 @dataclass(frozen=True)
