@@ -96,13 +96,16 @@ def numbered(samples: Samples) -> tuple[Rough, int]:
         time, value, side = time[whole], value[whole], side[whole]
     if len(time) < LEAST_HALF_CYCLES:
         return Rough(np.arange(len(time)), time, side, float(np.median(piece))), stride
-    # A beat may begin at a node, and noise in bursts tear half cycles apart: most hang together.
-    number, begin, cut = np.zeros(len(time), dtype=np.int64), 0, slice(0, 0)
+    # A beat may begin at a node, and bursts of noise tear half cycles apart: of those that hang
+    # together the ones with the most energy are taken.
+    number, begin, most, cut = np.zeros(len(time), dtype=np.int64), 0, -1.0, slice(0, 0)
     while len(time) - begin >= LEAST_HALF_CYCLES:
         rest = slice(begin, None)
         usual = float(np.median(np.diff(time[begin : begin + 6])))
         count = count_half_cycles(time[rest], side[rest], gap_before[rest], usual, number[rest])
-        cut = max(cut, slice(begin, begin + count), key=lambda part: part.stop - part.start)
+        energy = float(np.sum(np.diff(value[begin : begin + count]) ** 2))
+        if energy > most:
+            most, cut = energy, slice(begin, begin + count)
         begin += count
     return Rough(number[cut], time[cut], side[cut], _level(value[cut])), stride
 
