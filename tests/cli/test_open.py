@@ -10,6 +10,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from urllib.parse import quote
 
@@ -173,12 +174,26 @@ def test_an_analysis_that_takes_too_much_is_ended(
     assert browser.door._running == set()
 
 
+def test_a_limit_of_memory_that_cannot_be_set_stops_no_analysis(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As where the user has set a lower one, and on macOS."""
+    resource = pytest.importorskip("resource")
+    fault = ValueError("not allowed to raise maximum limit")
+    monkeypatch.setattr(resource, "setrlimit", lambda *_: (_ for _ in ()).throw(fault))
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    said = list[opening.Answer]()
+    opening._work(SimpleNamespace(send=said.append), 1 << 32, None, [], "absent.csv")
+    assert "no such file" in said[0].sheet.fitted.refusal.lower()
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_it_and_its_copies_and_so_do_two(number: int, tmp_path: Path) -> None:
-    """While a file is analysed, and whatever is sent while it ends."""
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_ends_it_and_its_copies_and_so_do_two(name: str, tmp_path: Path) -> None:
+    """While a file is analysed, and whatever is sent while it ends; a closed terminal hangs up."""
     if sys.platform == "win32":
         pytest.skip("signals end no process there as they do elsewhere")
+    number = getattr(signal, name)
     process = subprocess.Popen(
         [sys.executable, "-m", "pendpipe", "open"],
         stderr=subprocess.PIPE,
@@ -204,12 +219,8 @@ def test_a_signal_ends_it_and_its_copies_and_so_do_two(number: int, tmp_path: Pa
 
 
 def test_a_port_that_is_taken_is_refused_in_a_line(
-    browser: Browser, capsys: pytest.CaptureFixture[str]
+    browser: Browser, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
-    try:
-        assert main(["open", "--port", str(browser.door.server_port)]) == 2
-    finally:
-        signal.signal(signal.SIGINT, before[0])
-        signal.signal(signal.SIGTERM, before[1])
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    assert main(["open", "--port", str(browser.door.server_port)]) == 2
     assert re.fullmatch(r"pendpipe: --port \d+: .*leave it out\n", capsys.readouterr().err)

@@ -73,9 +73,12 @@ _HEADERS: Final = {
 def run(arguments: Arguments) -> None:
     """Serve the page until a signal ends it."""
     stop = threading.Event()
-    # A handler that raised could end the removal of the copies halfway.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+    # A handler that raised could end the removal of the copies halfway. A terminal that is closed
+    # hangs up, unless nohup has asked for more.
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"):
+        number = getattr(signal, name, None)
+        if number and not (name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN):
+            signal.signal(number, lambda *_: stop.set())
     with TemporaryDirectory(prefix="pendpipe-") as folder:
         try:
             door = Door(arguments.port, Path(folder), arguments.files, arguments.live)
@@ -146,7 +149,7 @@ def _refused(file: str, reason: str) -> Answer:
 def _work(pipe: Any, memory: int, folder: Path | None, words: Sequence[str], file: str) -> None:
     """Answer through a pipe, in a process of its own."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the door ends it
-    with suppress(ImportError):
+    with suppress(ImportError, ValueError):  # a lower limit holds already; macOS has none
         import resource
 
         resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
