@@ -89,6 +89,33 @@ def test_what_is_dropped_becomes_a_sheet_and_a_click_takes_a_part(
         assert b"string-pendulum.csv" in Path(download.value.path()).read_bytes()
 
 
+def test_the_last_choice_stands_however_late_an_earlier_one_is_answered(
+    chromium: Any, door: Door, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, go = door._made, threading.Event()
+
+    def slow(folder: Path | None, words: list[str], file: str) -> Any:
+        if "--no-diagnosis" not in words:
+            assert go.wait(60)
+        return made(folder, ["--no-diagnosis", "--length=0.3"], file)
+
+    with opened(chromium, door) as tab:
+        drop(tab, EXAMPLES[1:])
+        said(tab, "1 of 1 read.")
+        monkeypatch.setattr(door, "_made", slow)
+        tab.get_by_label("with a diagnosis").check()
+        tab.get_by_role("button", name="Read again").click()
+        tab.get_by_label("with a diagnosis").uncheck()
+        tab.get_by_label("Length, m").fill("0.3")
+        tab.get_by_role("button", name="Read again").click()
+        said(tab, "Read again.")
+        with tab.expect_response(lambda answer: "/read/" in answer.url) as late:
+            go.set()
+        late.value.finished()
+        tab.wait_for_timeout(200)
+        assert "--no-diagnosis --length=0.3" in tab.locator("#command").inner_text()
+
+
 def test_a_class_by_keys_alone(chromium: Any, door: Door) -> None:
     """Choose files, open a row, set a unit, read again, go back, save the table."""
     with opened(chromium, door) as tab:

@@ -158,6 +158,39 @@ def test_what_is_wrong_is_said_and_no_more(browser: Browser, tmp_path: Path) -> 
     assert browser.read(number, command="rm")["refusal"] == "", "an option that is not offered"
 
 
+def test_a_late_answer_to_an_earlier_question_takes_the_place_of_none(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A diagnosis that was given up for a quick reading; a file that was taken out."""
+    begun, go = threading.Event(), threading.Event()
+
+    def made(_: Any, words: list[str], file: str) -> opening.Answer:
+        if "--unit=deg" in words:
+            begun.set()
+            assert go.wait(30)
+        return opening.Answer(opening.Sheet(opening.Fitted(file, None, "none"), ""))
+
+    monkeypatch.setattr(browser.door, "_made", made)
+    (tmp_path / "slow.csv").write_bytes(b"1,2\n")
+    one, other = browser.drop(tmp_path / "slow.csv"), browser.drop(tmp_path / "slow.csv")
+    for number, then in ((one, "rad"), (other, "")):
+        begun.clear()
+        go.clear()
+        slow = threading.Thread(target=browser.read, args=(number,), kwargs={"unit": "deg"})
+        slow.start()
+        assert begun.wait(30)
+        if then:
+            browser.read(number, unit=then)
+        else:
+            assert browser.ask(f"forget/{number}", b"")[0] == 200
+            assert not (browser.door._folder / str(number)).exists(), "its copy goes with it"
+        go.set()
+        slow.join()
+    assert browser.read(one)["options"] == {"unit": "rad"}
+    assert other not in browser.door._answers
+    browser.ask(f"forget/{one}", b"")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("limit", "said"), [("_SECONDS", "more than 0 s"), ("_MEMORY", "broke off|more than 0 GB")]

@@ -13,6 +13,7 @@ import multiprocessing
 import os
 import secrets
 import shlex
+import shutil
 import signal
 import sys
 import threading
@@ -194,6 +195,8 @@ class Door(ThreadingHTTPServer):
             number: (None, file) for number, file in enumerate(files, 1)
         }
         self._answers: dict[int, tuple[dict[str, str], Answer]] = {}
+        self._asked: dict[int, dict[str, str]] = {}
+        """The options that a recording was last asked with; an answer to others comes too late."""
         self._live, self._shown = live, Shown(live) if live else None
         self._places = threading.BoundedSemaphore(cores())
         self._lock, self._ended, self._running = threading.Lock(), False, set[Any]()
@@ -255,10 +258,14 @@ class Door(ThreadingHTTPServer):
         """Analyse a recording by the options in the body; without them show what is known."""
         number, asked = int(which), json.loads(body) if body else None
         folder, file = self._files[number]
-        if asked is not None or number not in self._answers:
+        known = self._answers.get(number)
+        if asked is not None or known is None:
             options = {name: str(value) for name, value in (asked or {}).items()}
-            self._answers[number] = options, self._made(folder, _words(options), file)
-        options, (sheet, columns, picture) = self._answers[number]
+            self._asked[number] = options
+            known = options, self._made(folder, _words(options), file)
+            if self._asked.get(number) is options:
+                self._answers[number] = known
+        options, (sheet, columns, picture) = known
         return {
             "name": file,
             "options": options,
@@ -279,7 +286,11 @@ class Door(ThreadingHTTPServer):
         return "\n".join(shlex.join(["pendpipe", "page", *words, *ways[words]]) for words in ways)
 
     def _forget(self, which: str, _: bytes) -> None:
-        del self._files[int(which)]
+        """Take a recording out, with its copy."""
+        folder = self._files.pop(int(which))[0]
+        self._asked.pop(int(which), None)
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)  # with the rest, where somebody reads in it
 
     def _made(self, folder: Path | None, words: Sequence[str], file: str) -> Answer:
         """Let a process of its own answer, within its limits."""

@@ -1,6 +1,7 @@
 "use strict";
 const $ = (id) => document.getElementById(id);
 const known = new Map(); // what is shown of each recording, by its number
+const asked = new Map(); // the last question about each: an answer to an earlier one comes too late
 let current = 0, first = null, waiting = 0, failed = "";
 
 const field = (name) => $("form").elements.namedItem(name); // .length would be their number
@@ -88,8 +89,10 @@ const progress = () => {
   say(waiting ? `${done} of ${many} read …` : `${done} of ${many} read.${failed}`);
 };
 
-const read = async (number, options) => {
-  known.set(number, await post(`read/${number}`, options && JSON.stringify(options)));
+const read = async (number, options, question = {}) => {
+  asked.set(number, question);
+  const answer = await post(`read/${number}`, options && JSON.stringify(options));
+  if (asked.get(number) === question) known.set(number, answer);
 };
 
 // As many at a time as a browser has connections left for.
@@ -127,20 +130,21 @@ const take = async (files) => {
   await settled();
 };
 
-const again = async (asked, every) => {
+const again = async (options, every) => {
   failed = "";
-  const numbers = every ? [...known.keys()] : [current], seen = current;
-  waiting = 0;
+  const numbers = every ? [...known.keys()] : [current], seen = current, question = {};
   say("Reading …");
-  await Promise.all(numbers.map((number) => read(number, asked).catch((fault) => { failed += ` ${fault.message}.`; })));
+  await Promise.all(numbers.map((number) => read(number, options, question).catch((fault) => { failed += ` ${fault.message}.`; })));
+  if (asked.get(seen) !== question) return; // asked again, or taken out
   say(`Read again.${failed}`);
-  show(seen);
+  if ($("one").hidden) await table();
+  else if (numbers.includes(current)) show(current);
 };
 
 const chosen = () => {
-  const asked = Object.fromEntries(new FormData($("form")));
-  delete asked.every;
-  return asked;
+  const options = Object.fromEntries(new FormData($("form")));
+  delete options.every;
+  return options;
 };
 const submit = () => again(chosen(), field("every").checked);
 
@@ -152,6 +156,7 @@ $("back").addEventListener("click", () => table(true));
 $("forget").addEventListener("click", async () => {
   await post(`forget/${current}`, "");
   known.delete(current);
+  asked.delete(current);
   progress();
   $("one").hidden = true;
   await settled();
@@ -201,7 +206,7 @@ for (const kind of ["dragover", "dragleave", "drop"]) {
 
 const clock = (s) => `${Math.floor(s / 60)} min ${String(Math.floor(s % 60)).padStart(2, "0")} s`;
 const watch = async () => {
-  const asked = Date.now();
+  const begun = Date.now();
   let d;
   try { d = await (await fetch("live")).json(); } catch { $("now").textContent += " The recorder has ended, or its view has."; return; }
   if (d.scans) {
@@ -212,7 +217,7 @@ const watch = async () => {
     if (values.length) draw($("last"), d.last, low, high, Math.max(0, d.elapsed_s - 60), Math.max(60, d.elapsed_s));
     if (d.amplitude.length) draw($("amplitude"), d.amplitude, 0, 1.05 * Math.max(1e-9, ...d.amplitude.map((p) => p[1])), 0, d.duration_s);
   }
-  setTimeout(watch, Math.max(1000, 9 * (Date.now() - asked)));
+  setTimeout(watch, Math.max(1000, 9 * (Date.now() - begun)));
 };
 if ($("live")) watch();
 
