@@ -2,6 +2,7 @@
 
 import http.client
 import json
+import os
 import re
 import shlex
 import signal
@@ -231,7 +232,7 @@ def test_a_signal_ends_it_and_its_copies_and_so_do_two(name: str, tmp_path: Path
         [sys.executable, "-m", "pendpipe", "open"],
         stderr=subprocess.PIPE,
         text=True,
-        env={**dict(__import__("os").environ), "TMPDIR": str(tmp_path)},
+        env={**os.environ, "TMPDIR": str(tmp_path)},
     )
     assert process.stderr is not None
     found = re.search(r"http://(127\.0\.0\.1:(\d+))/(\S+)/", process.stderr.readline())
@@ -249,6 +250,40 @@ def test_a_signal_ends_it_and_its_copies_and_so_do_two(name: str, tmp_path: Path
     assert process.stderr.read() == ""
     process.stderr.close()
     line.close()
+
+
+@pytest.mark.slow
+def test_a_signal_ends_it_whichever_thread_it_comes_to(tmp_path: Path) -> None:
+    """The system chooses among those of a process."""
+    if sys.platform == "win32":
+        pytest.skip("signals end no process there as they do elsewhere")
+    code = """if True:
+        import os, signal, sys, threading
+        from pendpipe.cli import main
+
+        def sent():
+            os.read(0, 1)
+            signal.pthread_kill(threading.get_ident(), signal.SIGINT)
+
+        threading.Thread(target=sent, daemon=True).start()
+        sys.exit(main(["open"]))"""
+    with subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdin=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+    ) as process:
+        assert process.stdin is not None
+        assert process.stderr is not None
+        assert "http://127.0.0.1" in process.stderr.readline()
+        try:
+            process.stdin.write("\n")
+            process.stdin.flush()
+            assert process.wait(20) == 0
+        finally:
+            process.kill()
+    assert list(tmp_path.glob("pendpipe-*")) == []
 
 
 def test_a_port_that_is_taken_is_refused_in_a_line(

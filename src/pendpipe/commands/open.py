@@ -15,6 +15,7 @@ import secrets
 import shlex
 import shutil
 import signal
+import socket
 import sys
 import threading
 import webbrowser
@@ -73,35 +74,46 @@ _HEADERS: Final = {
 )
 def run(arguments: Arguments) -> None:
     """Serve the page until a signal ends it."""
-    stop = threading.Event()
-    # A handler that raised could end the removal of the copies halfway. A terminal that is closed
-    # hangs up, unless nohup has asked for more.
-    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"):
-        number = getattr(signal, name, None)
-        if number and not (name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN):
-            signal.signal(number, lambda *_: stop.set())
-    with TemporaryDirectory(prefix="pendpipe-") as folder:
+    # A handler that raised could end the removal of the copies halfway. Whichever thread a signal
+    # comes to writes to this socket; a lock would wait on where that is another than this one.
+    ended, stop = socket.socketpair()
+    stop.setblocking(False)
+    with ended, stop, TemporaryDirectory(prefix="pendpipe-") as folder:
+        before = signal.set_wakeup_fd(stop.fileno(), warn_on_full_buffer=False)
         try:
-            door = Door(arguments.port, Path(folder), arguments.files, arguments.live)
-        except (OSError, OverflowError) as fault:
-            raise InputError(
-                f"--port {arguments.port}", f"it can't be used ({fault})", "leave it out"
-            ) from None
-        with door:
-            threading.Thread(target=door.serve_forever, daemon=True).start()
-            if arguments.live:
-                threading.Thread(target=_until_input_ends, args=(stop,), daemon=True).start()
-            tell(f"pendpipe: {door.address} (this machine alone; Ctrl-C ends it)")
-            if sys.stderr.isatty() and (os.name == "nt" or _has_screen()):
-                webbrowser.open(door.address)
-            stop.wait()
-            door.end()
+            for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"):
+                number = getattr(signal, name, None)
+                # A terminal that is closed hangs up, unless nohup has asked for more.
+                if number and not (name == "SIGHUP" and signal.getsignal(number) == signal.SIG_IGN):
+                    signal.signal(number, lambda *_: None)
+            _serve(arguments, Path(folder), ended, stop)
+        finally:
+            signal.set_wakeup_fd(before)
 
 
-def _until_input_ends(stop: threading.Event) -> None:
+def _serve(arguments: Arguments, folder: Path, ended: socket.socket, stop: socket.socket) -> None:
+    """Serve the page until something has been written to the socket."""
+    try:
+        door = Door(arguments.port, folder, arguments.files, arguments.live)
+    except (OSError, OverflowError) as fault:
+        raise InputError(
+            f"--port {arguments.port}", f"it can't be used ({fault})", "leave it out"
+        ) from None
+    with door:
+        threading.Thread(target=door.serve_forever, daemon=True).start()
+        if arguments.live:
+            threading.Thread(target=_until_input_ends, args=(stop,), daemon=True).start()
+        tell(f"pendpipe: {door.address} (this machine alone; Ctrl-C ends it)")
+        if sys.stderr.isatty() and (os.name == "nt" or _has_screen()):
+            webbrowser.open(door.address)
+        ended.recv(1)
+        door.end()
+
+
+def _until_input_ends(stop: socket.socket) -> None:
     """End with the recorder, however it ends."""
     os.read(0, 1)
-    stop.set()
+    stop.send(b"\0")
 
 
 def _has_screen() -> bool:
