@@ -219,6 +219,9 @@ def test_each_pendulum_of_a_class_has_its_length(
 
 
 def test_a_file_says_what_follows_from_it(tmp_path: Path, answer_of: Any) -> None:
+    """Volts with their sensor's constant are angles, as in a fit."""
+    volts = answer_of(["inspect", str(ROOT / "examples" / "rod-pendulum.csv")]).out
+    assert "gives       T0, the period of small swings" in volts
     time_s = np.arange(0, 40, 0.05)
     for unit, said in (
         ("m", "with --length angle, T0 and g"),

@@ -66,7 +66,10 @@ def _lines(file: str, found: "Inspection") -> list[str]:
     read = [
         ("read", f"{found.chosen}, in{after_number(found.unit) or ' no known unit'}"),
         ("hangs at", f"{found.level:.6g}{after_number(found.unit)}"),
-        ("gives", _GIVES.get(found.unit, "Q, and the period of these swings")),
+        (
+            "gives",
+            _GIVES.get("rad" if found.scaled else found.unit, "Q, and the period of these swings"),
+        ),
     ]
     facts = [
         ("format", found.format),

@@ -431,6 +431,8 @@ class Inspection:
         How the file was understood, one line per decision.
     kind
         ``motion``, ``steady or driven``, ``amplitudes``, ``periods``, ``spectrum``, ``passages``.
+    scaled
+        Whether readings in volts are angles by a sensor's constant that the file gives.
     """
 
     format: str
@@ -451,6 +453,7 @@ class Inspection:
     facts: tuple[Fact, ...] = ()
     why: tuple[str, ...] = ()
     kind: str = "motion"
+    scaled: bool = False
 
     @property
     def weak_guesses(self) -> tuple[str, ...]:
@@ -507,12 +510,13 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
     )
     choice = replace(choice, readings=choice.readings or choice.channels[:1])
     column, facts = choice.readings[0], (*table.facts, *choice.facts)
-    kind = choice.listed.kind if choice.listed else "motion"
+    kind, scaled = choice.listed.kind if choice.listed else "motion", False
     try:
         recording = recording_of(table, options) if plain is None else plain
         time, values = recording.time_s[recording.usable], recording.values[recording.usable]
         unit, step, facts = recording.unit, recording.resolution, recording.facts
         notes = list(recording.notes)
+        scaled = unit == "V" and bool(recording.metadata.get("volts_per_radian", "").strip())
         if recording.holds_amplitudes:
             kind = "amplitudes"
         elif recording.fact("drive"):
@@ -562,6 +566,7 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
             + (unit if unit != "1" else "their own unit"),
         ),
         kind=kind,
+        scaled=scaled,
     )
 
 
