@@ -382,6 +382,7 @@ def test_one_page_holds_the_fit_and_refers_to_nothing_outside(
     assert not re.findall(r'(?:src|href)="(?!#|data:image/png)[^"]*"', text)
     assert str(tmp_path) not in text
     assert str(ROD_FILE.parent) not in text
+    assert re.findall(r"<h2>[^<]*</h2>\s*<ul>\s*</ul>", text) == [], "a heading of nothing"
 
 
 def test_a_name_in_the_page_is_text_and_no_markup(tmp_path: Path, answer_of: Any) -> None:
