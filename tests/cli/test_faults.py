@@ -64,6 +64,14 @@ def test_a_keyword_that_there_is_not_is_no_keyword(verb: Callable[..., object]) 
         verb("examples/rod-pendulum.csv", sampel_rate=10.0)
 
 
+def test_a_mistyped_file_in_the_place_of_a_command_gets_the_nearest_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answer_of: Any
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("rod-pendulum.csv").touch()
+    assert "rod-pendulum.csv" in answer_of(["rod-pendulm.csv"], 2).err
+
+
 def test_a_mistyped_command_gets_the_nearest_one(answer_of: Any) -> None:
     err = answer_of(["inspekt"], 2).err
     assert err.count("\n") == 1

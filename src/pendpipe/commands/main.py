@@ -123,12 +123,14 @@ def command_of(name: str) -> Any:
 def parse(argv: Sequence[str]) -> argparse.Namespace:
     """Parse the words of one call; argparse ends the program with 2 on bad usage.
 
-    ``help fit`` is ``fit --help``, and a file in the place of a command is one to fit.
+    ``help fit`` is ``fit --help``, and a file in the place of a command is one to fit: what has a
+    suffix is no command, but may be the misspelt name of a file.
     """
     if argv[:1] == ["help"]:
         argv = [*argv[1:], "--help"]
     command = command_of(argv[0]) if argv and not argv[0].startswith("-") else None
-    if command is None and argv and Path(argv[0]).is_file():
+    named = argv[0] if argv and command is None else ""
+    if named and (Path(named).is_file() or (Path(named).suffix and named[0] != "-")):
         argv = ["fit", *argv]
         command = command_of("fit")
     if command is not None:
