@@ -137,7 +137,9 @@ def test_packets_are_put_on_a_line_and_called_a_guess(
     fact = recording.fact("clock")
     assert fact is not None
     assert fact.how == "guessed"
-    assert 1.0 / np.mean(np.diff(recording.time_s)) == pytest.approx(rate, rel=1e-3)
+    found = 1.0 / np.mean(np.diff(recording.time_s))
+    assert found == pytest.approx(rate, rel=1e-3)
+    assert float(fact.value.split()[0]) == pytest.approx(found, rel=1e-5)
 
 
 @pytest.mark.parametrize(
