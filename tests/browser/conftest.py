@@ -2,7 +2,6 @@
 
 import copy
 import json
-import os
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 import pytest
 import yaml
+from benchmarks.open import browser, installed
 
 from pendpipe.cli import main
 from pendpipe.report.page import OWN_PAGES, render
@@ -20,16 +20,11 @@ ROOT = Path(__file__).parents[2]
 @pytest.fixture(scope="session")
 def chromium() -> Iterator[Any]:
     """The browser as it is installed; tests are skipped where there is none."""
-    library = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-    names = (os.environ.get("CHROMIUM", ""), "chromium", "chromium-browser", "google-chrome")
-    path = next((path for name in names if name and (path := shutil.which(name))), None)
-    if path is None:
+    pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    if installed() is None:
         pytest.skip("no Chromium is installed")
-    with library.sync_playwright() as driver:
-        # A container's user may be root, which Chromium's sandbox refuses.
-        running = driver.chromium.launch(executable_path=path, args=["--no-sandbox"])
+    with browser() as running:
         yield running
-        running.close()
 
 
 def repeated(results: Path, home: Path, count: int) -> tuple[Path, list[str]]:

@@ -2,69 +2,29 @@
 
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
+from benchmarks.open import EXAMPLES, by_keys, drop, look, opened, said, serving
 
 from pendpipe.commands.open import Door
 
 pytestmark = pytest.mark.slow
-EXAMPLES = [
-    str(Path(__file__).parents[2] / "examples" / name)
-    for name in ("rod-pendulum.csv", "string-pendulum.csv")
-]
+STRING = EXAMPLES[1]
 
 
 @pytest.fixture(scope="module")
 def door(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Door]:
-    with Door(0, tmp_path_factory.mktemp("open")) as serving:
-        threading.Thread(target=serving.serve_forever, daemon=True).start()
-        yield serving
-        serving.end()
-
-
-@contextmanager
-def opened(chromium: Any, door: Door, width: int = 1280, **look: Any) -> Iterator[Any]:
-    """The page; a complaint, and a request to anybody else, is a fault."""
-    for number in list(door._files):
-        del door._files[number]
-    context = chromium.new_context(viewport={"width": width, "height": 800}, **look)
-    tab, faults = context.new_page(), list[str]()
-    tab.on("console", lambda told: faults.append(f"{told.type}: {told.text}"))
-    tab.on("pageerror", lambda error: faults.append(str(error)))
-    tab.on("request", lambda asked: asked.url.startswith(door.address) or faults.append(asked.url))
-    tab.goto(door.address)
-    try:
-        yield tab
-        assert faults == []
-    finally:
-        context.close()
-
-
-def said(tab: Any, text: str) -> None:
-    tab.locator("#status", has_text=text).wait_for(timeout=60_000)
-
-
-def drop(tab: Any, files: list[str]) -> None:
-    """Drop files on the page, as a hand does."""
-    given = [{"name": Path(file).name, "text": Path(file).read_text()} for file in files]
-    held = tab.evaluate_handle(
-        """(given) => { const held = new DataTransfer();
-        for (const { name, text } of given) held.items.add(new File([text], name));
-        return held; }""",
-        given,
-    )
-    tab.dispatch_event("#drop", "drop", {"dataTransfer": held})
+    with serving(tmp_path_factory.mktemp("open")) as door:
+        yield door
 
 
 def test_what_is_dropped_becomes_a_sheet_and_a_click_takes_a_part(
     chromium: Any, door: Door
 ) -> None:
     with opened(chromium, door) as tab:
-        drop(tab, EXAMPLES[1:])
-        said(tab, "1 of 1 read.")
+        drop(tab, {STRING.name: STRING})
         assert tab.locator("#sheet h1").inner_text() == "string-pendulum.csv"
         assert "T0 = (2.00601" in tab.locator("#sheet .copy").inner_text()
         tab.locator("#picture").scroll_into_view_if_needed()
@@ -100,8 +60,7 @@ def test_the_last_choice_stands_however_late_an_earlier_one_is_answered(
         return made(folder, ["--no-diagnosis", "--length=0.3"], file)
 
     with opened(chromium, door) as tab:
-        drop(tab, EXAMPLES[1:])
-        said(tab, "1 of 1 read.")
+        drop(tab, {STRING.name: STRING})
         monkeypatch.setattr(door, "_made", slow)
         tab.get_by_label("with a diagnosis").check()
         tab.get_by_role("button", name="Read again").click()
@@ -117,31 +76,9 @@ def test_the_last_choice_stands_however_late_an_earlier_one_is_answered(
 
 
 def test_a_class_by_keys_alone(chromium: Any, door: Door) -> None:
-    """Choose files, open a row, set a unit, read again, go back, save the table."""
+    """Choose files, open a row, set a time, go back, save the table, take one out."""
     with opened(chromium, door) as tab:
-        tab.get_by_label("Drop recordings").set_input_files(EXAMPLES)
-        said(tab, "2 of 2 read.")
-        row = tab.get_by_role("link", name="rod-pendulum.csv")
-        for _ in range(20):
-            tab.keyboard.press("Tab")
-            if row.evaluate("(link) => link === document.activeElement"):
-                break
-        tab.keyboard.press("Enter")
-        assert tab.locator("#one").evaluate("(one) => one === document.activeElement")
-        assert tab.locator("#sheet h1").inner_text() == "rod-pendulum.csv"
-        while not tab.get_by_label("From, s").evaluate("(e) => e === document.activeElement"):
-            tab.keyboard.press("Tab")
-        tab.keyboard.type("10")
-        tab.keyboard.press("Enter")
-        said(tab, "Read again.")
-        assert "--start=10" in tab.locator("#command").inner_text()
-        tab.get_by_role("button", name="All recordings").press("Enter")
-        tab.locator("#all").wait_for()
-        assert tab.locator("#commands").inner_text().count("\n") == 1, "each in a way of its own"
-        with tab.expect_download() as download:
-            tab.get_by_role("link", name="class.csv").press("Enter")
-        table = Path(download.value.path()).read_text().splitlines()
-        assert [line.split(",")[0] for line in table[1:3]] == [Path(f).name for f in EXAMPLES]
+        by_keys(tab)
         tab.get_by_role("link", name="rod-pendulum.csv").press("Enter")
         tab.get_by_role("button", name="Take this one out").press("Enter")
         said(tab, "1 of 1 read.")
@@ -150,22 +87,13 @@ def test_a_class_by_keys_alone(chromium: Any, door: Door) -> None:
 
 def test_axe_finds_nothing_and_a_phone_needs_not_scroll(chromium: Any, door: Door) -> None:
     """Empty, with a sheet, with a table; in the light and in the dark."""
-    from axe_playwright_python.sync_playwright import Axe
-
-    def look(tab: Any) -> None:
-        for scheme in ("light", "dark"):
-            tab.emulate_media(color_scheme=scheme)
-            found = Axe().run(tab, options={"preload": False})
-            assert found.violations_count == 0, found.generate_report()
-        assert tab.evaluate("() => document.documentElement.scrollWidth") <= 390
-
     with opened(chromium, door, 390) as tab:
-        look(tab)
+        assert look(tab, "", widths=[390]) == []
         tab.get_by_label("Drop recordings").set_input_files(EXAMPLES)
         said(tab, "2 of 2 read.")
-        look(tab)
+        assert look(tab, "", widths=[390]) == []
         tab.get_by_role("link", name="rod-pendulum.csv").click()
-        look(tab)
+        assert look(tab, "", widths=[390]) == []
         tab.emulate_media(media="print")
         assert not tab.locator(".door-only").first.is_visible()
         assert not tab.locator("#sheet footer").is_visible()
@@ -173,30 +101,22 @@ def test_axe_finds_nothing_and_a_phone_needs_not_scroll(chromium: Any, door: Doo
 
 
 def test_a_recording_is_shown_while_it_is_made(chromium: Any, tmp_path: Path) -> None:
-    from axe_playwright_python.sync_playwright import Axe
-
     from pendpipe.acquisition.recorder import acquire_simulated, example_signal
 
     raw = tmp_path / "live.raw"
     options = {"channels": (1,), "rate_hz": 110.0, "duration_s": 90.0, "raw_path": raw}
-    with Door(0, tmp_path, live=raw) as serving:
-        threading.Thread(target=serving.serve_forever, daemon=True).start()
-        with opened(chromium, serving, 390) as tab:
-            assert tab.locator("#now").inner_text() == "Nothing has come yet."
-            acquire_simulated("di2108", example_signal(1, 3.85), clock_scale=200.0, **options)
-            tab.locator("#now", has_text="of 1 min 30 s").wait_for()
-            assert len(tab.locator("#last path").last.get_attribute("d")) > 1000
-            found = Axe().run(tab, options={"preload": False})
-            assert found.violations_count == 0, found.generate_report()
-            assert tab.evaluate("() => document.documentElement.scrollWidth") <= 390
-        serving.end()
+    with serving(tmp_path, raw) as door, opened(chromium, door, 390) as tab:
+        assert tab.locator("#now").inner_text() == "Nothing has come yet."
+        acquire_simulated("di2108", example_signal(1, 3.85), clock_scale=200.0, **options)
+        tab.locator("#now", has_text="of 1 min 30 s").wait_for()
+        assert len(tab.locator("#last path").last.get_attribute("d")) > 1000
+        assert look(tab, "live", widths=[390]) == []
 
 
 def test_what_is_refused_is_said_with_its_reason(chromium: Any, door: Door, tmp_path: Path) -> None:
-    (tmp_path / "<i>no.csv").write_text("nothing\n")
+    (tmp_path / "no.csv").write_text("nothing\n")
     with opened(chromium, door) as tab:
-        drop(tab, [str(tmp_path / "<i>no.csv")])
-        said(tab, "1 of 1 read.")
+        drop(tab, {"<i>no.csv": tmp_path / "no.csv"})
         assert tab.locator("#sheet h1").inner_text() == "<i>no.csv"
         assert "Refused: no reader knows this file" in tab.locator("#sheet").inner_text()
         assert not tab.locator("#picture").is_visible()
