@@ -7,8 +7,8 @@ empty page; ``many`` drops a number at once, which are these again; ``keys`` nee
 has the digits of ``pendpipe fit`` where its rows and its line to copy begin as those of `fit`,
 which ends a long row earlier. axe looks at the empty page, each sheet and the table, light and
 dark, at 1280 and 390 px. The status is 1 where digits differ, axe finds something or a page is
-wider than its window; a complaint of the browser and a key that leads nowhere are errors. Chromium,
-Playwright and axe-playwright-python are needed (the extra dev).
+wider than its window or its paper; a complaint of the browser and a key that leads nowhere are
+errors. Chromium, Playwright and axe-playwright-python are needed (the extra dev).
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def drop(tab: Any, files: Mapping[str, Path]) -> float:
     began = time.perf_counter()
     tab.dispatch_event("#drop", "drop", {"dataTransfer": held})
     said(tab, f"{len(files)} of {len(files)} read.")
-    tab.locator("#sheet h1, #table tr").first.wait_for()
+    tab.locator("#sheet h1, #rows tr").first.wait_for()
     return time.perf_counter() - began
 
 
@@ -123,20 +123,21 @@ def look(
     from axe_playwright_python.sync_playwright import Axe
 
     found = list[str]()
-    for width in widths:
+    for width in (*widths, PAPER):
+        printed = width == PAPER
         tab.set_viewport_size({"width": width, "height": 800})
-        for scheme in ("light", "dark"):
-            tab.emulate_media(color_scheme=scheme)
-            seen, at = Axe().run(tab, options={"preload": False}), f"{name}-{width}-{scheme}"
-            found += [f"{at}: {fault['id']}" for fault in seen.response["violations"]]
+        tab.emulate_media(media="print" if printed else "screen")
+        for scheme in ("print",) if printed else ("light", "dark"):
+            at = f"{name}-{width}-{scheme}"
+            if not printed:
+                tab.emulate_media(color_scheme=scheme)
+                seen = Axe().run(tab, options={"preload": False}).response["violations"]
+                found += [f"{at}: {fault['id']}" for fault in seen]
             if pictures:
                 tab.screenshot(path=pictures / f"{at}.png", full_page=True)
         if tab.evaluate("() => document.documentElement.scrollWidth") > width:
-            found.append(f"{name}-{width}: wider than its window")
-    if pictures:
-        tab.set_viewport_size({"width": PAPER, "height": 800})
-        tab.emulate_media(media="print", color_scheme="light")
-        tab.screenshot(path=pictures / f"{name}-print.png", full_page=True)
+            found.append(f"{name}-{width}: wider than its window, or its paper")
+    tab.emulate_media(media="screen")
     return found
 
 

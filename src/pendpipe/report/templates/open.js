@@ -77,7 +77,7 @@ const table = async (focus) => {
   const made = await page("class");
   const rows = made.querySelector("main");
   rows.querySelectorAll("a").forEach((a) => { a.dataset.number = a.getAttribute("href").split("/")[1]; });
-  $("table").replaceChildren(...rows.childNodes);
+  $("rows").replaceChildren(...rows.childNodes);
   $("commands").textContent = await (await fetch("commands")).json();
   $("all").hidden = false;
   $("one").hidden = true;
@@ -161,7 +161,7 @@ $("forget").addEventListener("click", async () => {
   $("one").hidden = true;
   await settled();
 });
-$("table").addEventListener("click", (event) => {
+$("rows").addEventListener("click", (event) => {
   const link = event.target.closest("a[data-number]");
   if (!link) return;
   event.preventDefault();
