@@ -5,6 +5,7 @@ import gzip
 import io
 import json
 import lzma
+import math
 import os
 import re
 import subprocess
@@ -499,3 +500,19 @@ def test_what_hides_in_a_file_is_counted(
     monkeypatch.setattr(containers, "_MOST_CELLS", 1000)
     with pytest.raises(InputError, match=said):
         read_as(tmp_path, content())
+
+
+def test_a_scope_whose_time_is_no_number_is_refused_by_inspect_too(tmp_path: Path) -> None:
+    scope = Path(__file__).with_name("tektronix_isf") / "scope.ISF"
+    data = re.sub(rb"XZE [^;]*;", b"XZE 1e999;", scope.read_bytes())
+    (tmp_path / "a.isf").write_bytes(data)
+    for asked in (read, inspect):
+        with pytest.raises(InputError, match=r"a\.isf"):
+            asked(tmp_path / "a.isf")
+
+
+def test_a_lone_quotation_mark_between_rows_is_no_row(tmp_path: Path) -> None:
+    swing = [round(50.0 + 40.0 * math.cos(0.6 * n)) for n in range(80)]
+    rows = [f"{0.05 * n:.2f} {each}" for n, each in enumerate(swing)]
+    (tmp_path / "a.txt").write_text("\n".join(["t x", *rows[:5], '"', *rows[5:]]))
+    assert inspect(tmp_path / "a.txt").samples > 70

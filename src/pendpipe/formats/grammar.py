@@ -90,13 +90,14 @@ class Layout:
     joined: tuple[int, ...] = ()
 
     def split(self, line: str) -> list[str]:
-        """Split a line into its cells, quotes and blanks around them removed."""
+        """Split a line into its cells, quotes and blanks around them removed; one at least."""
         if '"' not in line:
             cells = line.split(None if self.delimiter == " " else self.delimiter)
             return self.with_decimals([cell.strip() for cell in cells])
         try:
             rows = csv.reader([line.strip()], delimiter=self.delimiter, skipinitialspace=True)
-            return [cell.strip() for cell in next(rows) if cell.strip() or self.delimiter != " "]
+            cells = [cell.strip() for cell in next(rows) if cell.strip() or self.delimiter != " "]
+            return cells or [line.strip()]
         except csv.Error:  # a quote that opens 128 kB of text
             return [line.strip()]
 

@@ -526,6 +526,8 @@ def inspect(path: str | Path, options: ReadOptions = _ANYTHING) -> Inspection:
             base = time_base(table, choice, options)
         except InputError:
             raise fault from None
+        if not np.all(np.isfinite(base.time_s)):
+            raise
         time, values = base.time_s, column.values[base.rows]
         unit, step = column.unit, column.resolution or find_step(values)
         notes = [*table.notes, *remarks(facts), f"the readings can't be analysed: {fault.problem}"]
