@@ -85,6 +85,8 @@ def opened(chromium: Any, door: Door, width: int = WIDTHS[0]) -> Iterator[Any]:
     tab, faults = context.new_page(), list[str]()
     tab.on("console", lambda told: faults.append(f"{told.type}: {told.text}"))
     tab.on("pageerror", lambda error: faults.append(str(error)))
+    # A chooser is kept from now on: a key that comes before Chromium is asked to has none.
+    tab.on("filechooser", lambda _: None)
     tab.on("request", lambda asked: asked.url.startswith(door.address) or faults.append(asked.url))
     tab.goto(door.address)
     try:
