@@ -24,7 +24,7 @@ import pytest
 from scipy.io import savemat, wavfile
 
 from pendpipe.errors import InputError
-from pendpipe.formats import containers, dialects, inspect, read, table, trees
+from pendpipe.formats import apart, containers, dialects, inspect, read, table, trees
 from pendpipe.formats.dialects import matlab
 from pendpipe.formats.plugin import HEAD, Dialect, text_dialect
 
@@ -456,6 +456,21 @@ def test_arrays_of_other_files_are_not_read(tmp_path: Path, kind: str) -> None:
     outside(kind)(tmp_path / "a.h5", other)
     with pytest.raises(InputError, match="data sets of other files belong to it"):
         read(tmp_path / "a.h5")
+
+
+def test_a_damaged_file_that_keeps_its_library_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The heap of texts gets an object of no size, from which HDF5 steps on by nothing."""
+    sound = Path(__file__).parent / "arrays" / "swing.h5"
+    data, heap = sound.read_bytes(), bytes([2, *[0] * 7, 3, *[0] * 7])
+    (tmp_path / "a.h5").write_bytes(data.replace(b"rad\0", 2 * heap + b"rad\0"))
+    assert read(sound).values.size  # the process has begun
+    monkeypatch.setattr(apart, "WITHIN_S", 0.5)
+    with pytest.raises(InputError, match=r"took more than 0\.5 s"):
+        read(tmp_path / "a.h5")
+    monkeypatch.undo()
+    assert read(sound).values.size
 
 
 def test_a_pipe_as_the_storage_of_an_array_does_not_hang(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Files of named arrays: HDF5 (and MATLAB 7.3), NumPy, JSON, TDMS, sound."""
 
+import importlib
 import io
 import json
 import re
@@ -12,6 +13,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
+from pendpipe.formats.apart import called_apart
 from pendpipe.formats.clock import column_of_clock_times
 from pendpipe.formats.grammar import MOST_COLUMNS
 from pendpipe.formats.header import interval_of
@@ -196,8 +198,15 @@ def read_hdf5(place: Path, data: bytes, options: ReadOptions) -> Table:
     """Read the data sets of all groups, with the units among their attributes.
 
     What lies outside of the file is refused before it is opened: it could be any file of the
-    reader's, or a pipe.
+    reader's, or a pipe. A damaged file may keep the library for good, which is called apart.
     """
+    importlib.import_module("h5py")  # where it is not installed, that is said
+    tree, units = called_apart(hdf5_tree, data)
+    return table_of_tree(place, tree, "hdf5", options, units)
+
+
+def hdf5_tree(data: bytes) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return the data sets and attributes by their paths, and the units of the data sets."""
     import h5py
 
     tree: dict[str, Any] = {}
@@ -229,7 +238,7 @@ def read_hdf5(place: Path, data: bytes, options: ReadOptions) -> Table:
         tree.update(file.attrs)
         gather("", file)
         file.visititems(gather)
-    return table_of_tree(place, tree, "hdf5", options, units)
+    return tree, units
 
 
 def read_numpy(place: Path, data: bytes, options: ReadOptions) -> Table:
