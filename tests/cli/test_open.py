@@ -86,7 +86,7 @@ def test_nobody_else_is_answered(browser: Browser) -> None:
 
 
 def test_what_is_no_upload_is_refused_before_it_is_read(browser: Browser) -> None:
-    for length in (str(opening._LARGEST + 1), "-1", "many", ""):
+    for length in (str(opening._LARGEST + 1), "-1", "many", "", "9" * 5000):
         line = http.client.HTTPConnection("127.0.0.1", browser.door.server_port, timeout=10)
         line.putrequest("POST", f"/{browser.door.token}/files/a.csv")
         line.putheader("Content-Length", length)
@@ -97,6 +97,25 @@ def test_what_is_no_upload_is_refused_before_it_is_read(browser: Browser) -> Non
         assert browser.ask(path)[0] == 404
     for path in ("read/99", "files/", "files/..", "files/%00", "forget/99", "nothing/1"):
         assert browser.ask(path, b"1,2\n")[0] == 404
+
+
+def test_what_is_no_question_is_refused(browser: Browser, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_bytes(b"1,2\n")
+    number = browser.drop(tmp_path / "a.csv")
+    for body in (b"[]", b"1", b'"unit"', b"{", b"\xff", b"[" * 100_000):
+        assert browser.ask(f"read/{number}", body)[0] == 404
+    browser.ask(f"forget/{number}", b"")
+
+
+def test_two_files_of_one_name_are_told_apart(browser: Browser, tmp_path: Path) -> None:
+    numbers = list[int]()
+    for name in ("swing.csv", "swing.csv", "-a", "-a", "swing.csv"):
+        (tmp_path / name).write_bytes(b"no\nnumbers\n")
+        numbers.append(browser.drop(tmp_path / name))
+    names = [browser.door._files[number][1] for number in numbers]
+    assert names == ["swing.csv", "swing (2).csv", "./-a", "./-a (2)", "swing (3).csv"]
+    for number in numbers:
+        browser.ask(f"forget/{number}", b"")
 
 
 def test_its_answers_load_nothing_from_elsewhere(browser: Browser) -> None:

@@ -11,6 +11,7 @@ import io
 import json
 import multiprocessing
 import os
+import re
 import secrets
 import shlex
 import shutil
@@ -22,8 +23,9 @@ import webbrowser
 from collections.abc import Mapping, Sequence
 from contextlib import redirect_stderr, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from itertools import chain, count
 from math import degrees
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 from urllib.parse import unquote
@@ -256,19 +258,24 @@ class Door(ThreadingHTTPServer):
 
     def _take(self, name: str, body: bytes) -> int:
         """Keep what was dropped, in a folder of its own, and return its number."""
-        name = PurePosixPath(unquote(name).replace("\\", "/")).name
+        path = PurePosixPath(unquote(name).replace("\\", "/"))
         with self._lock:
             self._count += 1
             folder, number = self._folder / str(self._count), self._count
+            # A browser keeps the folders of what is dropped to itself.
+            taken = {PurePath(file).name for _, file in self._files.values()}
+            others = (f"{path.stem} ({n}){path.suffix}" for n in count(2))
+            name = next(each for each in chain([path.name], others) if each not in taken)
             if not self._ended:
                 folder.mkdir()
                 (folder / name).write_bytes(body)
-        self._files[number] = folder, f"./{name}" if name.startswith("-") else name
+            self._files[number] = folder, f"./{name}" if name.startswith("-") else name
         return number
 
     def _read(self, which: str, body: bytes) -> dict[str, Any]:
         """Analyse a recording by the options in the body; without them show what is known."""
         number, asked = int(which), json.loads(body) if body else None
+        refuse_if(not isinstance(asked, dict | None), "options", "no JSON object", "send one")
         folder, file = self._files[number]
         known = self._answers.get(number)
         if asked is not None or known is None:
@@ -362,7 +369,8 @@ class _Handler(BaseHTTPRequestHandler):
         if not self._is_ours():
             return
         length = self.headers.get("Content-Length", "")
-        if not length.isdecimal() or int(length) > _LARGEST:
+        # int() counts no more than 4,300 digits.
+        if not re.fullmatch("[0-9]{1,9}", length) or int(length) > _LARGEST:
             self.send_error(413, "Too large", "give its name to pendpipe open")
             return
         body = self.rfile.read(int(length))
@@ -382,7 +390,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _answer(self, body: bytes | None) -> None:
         try:
             kind, content = self.server.answer(self.path[1:].partition("/")[2], body)
-        except (KeyError, ValueError, OSError, InputError) as fault:
+        except (KeyError, ValueError, OSError, InputError, RecursionError) as fault:
             self.send_error(404, "Not found", str(fault))
             return
         self.send_response(200)
