@@ -120,6 +120,9 @@ def test_at_the_nodes_of_a_beat_no_rows_are_lost() -> None:
     # Curves without a name share the small misfit of rounding to 1, and widen what is quoted.
     quotes = found.improved.parameters["frequency"]
     assert abs(quotes.value - 0.70823) < 2.0 * quotes.sd < 0.5 * (0.7351 - 0.70823)
+    # Here the fit prints no T0, so that none is compared.
+    assert re.match(r"T0 [\d.]+\(\d+\) s, other mode 1\.360\d*\(\d+\) s", found.summary.quote)
+    assert found.summary.consequence[0].quantity == "a"
 
 
 @pytest.mark.slow

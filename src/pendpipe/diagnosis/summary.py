@@ -314,8 +314,10 @@ def name_of(identifier: str) -> str:
 def _changes(diagnosis: Outcome) -> tuple[Change, ...]:
     """Compare the numbers of the baseline with the averages that are quoted."""
     before, after = diagnosis.baseline.parameters, diagnosis.improved.parameters
-    found = []
-    if "frequency" in before and "frequency" in after:
+    found, fit = [], diagnosis.fit
+    # Of two modes that beat the fit has no T0.
+    beats = fit is not None and fit.hindered == "beat"
+    if "frequency" in before and "frequency" in after and not beats:
         found.append(
             Change(
                 "period",
@@ -329,7 +331,6 @@ def _changes(diagnosis: Outcome) -> tuple[Change, ...]:
         # What is held in both says nothing.
         if name in before and name in after and before[name].sd + after[name].sd > 0.0
     ]
-    fit = diagnosis.fit
     if fit is not None and fit.light != "red":
         better = diagnosis.improved.quality_factors
         found += [
@@ -426,16 +427,21 @@ def _decide_by(found: Sequence[FoundEffect]) -> str:
 
 def _quote(diagnosis: Outcome, changes: Sequence[Change]) -> str:
     """What can be quoted: T0 and Q of the better model, a, b, c that stay."""
-    said, unit = list[str](), diagnosis.unit
-    period = next((each for each in changes if each.quantity == "period"), None)
-    if period is not None:
-        better = period.with_missing
-        span = diagnosis.improved.period_span_s
+    said, unit, better = list[str](), diagnosis.unit, diagnosis.improved
+    modes = [each.parameters.get("f_2") for each in diagnosis.missing]
+    periods = [
+        with_error(each.value, each.sd, "s", short=True)
+        for frequency in (better.parameters.get("frequency"), *modes)
+        if frequency is not None
+        for each in [period_of_frequency(frequency)]
+    ]
+    if periods:
+        span = better.period_span_s
         drifts = f" in the mean, drifting by {compact(span[1] - span[0], 's')}" if span else ""
-        said.append(f"T0 {with_error(better.value, better.sd, 's', short=True)}{drifts}")
+        said.append(f"T0 {periods[0]}{drifts}{''.join(f', other mode {T}' for T in periods[1:])}")
     good = [
         f"{with_error(q.value, q.sd, short=True)} at {short_size(amplitude, unit)}"
-        for amplitude, q in diagnosis.improved.quality_factors.items()
+        for amplitude, q in better.quality_factors.items()
         if q.sd < 0.1 * q.value
     ]
     if good:
