@@ -558,8 +558,10 @@ def test_flat_tops_are_counted_sample_by_sample(top: float, cycles: int) -> None
     assert clipped_samples(low, None) == np.count_nonzero(swing >= top)
     assert clipped_samples(-low, None) == np.count_nonzero(swing >= top)
     assert clipped_samples(swing, None) == 0
-    # A span beyond all numbers is no warning: `inspect` counts what `read` refuses.
-    assert clipped_samples(np.array([0.0, 1.7e308, 0.1, -1.7e308, 0.2]), None) == 0
+    # A span beyond all numbers, and a NaN that signals, warn of nothing: `inspect` counts what
+    # `read` refuses.
+    signals = np.frombuffer(np.uint64(0x7FF0_0000_0000_0001).tobytes())[0]
+    assert clipped_samples(np.array([0.0, 1.7e308, 0.1, -1.7e308, signals]), None) == 0
     # A known limit is met to half a step.
     both = np.clip(swing, -0.5, 0.5)
     assert clipped_samples(both, 0.01, (-0.5, 0.5)) == np.count_nonzero(np.abs(swing) >= 0.495)

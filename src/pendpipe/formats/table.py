@@ -364,7 +364,7 @@ def find_gaps(time_s: FloatArray) -> list[Gap]:
     return [Gap(int(at), float(steps[at] - middle)) for at in np.flatnonzero(steps > limit)]
 
 
-@np.errstate(over="ignore")  # a span beyond all numbers is infinite
+@np.errstate(invalid="ignore", over="ignore")  # a span beyond all numbers; a NaN that signals
 def clipped_samples(
     values: FloatArray, step: float | None, limits: tuple[float, float] | None = None
 ) -> int:
