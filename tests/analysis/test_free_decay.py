@@ -731,8 +731,31 @@ def test_a_decay_is_one_run(share: float, count: int) -> None:
     assert (run.first, run.last, run.legs, run.bridged) == (0, count - 1, count, 0)
     assert run.path == pytest.approx(decay(count, share).sum())
     assert run.half_period_s == pytest.approx(HALF)
-    # Two half cycles tell no decay, and the more there are the nearer is the worth to the path.
-    assert run.worth == pytest.approx(run.path * (count - 2) / count)
+    # Information about a rate of n equal swings grows as n^3.
+    if share == 0.0:
+        assert run.worth**2 == pytest.approx((count**3 - count) / 12.0)
+
+
+def test_a_ring_that_is_repeated_is_a_decay() -> None:
+    """Each of sixty pushes rings for seven half cycles."""
+    time, pushes = np.arange(6000) / RATE, np.random.default_rng(2).uniform(0.5, 1.5, 59)
+    late = np.maximum(time[:, None] - np.arange(1, 60), 0.0)
+    rings = np.exp(-6.0 * late) * np.sin(8.0 * np.pi * late) @ pushes
+    found = find_free_decay(recording([rings], noise=1e-3))
+    assert found.half_cycles > 5
+    assert found.notes[-1].endswith("more decays are not used")
+
+
+def test_a_fall_by_chance_is_no_decay() -> None:
+    """Of sixty swings of any size three fall in turn in most records, five in few."""
+    taken = 0
+    for seed in range(40):
+        sizes = np.random.default_rng(seed).uniform(0.3, 1.0, 60)
+        levels = np.append(0.0, np.cumsum(sizes * (-1.0) ** np.arange(60)))
+        with contextlib.suppress(NotAnalysableError):
+            parts = [ramp(low, high, 0.6) for low, high in pairwise(levels.tolist())]
+            taken += find_free_decay(recording(parts, noise=1e-3)).half_cycles >= 3
+    assert taken <= 8
 
 
 @given(scale=st.floats(1e-3, 1e3), pace=st.floats(1e-2, 1e2), kick=st.floats(0.2, 2.0))

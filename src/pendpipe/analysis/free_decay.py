@@ -104,8 +104,13 @@ class Run:
 
     @property
     def worth(self) -> float:
-        """What it can tell: its path, less for a few half cycles (two tell no decay)."""
-        return self.path * (1.0 - 2.0 / self.legs)
+        """What it tells of loss and period, the error of a swing over that of their rates.
+
+        With swings s_k the root of their information, sum s_k^2 (k - <k>)^2.
+        """
+        weight, place = self.swing**2, np.arange(self.legs)
+        middle = float(weight @ place) / float(weight.sum())
+        return math.sqrt(float(weight @ (place - middle) ** 2))
 
     @property
     def legs(self) -> int:
@@ -393,17 +398,18 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     parts = [half_cycles(time[piece], values[piece], least, half_period) for piece in pieces]
     gapless = pieces == [slice(0, len(time))]
     whole = parts[0] if gapless else half_cycles(time, values, least, half_period)
+    every = sum(map(len, parts))
+    # Of so many others some fall in turn by chance: k of them one time in k!.
     found = [
         run
         for cycles, piece in zip(parts, pieces, strict=True)
         for run in best_runs(cycles, piece)
-        if run.legs >= LEAST_HALF_CYCLES
+        if every - run.legs <= math.factorial(min(run.legs, _MANY))
     ]
     told = max(found, key=lambda run: run.worth, default=None)
-    rivals = sum(run.path > 0.2 * told.path for run in found) - 1 if told else 0
     used = _chained(found, told) if told else []
-    beside = sum(run.path for run in found) - sum(run.path for run in used)
-    alone = told and beside <= 0.3 * told.path and _falls(told, least)
+    unused = sum(run.path for run in found) - sum(run.path for run in used)
+    alone = told and unused <= 0.3 * told.path and _falls(told, least)
     ends = (float(told.middle_s[0]), float(told.middle_s[-1])) if told else (math.inf, math.inf)
     held = told is not None and told.driven
     beat = _beating(
@@ -414,20 +420,10 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     if told is None:
         raise NotAnalysableError(
             place,
-            "no free decay: no three half cycles follow each other with falling amplitude",
+            "no free decay: no three half cycles follow each other with falling amplitude,"
+            " unless by chance",
             "handling, a clamp or a drive can't be analysed",
         )
-    if told.legs < _MANY and rivals >= max(2, told.legs // 3):
-        longer = [run for run in found if run.legs >= _MANY]
-        refuse_if(
-            not longer,
-            place,
-            f"no free decay, but {rivals + 1} short oscillations of about {told.legs} half cycles",
-            "irregular motion can't be analysed",
-            NotAnalysableError,
-        )
-        told = max(longer, key=lambda run: run.worth)
-        used = _chained(found, told)
     _refuse_without_fall(place, time[told.piece], values[told.piece], told, least)
     others = [run for run in found if run.path > 0.05 * told.path and run not in used]
     may_turn_over = recording.quantity == "angle_rad"
@@ -508,8 +504,9 @@ def _described(
         ),
         *(
             f"another decay of {other.legs} half cycles from {other.middle_s[0]:.6g} s is not used"
-            for other in others
+            for other in others[:3]
         ),
+        *([f"{len(others) - 3} more decays are not used"] if len(others) > 3 else []),
         *([f"{bridged} disturbed half cycle(s) inside the decay are kept"] if bridged else []),
     ]
     return FreeDecay(start, stop, cuts, half, sum(part.legs for part in used), notes)
