@@ -77,13 +77,15 @@ def named(identifier: str, **parameters: Estimate) -> FoundEffect:
     )
 
 
-BEFORE = FittedModel({"b": Estimate(0.0123, 0.0002, "1/s")}, 2e-4, 4.0, 1e-4)
+BEFORE = FittedModel("eq8", {"b": Estimate(0.0123, 0.0002, "1/s")}, 2e-4, 4.0, 1e-4)
 
 
-def searched(unexplained: float, remainder: Remainder | None = None) -> Any:
+def searched(unexplained: float, remainder: Remainder | None = None, p_value: float = 0.0) -> Any:
     """What a diagnosis asks of the search behind it."""
     return SimpleNamespace(
         unexplained=unexplained,
+        p_value=p_value,
+        beginning=SimpleNamespace(fit=None),
         remainder=remainder,
         data=SimpleNamespace(unit="rad", step=0.0),
         baseline=SimpleNamespace(model=SimpleNamespace(restoring="linear")),
@@ -93,13 +95,13 @@ def searched(unexplained: float, remainder: Remainder | None = None) -> Any:
 
 
 def details(effect: FoundEffect) -> list[str]:
-    found = Diagnosis("eq8", BEFORE, BEFORE, 0.0, (effect,), None, search=searched(0.5))
+    found = Diagnosis(BEFORE, BEFORE, (effect,), None, search=searched(0.5))
     return found.details.splitlines()
 
 
 def undisturbed(p_value: float) -> str:
-    model = FittedModel({}, 1e-4, 1.0, 1e-4)
-    return Diagnosis("eq8", model, model, p_value, (), None, search=searched(p_value)).details
+    model = FittedModel("eq8", {}, 1e-4, 1.0, 1e-4)
+    return Diagnosis(model, model, (), None, search=searched(p_value, p_value=p_value)).details
 
 
 def test_a_line_says_whether_the_law_holds_one_each_effect_and_one_what_is_left() -> None:
@@ -224,17 +226,15 @@ def parameters(frequency_hz: float) -> dict[str, Estimate]:
 
 
 def diagnosis(*effects: FoundEffect, left: Remainder | None = None, **more: Any) -> Diagnosis:
-    before = FittedModel(parameters(0.9), 2e-4, 4.0)
-    after = FittedModel(parameters(0.91), 1e-4, 1.0, 1e-4)
+    before = FittedModel("eq8", parameters(0.9), 2e-4, 4.0)
+    after = FittedModel("eq8", parameters(0.91), 1e-4, 1.0, 1e-4)
     held = HeldOut(1000.0, 1050.0, 5.0, 2e-4, 1.1e-4, 12, 11)
     return Diagnosis(
-        "eq8",
         before,
         after,
-        0.0 if effects else 0.9,
         effects,
         held,
-        search=searched(0.9, left),
+        search=searched(0.9, left, 0.0 if effects else 0.9),
         **more,
     )
 
@@ -256,7 +256,7 @@ def test_a_healthy_pendulum_takes_one_line() -> None:
 
 @pytest.mark.structure
 def test_a_misfit_that_chance_does_not_explain_is_not_nothing() -> None:
-    left = replace(diagnosis(), p_value=5e-10)
+    left = replace(diagnosis(), search=searched(0.9, p_value=5e-10))
     headline, copied = left.statement.splitlines()
     assert headline == "a small misfit is left, its cause is NOT known (p = 5e-10)"
     assert copied.endswith("(p = 5e-10); the cause was not identified.”")

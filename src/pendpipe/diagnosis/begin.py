@@ -51,6 +51,8 @@ class Beginning:
         Indices of values that are not fitted.
     starts
         What effects declare where the turning points beat.
+    fit
+        That of the recording, with which it begins.
     """
 
     data: Data
@@ -58,6 +60,7 @@ class Beginning:
     value: FloatArray
     held: tuple[int, ...]
     starts: tuple[Start, ...] = ()
+    fit: FitResult | None = None
 
 
 def begin(
@@ -130,7 +133,7 @@ def begin(
     # Held parts of b are handled by the model.
     of_model = (B, SHARE) if held.parts else ()
     places = tuple(place for place in held.places if place not in of_model)
-    return Beginning(data, model, value, places, starts)
+    return Beginning(data, model, value, places, starts, fit)
 
 
 def _far_from_the_stop(data: Data, value: FloatArray) -> Data:

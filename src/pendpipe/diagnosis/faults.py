@@ -29,20 +29,18 @@ _MOST_ROUNDS: Final = 12
 """Findings that are applied, and put back, of a record: about as many as there are tests."""
 
 
-def correct(state: Hypothesis, task: Task) -> Hypothesis:
-    """Correct what corrupts the fit: time stamps, lost samples, clipping, glitches."""
-    return _with_findings(state, task, last=False)
-
-
 def examine(state: Hypothesis, task: Task) -> Hypothesis:
     """Make the tests that need the final model: any misfit could look like what they find."""
     again = {finder.name for finder in FINDERS if finder.last}
     notes = {name: said for name, said in state.notes.items() if name not in again}
-    return _with_findings(replace(state, notes=notes), task, last=True)
+    return correct(replace(state, notes=notes), task, last=True)
 
 
-def _with_findings(state: Hypothesis, task: Task, *, last: bool) -> Hypothesis:
-    """Apply the finding that pays most, and fit again, until none pays."""
+def correct(state: Hypothesis, task: Task, *, last: bool = False) -> Hypothesis:
+    """Correct what corrupts the fit: time stamps, lost samples, clipping, glitches.
+
+    The finding that pays most is applied, and the model fitted again, until none pays.
+    """
     for _ in range(_MOST_ROUNDS if state.samples is not None else 0):
         evidence = _evidence(state)
         found = [

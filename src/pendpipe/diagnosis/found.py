@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.estimate import Estimate
 from pendpipe.files import fields_of
+
+if TYPE_CHECKING:
+    from pendpipe.diagnosis.cycles import SmallSwings
 
 COLOURED_NOISE: Final = "coloured-noise"
 """What is reported of the noise, and is nothing that a model lacks."""
@@ -38,6 +41,9 @@ class FittedModel:
     the probability (`quoted`).
     """
 
+    name: str = field(metadata={"json": None})
+    """Of the baseline."""
+
     parameters: Mapping[str, Estimate]
     residual_rms_rad: float
     chi2_per_dof: float
@@ -47,12 +53,14 @@ class FittedModel:
     quality_factors: Mapping[float, Estimate] = field(default_factory=dict)
     period_span_s: tuple[float, float] | None = None
     """Within which the period of small swings drifts, of which the frequency is the mean."""
+    small_swings: SmallSwings | None = field(default=None, metadata={"json": None})
+    """How the frequency differs from the model's at the smallest amplitudes, if it does."""
 
     @classmethod
     def of_fit(cls, fit: FitResult) -> FittedModel:
         """Take the numbers, the residual and the noise of a fit, all of its readings."""
         left = fit.residual_rms_rad, fit.chi2_per_dof, fit.noise_rms_rad
-        return cls(fit.parameters, *left, fit.fit_p_value)
+        return cls(fit.baseline, fit.parameters, *left, fit.fit_p_value)
 
     def as_json(self) -> dict[str, Any]:
         """Return the contract's form."""

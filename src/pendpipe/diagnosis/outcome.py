@@ -19,7 +19,6 @@ from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.levels import FALSE_ALARM
 
 if TYPE_CHECKING:
-    from pendpipe.diagnosis.cycles import SmallSwings
     from pendpipe.diagnosis.held_out import HeldOut
     from pendpipe.diagnosis.hypothesis import Hypothesis
     from pendpipe.diagnosis.remainder import Remainder
@@ -31,49 +30,55 @@ class Outcome:
 
     Parameters
     ----------
-    baseline_name, baseline, improved
+    baseline, improved
         The model that was asked for, and the one with the effects that were found.
-    p_value
-        Global: of the largest score over the whole catalogue.
     effects
         What the baseline has, and the missing in the order in which they were added.
     held_out
         None where nothing was added.
-    small_swings
-        How the frequency differs from the improved model's at the smallest amplitudes, if it does.
     name
         Of the recording.
-    fit
-        The fit that the diagnosis began with.
     search
         The fits and readings behind it; None where nothing could be fitted.
     alone, recordings
         Of several recordings: each one's own diagnosis, and what is said of it.
     drawn_by
         Imports what draws it (`pendpipe.api`): a result knows no figures.
-    drag_form
-        That the readings prefer.
     level
         The p-value from which chance explains a misfit.
     """
 
-    baseline_name: str
     baseline: FittedModel
     improved: FittedModel
-    p_value: float
     effects: tuple[FoundEffect, ...]
     held_out: HeldOut | None
     warnings: tuple[str, ...] = ()
-    small_swings: SmallSwings | None = None
-    drag_form: str = "energy"
     provenance: Mapping[str, Any] = field(default_factory=dict)
     name: str = ""
-    fit: FitResult | None = field(default=None, repr=False, compare=False)
     search: Hypothesis | None = field(default=None, repr=False, compare=False)
     alone: tuple[Outcome, ...] = field(default=(), repr=False, compare=False)
     recordings: tuple[dict[str, Any], ...] = ()
     level: float = FALSE_ALARM
     drawn_by: Callable[[], Any] | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def p_value(self) -> float:
+        """Global: of the largest score over the whole catalogue; of several, of all searches."""
+        if self.search is None:
+            return math.nan
+        found = [self.search.p_value, *(each.p_value for each in self.alone)]
+        return min(1.0, len(found) * min(found))
+
+    @property
+    def fit(self) -> FitResult | None:
+        """The fit that the diagnosis began with."""
+        return None if self.search is None else self.search.beginning.fit
+
+    @property
+    def drag_form(self) -> str:
+        """That the readings prefer; of several recordings together that of the first."""
+        fit = self.alone[0].fit if self.alone else self.fit
+        return "energy" if fit is None or fit.light == "red" else fit.drag_form
 
     @property
     def missing(self) -> tuple[FoundEffect, ...]:
@@ -98,8 +103,6 @@ class Outcome:
     @property
     def restoring(self) -> Restoring:
         """The baseline's torque; of several recordings together that of the first."""
-        if self.alone:
-            return self.alone[0].restoring
         return "linear" if self.search is None else self.search.baseline.model.restoring
 
     @property
@@ -118,10 +121,7 @@ class Outcome:
     @property
     def unit(self) -> str:
         """Of the motion."""
-        if self.search is not None:
-            return self.search.data.unit
-        amplitude = self.baseline.parameters.get("amplitude")
-        return "rad" if amplitude is None else amplitude.unit
+        return "rad" if self.search is None else self.search.data.unit
 
     @property
     def wanders(self) -> bool:

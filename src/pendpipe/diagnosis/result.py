@@ -59,7 +59,7 @@ class Diagnosis(Outcome):
             finite(
                 {
                     "schema_version": 1,
-                    "baseline": {"name": self.baseline_name, **self.baseline.as_json()},
+                    "baseline": {"name": self.baseline.name, **self.baseline.as_json()},
                     "restoring": self.restoring,
                     "drag_form": self.drag_form,
                     "noise_rms_rad": self.noise_rms_rad,
@@ -74,7 +74,7 @@ class Diagnosis(Outcome):
                         "p_value": self.unexplained_p_value,
                     },
                     "remainder": self.remainder,
-                    "small_amplitudes": self.small_swings,
+                    "small_amplitudes": self.improved.small_swings,
                     "statement": self.statement,
                     "summary": self.summary,
                     "details": self.details,
@@ -151,9 +151,9 @@ def not_analysable(
     provenance
         Goes into the result.
     """
-    nothing = FittedModel({}, math.nan, math.nan, math.nan)
+    nothing = FittedModel(baseline, {}, math.nan, math.nan, math.nan)
     answer = f"This recording can't be analysed: {reason}."
-    empty = Diagnosis(baseline, nothing, nothing, math.nan, (), None).to_dict()
+    empty = Diagnosis(nothing, nothing, (), None).to_dict()
     return dict(
         plain(
             {

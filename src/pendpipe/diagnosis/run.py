@@ -40,8 +40,7 @@ from pendpipe.diagnosis.values import parameters_of
 from pendpipe.diagnosis.weighing import effect_named, fault_named
 from pendpipe.dynamics.any_law import NoMotionError, sample_pieces
 from pendpipe.dynamics.eq8 import Restoring
-from pendpipe.effects import Effect
-from pendpipe.effects.catalogue.losses import drag_form as drag_form_effect
+from pendpipe.effects.catalogue.losses import drag_form
 from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import Estimate
@@ -155,24 +154,16 @@ def diagnose_recording(
     effects = _in_order(found, samples)
     verdict = verdict_of(effects, found.p_value, level)
     # A part of b that is held bounds b here alone.
-    printed = None if beginning.model.parts else fit
-    stands = printed if printed and printed.light != "red" else None
-    before, after, leading = _models(found, printed, level)
-    drag_form = stands.drag_form if stands else "energy"
+    before, after = _models(found, None if beginning.model.parts else fit, baseline, level)
     gap = gap_note((whole or recording).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
     stamps = tuple(note for note in (gap, *found.notes.values()) if note)
     return Diagnosis(
-        baseline,
         before,
         after,
-        found.p_value,
-        (*_presumed(found, drag_form), *effects),
+        (*_presumed(found), *effects),
         _left_out(found, beginning.held, progress) if verdict != "consistent" else None,
         warnings=(*points.notes, *stamps),
-        small_swings=_small_swings(leading, found),
-        drag_form=drag_form,
         provenance=dict(provenance or {}),
-        fit=fit,
         name=Path(place).name if str(place) != "recording" else "",
         search=found,
         level=level,
@@ -200,14 +191,15 @@ def _angle_of(
 
 
 def _models(
-    found: Hypothesis, fit: FitResult | None, level: float
-) -> tuple[FittedModel, FittedModel, Fit]:
-    """Return the baseline as it is printed, the model with what is missing, and its fit.
+    found: Hypothesis, fit: FitResult | None, name: str, level: float
+) -> tuple[FittedModel, FittedModel]:
+    """Return the baseline as it is printed, and the model with what is missing.
 
     The baseline's numbers are those of the fit, where that stands; the others are averages over
     the descriptions that share the probability.
     """
-    before = _fitted_model(with_errors(found.baseline, found.data, found.noise), found)
+    bare = with_errors(found.baseline, found.data, found.noise)
+    before = _fitted_model(bare, found, name)
     if fit:
         law, small = before, {"frequency": small_frequency(fit)}
         if fit.light != "red":
@@ -216,19 +208,20 @@ def _models(
         # What it leaves of other readings, or beside a zero that drifts, compares with nothing.
         before = replace(law if of_all else before, parameters={**law.parameters, **small})
     if _adds_nothing(found) and found.fit.error_scale == 1.0:
-        return before, before, found.fit
+        return before, before
     said = quoted(found, fit, level)
     # One law has one noise and one error of each number, whatever it leaves.
     after = before
     if not _adds_nothing(found):
         parameters = {**parameters_of(said.leading, found.data), **said.constants}
-        after = replace(_fitted_model(found.fit, found), parameters=parameters)
+        after = replace(_fitted_model(found.fit, found, name), parameters=parameters)
     after = replace(
         after,
         quality_factors=said.quality_factors,
         period_span_s=said.period_span_s,
+        small_swings=_small_swings(said.leading, found),
     )
-    return before, after, said.leading
+    return before, after
 
 
 def _adds_nothing(found: Hypothesis) -> bool:
@@ -288,40 +281,44 @@ def _fit_of(
         return None
 
 
-def _presumed(found: Hypothesis, drag_form: str) -> tuple[FoundEffect, ...]:
-    """List what the baseline has that Eq. 8 has not: sin x, and v|v| where that was fitted."""
-    law = found.baseline.at.span.pendulum
-    swung = [circular_error] if law.has(circular_error.form) else []
-    dragged = [drag_form_effect] if drag_form == "speed" and law.has(drag_form_effect.form) else []
-    return tuple(_as_presumed(each, found) for each in (*swung, *dragged))
+def _presumed(found: Hypothesis) -> tuple[FoundEffect, ...]:
+    """List what the baseline has that Eq. 8 has not: sin x, and v|v| where that was fitted.
 
-
-def _as_presumed(effect: Effect, found: Hypothesis) -> FoundEffect:
-    """Return what an effect of the baseline explains, to first order beside its other numbers."""
-    fit = found.baseline
-    (column,) = whitened(fit, found.noise, effect, [()])
-    worth = float(np.sum(fit.beside(column, ()) ** 2))
+    What each explains is told to first order beside the baseline's other numbers.
+    """
+    fit, begun = found.baseline, found.beginning.fit
+    dragged = (drag_form,) if begun is not None and begun.drag_form == "speed" else ()
+    law = fit.at.span.pendulum
     everywhere = replace(
         Location.over(found.data.time_s, fit.at.sampled.amplitude),
         summary="it is fitted, throughout the record",
     )
-    return FoundEffect(
-        effect.identifier,
-        effect.name,
-        effect.kind,
-        effect.equation,
-        {},
-        worth,
-        math.erfc(math.sqrt(0.5 * worth)),
-        1.0 / (1.0 + math.exp(-0.5 * min(worth + effect.prior, 1e3))),
-        (),
-        effect.discriminating_test,
-        everywhere,
-        presumed=True,
-    )
+    presumed = list[FoundEffect]()
+    for effect in (circular_error, *dragged):
+        if not law.has(effect.form):
+            continue
+        (column,) = whitened(fit, found.noise, effect, [()])
+        worth = float(np.sum(fit.beside(column, ()) ** 2))
+        presumed.append(
+            FoundEffect(
+                effect.identifier,
+                effect.name,
+                effect.kind,
+                effect.equation,
+                {},
+                worth,
+                math.erfc(math.sqrt(0.5 * worth)),
+                1.0 / (1.0 + math.exp(-0.5 * min(worth + effect.prior, 1e3))),
+                (),
+                effect.discriminating_test,
+                everywhere,
+                presumed=True,
+            )
+        )
+    return tuple(presumed)
 
 
-def _fitted_model(fit: Fit, found: Hypothesis) -> FittedModel:
+def _fitted_model(fit: Fit, found: Hypothesis, name: str) -> FittedModel:
     """Return a fit's residual and parameters.
 
     Residual, chi^2 and noise are those of a reading.
@@ -329,6 +326,7 @@ def _fitted_model(fit: Fit, found: Hypothesis) -> FittedModel:
     data = found.data
     left, by_baseline = (data.rms_left(each.at.reading) for each in (fit, found.baseline))
     return FittedModel(
+        name,
         parameters_of(fit, data),
         data.rms_of_reading(left),
         data.chi2_per_dof(fit.chi2, len(fit.free)),

@@ -139,8 +139,6 @@ def diagnose_several(
     before = replace(after, improved=found.baseline, described=[Description(1.0, bare)])
     named, differing = after.effects()
     events = after.events()
-    p_value = min([found.p_value, *(outcome.p_value for outcome in outcomes)])
-    p_value = min(1.0, (len(outcomes) + 1) * p_value)
     own_forms = [each for each in outcomes[0].effects if each.presumed]
     effects = (*own_forms, *named, *differing, *events)
     held = (
@@ -149,10 +147,8 @@ def diagnose_several(
         else None
     )
     return Diagnosis(
-        baseline,
         before.model(),
         after.model(),
-        p_value,
         effects,
         held,
         warnings=tuple(
@@ -160,7 +156,6 @@ def diagnose_several(
             for name, outcome in zip(names, outcomes, strict=True)
             for line in outcome.warnings
         ),
-        drag_form=outcomes[0].drag_form,
         provenance=dict(provenance or {}),
         name=f"{listed(names)} together",
         search=found,
@@ -384,6 +379,7 @@ class _Together:
             if name in MAY_DIFFER and name not in {*self.own, *self.differing}
         }
         return FittedModel(
+            self.outcomes[0].baseline.name,
             shared,
             float(np.sqrt(size @ left**2 / size.sum())),
             (fit.chi2 + within) / max(float(size.sum()) - len(fit.free), 1.0),

@@ -453,9 +453,8 @@ def _quote(diagnosis: Outcome, changes: Sequence[Change]) -> str:
 
 
 def _sentence(diagnosis: Outcome, names: Sequence[str], presumed: str) -> str:
-    model = {"eq8": "Eq. 8", "viscous": "Eq. 3"}.get(
-        diagnosis.baseline_name, diagnosis.baseline_name
-    )
+    name = diagnosis.baseline.name
+    model = {"eq8": "Eq. 8", "viscous": "Eq. 3"}.get(name, name)
     model += f" with {presumed}" if presumed else ""
     p = printed(diagnosis.p_value)
     if not names:
@@ -467,7 +466,7 @@ def swinging(outcome: Outcome) -> str:
     """Return the baseline with its forms, in words."""
     forms = {"sin x": outcome.restoring == "sine", "v|v|": outcome.drag_form == "speed"}
     with_them = " and ".join(name for name, has in forms.items() if has)
-    name = BASELINES.get(outcome.baseline_name, outcome.baseline_name)
+    name = BASELINES.get(outcome.baseline.name, outcome.baseline.name)
     return name + (f" with {with_them}" if with_them else "")
 
 
@@ -484,7 +483,7 @@ def details_of(outcome: Outcome) -> list[str]:
         f" {size} rms, {factor(left / noise_rms)} times the noise of {noise_is}.",
         *map(_effect, shared),
         _rest(outcome.unexplained_p_value, outcome.level, outcome.remainder),
-        *([outcome.small_swings.sentence(unit)] if outcome.small_swings is not None else []),
+        *([small.sentence(unit)] if (small := outcome.improved.small_swings) is not None else []),
     ]
     if len(noise) == len(shared):
         what = f"the motion of {whole}, whose zero wanders" if outcome.wanders else whole

@@ -79,7 +79,7 @@ class Shown:
     @property
     def baseline_name(self) -> str:
         """For legends."""
-        return NAMES.get(self.diagnosis.baseline_name, self.diagnosis.baseline_name)
+        return NAMES.get(self.diagnosis.baseline.name, self.diagnosis.baseline.name)
 
     @property
     def models(self) -> list[tuple[str, Fit]]:
