@@ -13,11 +13,13 @@ import pytest
 
 import pendpipe as pp
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics import Eq8, machine_code
+from pendpipe.dynamics import Eq8, Release, machine_code, sample_with_jacobian
 from pendpipe.dynamics.kernel import Kernel, Matrix, _tell, folders, kernel, shipped
 from pendpipe.dynamics.layout import (
+    FEW_POINTS,
     HEAD,
     MOST_PANELS,
+    MOST_POINTS,
     NODE_COUNT,
     REQUEST,
     ROW,
@@ -25,6 +27,7 @@ from pendpipe.dynamics.layout import (
     WORK_SIZE,
 )
 from pendpipe.dynamics.march import march
+from pendpipe.dynamics.table import _interpolate
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FILES = [str(EXAMPLES / f"{name}-pendulum.csv") for name in ("rod", "string")]
@@ -318,3 +321,36 @@ def test_without_a_compiler_a_fit_prints_the_same_digits(hidden: str, tmp_path: 
     )
     assert found.stdout == "".join(f"{pp.fit(file)}\n" for file in FILES)
     assert list(tmp_path.iterdir()) == [], "nothing is compiled"
+
+
+@pytest.mark.parametrize("amplitude_rad", [0.3, 2.9])
+def test_arrays_in_place_of_machine_code_move_the_same_pendulum(
+    monkeypatch: pytest.MonkeyPatch, amplitude_rad: float
+) -> None:
+    """Angles and derivatives: what the sums' other order rounds otherwise is below 1e-9."""
+    law = Eq8(3.2, quadratic=1e-3, hysteretic=2e-3, viscous=1e-3, coulomb=2e-4, restoring="sine")
+    release, time_s = Release(0.0, amplitude_rad), np.linspace(0.0, 80.0, 400)
+    compiled = sample_with_jacobian(law, release, time_s)
+    monkeypatch.setattr(Kernel, "__call__", Kernel._without_machine_code)
+    for ours, theirs in zip(compiled, sample_with_jacobian(law, release, time_s), strict=True):
+        assert np.all(abs(theirs - ours) <= 1e-9 * abs(ours).max(axis=0))
+
+
+@pytest.mark.parametrize("points", [FEW_POINTS, MOST_POINTS])
+@pytest.mark.parametrize(
+    ("column", "size"), [(0, 1e-9), (1, 1e-8), (2, 1.0), (3, 1e-9), (7, 1.0), (8, 1.0)]
+)
+@pytest.mark.parametrize("before_last", [0, 1])
+def test_arrays_refuse_the_table_that_loops_refuse(
+    points: int, column: int, size: float, before_last: int
+) -> None:
+    """By the last two coefficients of the loss, of the excess, or of a low power of time."""
+    nodes = np.cos(np.pi * (np.arange(points) + 0.5) / points)
+    rows = np.zeros((MOST_POINTS + 1, 9))
+    rows[:points] = 1.0 + nodes[:, None] * np.arange(9)
+    found = list[bool]()
+    for more in (0.0, size):
+        rows[:points, column] += more * np.cos((points - 1 - before_last) * np.arccos(nodes))
+        given = points, 9, rows, 2, 6, 0.0, np.zeros((MOST_POINTS, 9))
+        found += [_interpolate.function(*given), _interpolate.arrays(*given)]
+    assert found == [True, True, *[column in (2, 7, 8)] * 2]

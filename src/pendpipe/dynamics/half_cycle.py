@@ -26,6 +26,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.chebyshev import INTEGRATION_T
 from pendpipe.dynamics.kernel import Matrix, kernel
@@ -260,7 +262,17 @@ def emit(
     return end
 
 
-@kernel()
+def _derivatives(work: Work, theta: FloatArray, time_s: FloatArray, out: Matrix, at: int) -> None:
+    rates, into = work.rates, out[1:, at : at + theta.size]
+    powers = np.vander(theta, NODE_COUNT, increasing=True)
+    by_time, by_release, *columns = work.total[1 : rates + 3] @ powers.T
+    into[:rates] = columns
+    late = (time_s - work.release_s) * by_time
+    into[rates] = late - work.rate[:rates] / work.omega @ into[:rates]
+    into[rates + 1], into[rates + 2] = by_release, -work.omega * by_time
+
+
+@kernel(arrays=_derivatives)
 def _emit_derivatives(
     work: Work, theta: FloatArray, time_s: FloatArray, out: Matrix, at: int
 ) -> None:

@@ -36,7 +36,9 @@ SHIPPED: Final = Path(__file__).parent / "shipped"
 """Machine code for many machines, made while the package is built (`setup.py`)."""
 
 
-def kernel(*, any_order: bool = False, inline: bool = False) -> Callable[[_F], _F]:
+def kernel(
+    *, any_order: bool = False, inline: bool = False, arrays: Callable[..., Any] | None = None
+) -> Callable[[_F], _F]:
     """Declare a function of numbers and arrays that runs as machine code.
 
     It allocates nothing and raises nothing: what it fills is given to it. Other kernels may
@@ -50,11 +52,14 @@ def kernel(*, any_order: bool = False, inline: bool = False) -> Callable[[_F], _
         Its sums may be taken in any order; so the compiler can vectorise them.
     inline
         Compile it into its callers, where it is known what does not overlap.
+    arrays
+        The same in numpy, for where there is no machine code: Python counts too slowly for the
+        innermost loops.
     """
     # Multiplications and additions may be fused.
     fastmath = {"contract", "reassoc", "nsz"} if any_order else {"contract"}
     options = {"fastmath": fastmath, "forceinline": inline}
-    return cast("Callable[[_F], _F]", functools.partial(Kernel, options=options))
+    return cast("Callable[[_F], _F]", functools.partial(Kernel, options=options, arrays=arrays))
 
 
 class Kernel:
@@ -62,8 +67,10 @@ class Kernel:
 
     __name__: str
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
-        self.function, self.options = function, options
+    def __init__(
+        self, function: Callable[..., Any], options: dict[str, Any], arrays: Any = None
+    ) -> None:
+        self.function, self.options, self.arrays = function, options, arrays
         functools.update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -109,6 +116,8 @@ class Kernel:
     def plain(self) -> Callable[..., Any]:
         """The function for Python, where log(-1) is nan as in machine code, and no fault."""
         function = self.function
+        if self.arrays is not None:
+            return self.arrays  # type: ignore[no-any-return]
         as_in_c = {name: getattr(np, name) for name in dir(math) if hasattr(np, name)}
         as_in_c |= {"floor": math.floor, "ceil": math.ceil}  # whole numbers
         own = function.__globals__ | {"math": SimpleNamespace(**as_in_c)}

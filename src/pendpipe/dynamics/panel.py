@@ -36,6 +36,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.chebyshev import ANALYSIS_T, INTEGRATION_T, NODES, POWERS_T
 from pendpipe.dynamics.kernel import kernel
@@ -55,7 +57,11 @@ CENTRE, HYSTERETIC, QUADRATIC, VISCOUS, CURVATURE, SPEED = range(6)
 """m, h, q, g, k and f in the array `shape`."""
 
 
-@kernel(inline=True)
+def _product(a: FloatArray, x: FloatArray, p: int, out: FloatArray, to: int) -> None:
+    out[to : to + NODE_COUNT] = x[p : p + NODE_COUNT] @ a
+
+
+@kernel(inline=True, arrays=_product)
 def multiply(transposed: FloatArray, x: FloatArray, p: int, out: FloatArray, to: int) -> None:
     """Write the product of a matrix, given transposed, and the 17 values x[p:] to out[to:].
 
@@ -318,7 +324,12 @@ def time_nodes(node: FloatArray, half_width: float, chebyshev: FloatArray) -> fl
     return float(duration)
 
 
-@kernel()
+def _cosines(node: FloatArray, chebyshev: FloatArray) -> None:
+    zeta = node[ZETA : ZETA + NODE_COUNT]
+    chebyshev[:] = np.cos(np.outer(np.arange(NODE_COUNT), np.arccos(zeta)))
+
+
+@kernel(arrays=_cosines)
 def _tabulate_chebyshev(node: FloatArray, chebyshev: FloatArray) -> None:
     """Write T_k(zeta) to ``chebyshev[k]``."""
     for i in range(NODE_COUNT):
@@ -342,7 +353,11 @@ def polynomial(
     multiply(POWERS_T, values, 0, out, to)
 
 
-@kernel()
+def _powers(c: FloatArray, theta: FloatArray, out: FloatArray) -> None:
+    out[:] = np.vander(theta, NODE_COUNT, increasing=True) @ c
+
+
+@kernel(arrays=_powers)
 def horner(c: FloatArray, theta: FloatArray, out: FloatArray) -> None:
     """Evaluate the polynomial of degree 16 with coefficients `c` at `theta`.
 

@@ -123,7 +123,26 @@ def build(work: Work, rows: Matrix, log_y: float, span: float, panels: int) -> i
     return DONE
 
 
-@kernel()
+def _transformed(
+    points: int,
+    width: int,
+    rows: FloatArray,
+    first: int,
+    per_panel: int,
+    excess: float,
+    table: FloatArray,
+) -> bool:
+    own = _MANY_ANALYSIS if points == MOST_POINTS else _FEW_ANALYSIS
+    found = own @ rows[:points, :width]
+    table[:points, :width] = _POWERS[:points, :points].T @ found
+    last, least = abs(found[-2:]), _LOSS_TOLERANCE * rows[:points, 0].min()
+    power = (np.arange(width) - first) % per_panel
+    low = (np.arange(width) >= first) & (power > 0) & (power <= _LOW_POWERS)
+    within = [last[:, 0] <= least, last[:, 1] <= max(least, excess)]
+    return bool(np.all(within) and np.all(last[:, low] <= _WAVEFORM_TOLERANCE))
+
+
+@kernel(arrays=_transformed)
 def _interpolate(
     points: int,
     width: int,
@@ -165,7 +184,14 @@ def _interpolate(
     return resolved
 
 
-@kernel()
+def _series(
+    segment: FloatArray, table: FloatArray, log_y: float, width: int, row: FloatArray
+) -> None:
+    z, points = (log_y - segment[MIDDLE]) * segment[INVERSE], int(segment[POINTS])
+    row[:width] = z ** np.arange(points) @ table[:points, :width]
+
+
+@kernel(arrays=_series)
 def look_up(
     segment: FloatArray, table: FloatArray, log_y: float, width: int, row: FloatArray
 ) -> None:
