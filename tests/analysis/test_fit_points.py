@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -161,6 +162,23 @@ def test_the_unknown_share_widens_the_time_of_release() -> None:
     assert shape > 0.2 * max(np.abs(ends))
     found = either.covariance[1, 1] - known.covariance[1, 1]
     assert found == pytest.approx(added, rel=0.03)
+
+
+def test_a_first_turning_point_on_the_wrong_side_has_an_answer() -> None:
+    """A fit put it at zero, by which c is divided."""
+    time = np.arange(9) * (math.pi / OMEGA)
+    points = table(time, np.full(9, 0.01), 1e-3)
+    angle, sd = points.angle_rad.copy(), points.angle_sd_rad.copy()
+    angle[0], sd[0] = -angle[0], 1e-6
+    fit = pp.fit(replace(points, angle_rad=angle, angle_sd_rad=sd))
+    assert fit["amplitude"].value > 0.0
+    assert "a" not in fit.quotable
+
+
+def test_sin_x_is_refused_where_all_turn_beyond_its_top() -> None:
+    time = np.arange(9) * (math.pi / OMEGA)
+    with pytest.raises(pp.InputError, match="below pi rad"):
+        pp.fit(table(time, 10.0 * np.exp(-0.1 * time), 1e-3), restoring="sine")
 
 
 def test_the_level_error_does_not_reach_the_rates() -> None:

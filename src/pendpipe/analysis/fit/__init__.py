@@ -190,9 +190,22 @@ def fit_turning_points(
     """Fit Eq. 14 to turning points whose readings are not there; see `fit_recording`."""
     position = restoring == "sine" and points.unit == "m"
     points, _ = as_angles(points, length, position=position)
+    _check_torque(restoring, points, "turning points")
     torque = restoring or restoring_of(points)
     found = fit_points(points, baseline=baseline, fixed=fixed, restoring=torque)
     return replace(found, points=points, cuts=tuple(cut._asdict() for cut in points.cuts))
+
+
+def _check_torque(restoring: Restoring | None, points: TurningPoints, place: str | Path) -> None:
+    """Refuse sin x where too few turning points lie below its top."""
+    refuse_if(
+        restoring == "sine" and not may_be_sine(points),
+        place,
+        "sin x needs three turning points below pi rad (the largest is"
+        f" {np.max(points.amplitude_rad):.3g}{after_number(points.unit)})",
+        "use --restoring linear",
+        NotAnalysableError,
+    )
 
 
 def _fit(
@@ -206,14 +219,7 @@ def _fit(
     place: str | Path,
     stated: bool,
 ) -> FitResult:
-    refuse_if(
-        restoring == "sine" and not may_be_sine(points),
-        place,
-        "sin x needs three turning points below pi rad (the largest is"
-        f" {np.max(points.amplitude_rad):.3g}{after_number(points.unit)})",
-        "use --restoring linear",
-        NotAnalysableError,
-    )
+    _check_torque(restoring, points, place)
     if method == "turning-points":
         torque = restoring or restoring_of(points, stated=stated)
         return fit_points(points, baseline=baseline, fixed=fixed, restoring=torque)

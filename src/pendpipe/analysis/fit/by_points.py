@@ -38,7 +38,8 @@ from pendpipe.solve import (
 
 ENVELOPE: Final = ("a", "b", "c", "amplitude", "level")
 Decay = Callable[..., tuple[FloatArray, FloatArray]]
-BOUNDS: Final = Bounds(np.array([0.0, 0.0, 0.0, 0.0, -np.inf]), np.full(5, np.inf))
+_LEAST: Final = 1e-12
+"""Of the largest amplitude, as exactly as it is computed: by less nothing is divided."""
 
 
 @dataclass(frozen=True)
@@ -94,17 +95,19 @@ def fit_envelope(
         return columns / sd[:, None]
 
     start, held = _start(points, fixed or {})
-    found = minimise(squares(residual, derivatives, BOUNDS, _of_level(points)), start, held=held)
+    bounds, prior = known_of(points)
+    found = minimise(squares(residual, derivatives, bounds, prior), start, held=held)
     a, b, c, y0, level = found.value
     model = decay(time, y0, a, b, c)[0]
     left = measured - model - shared * level
     return EnvelopeFit(found.value, found.point.quadratic, held, model, left, found.converged)
 
 
-def _of_level(points: TurningPoints) -> Priors:
-    """The prior of the level's error."""
-    least = 1e-12 * float(np.max(np.abs(points.amplitude_rad)))
-    return Priors(np.array([4]), np.zeros(1), np.array([max(points.level_sd_rad, least)]))
+def known_of(points: TurningPoints) -> tuple[Bounds, Priors]:
+    """The bounds of a, b, c, y0 and the level's error, and the prior of that error."""
+    least = _LEAST * float(np.max(np.abs(points.amplitude_rad)))
+    bounds = Bounds(np.array([0.0, 0.0, 0.0, least, -np.inf]), np.full(5, np.inf))
+    return bounds, Priors(np.array([4]), np.zeros(1), np.array([max(points.level_sd_rad, least)]))
 
 
 def fit_energies(
@@ -133,8 +136,8 @@ def fit_energies(
     share
         The hysteretic share of b.
     """
-    measured, sd, prior = points.amplitude_rad, points.angle_sd_rad, _of_level(points)
-    base = np.array([0.0, 0.0, 0.0, measured[0], 0.0])
+    measured, sd, (bounds, prior) = points.amplitude_rad, points.angle_sd_rad, known_of(points)
+    base = bounds.clip(np.array([0.0, 0.0, 0.0, measured[0], 0.0]))
     start, held = _with_held(points, fixed or {}, base)
     free = fit_period(points, measured, (0.0, 0.0, 0.0), share=share, restoring=restoring)
     swings = np.diff(points.half_cycle) / free.angular_frequency
@@ -151,12 +154,12 @@ def fit_energies(
         rows = np.vstack([jacobian / sd[:, None], prior.rows(5)])
         residual = (energy - energy[0]) / slope - jacobian @ (start - base)
         left = np.append(residual / sd, prior.residual(start))
-        step = bounded_step(rows.T @ rows, rows.T @ left, BOUNDS.about(start), held)
+        step = bounded_step(rows.T @ rows, rows.T @ left, bounds.about(start), held)
         value, residual, left = start + step, residual - jacobian @ step, left - rows @ step
         model = measured - residual - shared * value[4]
         y = np.clip(model, 0.0, most)
     quadratic = Quadratic(float(left @ left), rows.T @ left, rows.T @ rows)
-    return EnvelopeFit(BOUNDS.clip(value), quadratic, held, model, residual, converged=True)
+    return EnvelopeFit(bounds.clip(value), quadratic, held, model, residual, converged=True)
 
 
 def _half_swing_losses(y: FloatArray, share: float, *, sine: bool) -> FloatArray:
@@ -309,5 +312,6 @@ def numbers_of(
     a, b, c, amplitude, _ = envelope.value
     frequency, phase = 0.5 * period.angular_frequency / math.pi, math.remainder(phase, math.tau)
     value: FloatArray = np.array([a, b, c, frequency, amplitude, phase, level])
-    ends = intervals95(envelope.value, normal, gradient, BOUNDS, range(3), envelope.held, rates)
+    bounds, held = known_of(points)[0], envelope.held
+    ends = intervals95(envelope.value, normal, gradient, bounds, range(3), held, rates)
     return value, matrix, ends
