@@ -682,8 +682,12 @@ class Search(Generic[AnyPoint]):
             self._ended = self.converged = True
 
 
-def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
-    """Invert the normal matrix; rows and columns of what is held are zero.
+def covariance(
+    normal: FloatArray, held: Sequence[int] = (), beyond: FloatArray | None = None
+) -> FloatArray:
+    """Invert the normal matrix H; rows and columns of what is held are zero.
+
+    What the gradient scatters by `beyond` the noise, B, adds ``H^-1 B H^-1``.
 
     A bound is not used: what it would take off the standard deviations depends on where
     the truth lies, so they are those of the free estimate.
@@ -695,7 +699,7 @@ def covariance(normal: FloatArray, held: Sequence[int] = ()) -> FloatArray:
         return np.full_like(normal, np.nan)
     result, own = np.zeros_like(normal), np.linalg.pinv(scaled, rcond=1e-14, hermitian=True)
     result[np.ix_(free, free)] = own / scale[:, None] / scale
-    return result
+    return result if beyond is None else result + result @ beyond @ result
 
 
 def _others(size: int, held: Iterable[int]) -> IntArray:

@@ -17,10 +17,10 @@ from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.lost_samples import find_lost_samples
 from pendpipe.diagnosis.forensics.tails import Tail, fit_tail, tail_of_squares
 from pendpipe.diagnosis.found import Finding
-from pendpipe.diagnosis.hypothesis import Hypothesis, Task, is_gross, settled
+from pendpipe.diagnosis.hypothesis import Hypothesis, Task, settled
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import white_noise
-from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.refine import is_gross, refine
 from pendpipe.diagnosis.rivals import NO_SCAN
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.dynamics.eq8 import OMEGA

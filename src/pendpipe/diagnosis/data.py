@@ -11,7 +11,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from scipy.fft import prev_fast_len
 
-from pendpipe.analysis.fit.rounding import best_noise
+from pendpipe.analysis.noise import before_rounding, scatter
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 
@@ -159,7 +159,7 @@ def rounding_bias(angle: FloatArray, step: float, noise_rms: float) -> FloatArra
 def with_lattice(data: Data, reading: FloatArray) -> Data:
     """Estimate the noise before rounding, if the readings show the mean rounding error.
 
-    It is the fit's (`fit.rounding.best_noise`). Where the model is still wrong by part of a step,
+    It is the fit's (`noise.before_rounding`). Where the model is still wrong by part of a step,
     which smooths the rounding error as noise does, it is larger, and the sawtooth that is taken
     off smaller. Whether one is there, the residual decides.
 
@@ -177,7 +177,7 @@ def with_lattice(data: Data, reading: FloatArray) -> Data:
         return data
     turn = 2.0 * np.pi * data.values / data.step
     origin = float(np.angle(np.mean(np.exp(1j * turn)))) * data.step / (2.0 * np.pi)
-    noise = best_noise(off, data.step, 0.1 * data.step)
+    noise = before_rounding(scatter(float(off @ off), len(off)), data.step)
     finer = replace(data, lattice=(origin, noise))
     left = finer.residual(reading)[data.weight > 0.0]
     gain = len(off) * float(np.log(np.mean(off**2) / np.mean(left**2)))

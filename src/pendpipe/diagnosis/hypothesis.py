@@ -19,7 +19,7 @@ from pendpipe.diagnosis.found import COLOURED_NOISE, Finding
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import Noise, white_noise
 from pendpipe.diagnosis.noise_estimate import estimate_noise
-from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR, Fit, best_fit, refine
+from pendpipe.diagnosis.refine import GROSS, Fit, best_fit, is_gross, loses_phase, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import INCOMPLETE, Remainder, remainder_of
 from pendpipe.dynamics.eq8 import OMEGA, Restoring
@@ -223,16 +223,6 @@ class Hypothesis:
     def unexplained(self) -> float:
         """Global p-value of the residual."""
         return min(self.scan.p_value / CATALOGUE_SHARE, 1.0)
-
-
-def is_gross(fit: Fit, data: Data) -> bool:
-    """Return whether a misfit is too large for a linear approximation."""
-    return fit.chi2 > GROSS * data.used or loses_phase(fit)
-
-
-def loses_phase(fit: Fit) -> bool:
-    """Return whether a model is so far out of phase that first-order scores mean nothing."""
-    return fit.max_phase_error_rad > LARGE_PHASE_ERROR
 
 
 def first_noise(beginning: Beginning) -> Noise:

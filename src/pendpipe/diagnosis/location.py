@@ -13,6 +13,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.found import Location
 from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.unwrapped import LARGE_PHASE_ERROR
 from pendpipe.diagnosis.values import curve_values, curves_of, last_in
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
@@ -24,8 +25,6 @@ _ROUNDING: Final = 1e-9
 """Of the usual size: a motion is right to 1e-10 of itself, and a curve below tells of that."""
 _INTERVAL_SHARE: Final = 0.9
 """Part of what an effect explains that its intervals hold."""
-_LARGE_PHASE_RAD: Final = 0.3
-"""Phase difference of two models in rad from which the difference of readings misleads."""
 _HARMONICS: Final = 6
 """Of the motion that are told apart: what lies higher is told as sharp in phase."""
 _HARMONIC_SHARE: Final = 0.1
@@ -153,7 +152,7 @@ def _difference(before: Fit, after: Fit) -> FloatArray:
     turn = other.phase - one.phase
     # Whole turns may be counted differently, and each model has its own phase at release.
     turn = turn - np.average(turn, weights=other.amplitude**2)
-    if np.max(np.abs(turn)) < _LARGE_PHASE_RAD:
+    if np.max(np.abs(turn)) < LARGE_PHASE_ERROR:
         return after.at.reading - before.at.reading
     log_ratio = np.log(np.maximum(other.amplitude, 1e-300) / np.maximum(one.amplitude, 1e-300))
     moved = other.angle * log_ratio + other.velocity / other.motion.angular_frequency * turn

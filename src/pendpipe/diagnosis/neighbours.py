@@ -31,15 +31,13 @@ from pendpipe.diagnosis.hypothesis import (
     Step,
     Task,
     is_further,
-    is_gross,
-    loses_phase,
     price,
     price_of_another,
     settled,
     undrawn,
 )
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.refine import Fit, is_gross, loses_phase, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.remainder import remainder_of
 from pendpipe.diagnosis.rivals import (

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray, scaled_qr
-from pendpipe.diagnosis.unwrapped import unwrapped
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.unwrapped import LARGE_PHASE_ERROR, unwrapped
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.dynamics.eq8 import OMEGA, SHARE, B
-from pendpipe.dynamics.eq8_model import SHARES
+from pendpipe.dynamics.eq8_model import SHARES, known_losses
 from pendpipe.effects.model import Evaluated, Model, jacobian
-from pendpipe.solve import Bounds, NoStartError, Problem, Search, Squares
+from pendpipe.solve import Bounds, NoStartError, Problem, Search, Squares, covariance
 
 if TYPE_CHECKING:
     from pendpipe.diagnosis.data import Data
@@ -152,14 +152,10 @@ class Fit:
 
     def covariance(self) -> FloatArray:
         """Of all values; zero for those held, shape (size, size)."""
-        matrix = np.zeros((len(self.value), len(self.value)))
-        _, triangle, scale = scaled_qr(self.jacobian[:, self.free])
-        inverse = np.linalg.pinv(triangle, rcond=1e-12)
-        own = inverse @ inverse.T / np.outer(scale, scale)
-        if self.scatter is not None:
-            own = own @ self.scatter[np.ix_(self.free, self.free)] @ own
-        matrix[np.ix_(self.free, self.free)] = own
-        return matrix
+        held = [index for index in range(len(self.value)) if index not in self.free]
+        normal = self.jacobian.T @ self.jacobian
+        beyond = None if self.scatter is None else self.scatter - normal
+        return covariance(normal + known_losses(self.value), held, beyond)
 
 
 def pulled(fit: Fit) -> list[int]:
@@ -349,8 +345,16 @@ CLEAN: Final = 1.3
 better, from between the harmonics."""
 GROSS: Final = 2.0
 """chi^2 per degree of freedom above which first-order scores are meaningless."""
-LARGE_PHASE_ERROR: Final = 0.1
-"""Phase error in rad from which a model has lost the motion."""
+
+
+def is_gross(fit: Fit, data: Data) -> bool:
+    """Return whether a misfit is too large for a linear approximation."""
+    return fit.chi2 > GROSS * data.used or loses_phase(fit)
+
+
+def loses_phase(fit: Fit) -> bool:
+    """Return whether a model is so far out of phase that first-order scores mean nothing."""
+    return fit.max_phase_error_rad > LARGE_PHASE_ERROR
 
 
 def fitted_from(
@@ -359,6 +363,6 @@ def fitted_from(
     """Fit at once, and in a growing window where that loses the phase; return the better one."""
     fixed = tuple(held)
     fit = best_fit(model, data, noise, [start], held=fixed)
-    if fit and fit.converged and fit.max_phase_error_rad < LARGE_PHASE_ERROR:
+    if fit and fit.converged and not loses_phase(fit):
         return fit
     return better(fit, fit_in_growing_window(model, data, noise, start, held=fixed))

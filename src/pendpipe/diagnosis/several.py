@@ -30,12 +30,11 @@ from pendpipe.diagnosis.hypothesis import (
     Step,
     Task,
     catalogue_beside,
-    loses_phase,
     price,
 )
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.quoted import Description, averages, descriptions_of
-from pendpipe.diagnosis.refine import Fit, best_fit
+from pendpipe.diagnosis.refine import Fit, best_fit, loses_phase
 from pendpipe.diagnosis.remainder import remainder_of, with_errors
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.rivals import Scale

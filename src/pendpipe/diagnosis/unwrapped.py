@@ -14,11 +14,9 @@ from pendpipe.effects.model import Evaluated
 if TYPE_CHECKING:
     from pendpipe.diagnosis.data import Data
 
-_LARGE_DIFFERENCE: Final = 0.15
-"""Phase difference in rad, and relative difference of amplitude, from which the simple difference
-of readings is not used."""
-_SMALL_RESIDUAL: Final = 0.05
-"""Residual over amplitude below which phase and amplitude differ by less than 0.1."""
+LARGE_PHASE_ERROR: Final = 0.1
+"""Phase difference e in rad, and relative difference of amplitude, from which a model has lost the
+motion: first order misses e^2/2 of the amplitude, 0.5 %."""
 _CYCLE_SHARE: Final = 0.6
 """Part of a cycle's readings that must be present."""
 _NOISE_SD: Final = 5.0
@@ -72,14 +70,14 @@ def unwrapped(data: Data, at: Evaluated) -> tuple[FloatArray, float]:
         return np.concatenate([part for part, _ in parts]), max(slip for _, slip in parts)
     difference = data.residual(at.reading)
     # Where all residuals are small, no cycle's phase can differ, but for whole turns.
-    small = np.max(np.abs(difference) * data.weight) <= _SMALL_RESIDUAL * np.min(
+    small = np.max(np.abs(difference) * data.weight) <= 0.5 * LARGE_PHASE_ERROR * np.min(
         at.sampled.amplitude
     )
     if small and abs(_turned(data, at)) < math.pi:
         return difference, 0.0
     log_ratio, phase, centre = alignment(data, at, difference)
     slip = float(np.max(np.abs(phase), initial=0.0))
-    if slip < _LARGE_DIFFERENCE and np.max(np.abs(log_ratio), initial=0.0) < _LARGE_DIFFERENCE:
+    if slip < LARGE_PHASE_ERROR and np.max(np.abs(log_ratio), initial=0.0) < LARGE_PHASE_ERROR:
         return difference, slip
     sampled = at.sampled
     by_log = np.interp(sampled.phase, centre, log_ratio)

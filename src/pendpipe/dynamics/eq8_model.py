@@ -20,6 +20,7 @@ from pendpipe.dynamics.eq8 import (
     SHARE,
     SHARE_MEAN,
     SHARE_SD,
+    START,
     TIME,
     A,
     B,
@@ -42,11 +43,25 @@ UPPER: Final = np.array([np.inf, np.inf, np.inf, 1.0, np.inf, np.inf, np.inf, np
 """Least and greatest values, in the order of `BASELINE`."""
 SHARES: Final = Priors(np.array([SHARE]), np.array([SHARE_MEAN]), np.array([SHARE_SD]))
 """The hysteretic share of b, as normal about its mean: one recording hardly tells it."""
+_LEAST: Final = 1e-100
+"""Of a loss that is divided by."""
 _BY_SHARE: Final = 0.5 - 4.0 / 3.0 + math.pi**2 / 8.0
 """(omega/b)^2 times the relative lengthening of the period by the square of b's hysteretic share
 (`torque.period_excess`)."""
 _BESIDE: Final = 2e-3
 """Phase between the two motions that tell the velocity: 1e-13 of it is lost in the sixth power."""
+
+
+def known_losses(value: FloatArray) -> FloatArray:
+    """What is known of a, b and c beforehand, as a normal matrix: none is more than the whole loss.
+
+    That at the start, a y + b + c/y, counts as the standard deviation of each of its parts where
+    readings tell the sum alone.
+    """
+    y, known = abs(float(value[START])), np.zeros((len(value), len(value)))
+    by_rate = np.array([y, 1.0, 1.0 / y])
+    known[[A, B, C], [A, B, C]] = (by_rate / max(float(by_rate @ value[[A, B, C]]), _LEAST)) ** 2
+    return known
 
 
 def values_of(law: Eq8, release: Release, offset: float = 0.0) -> FloatArray:

@@ -17,11 +17,10 @@ from pendpipe.analysis.fit.fitted import Baseline, DragForm
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness, Left, combined, judge
 from pendpipe.analysis.fit.result import FitResult, result_of
-from pendpipe.analysis.fit.rounding import best_noise
 from pendpipe.analysis.fit.start import Start, start_values, usable_span
 from pendpipe.analysis.fit.waveform import DRIFT, Waveform
 from pendpipe.analysis.misfit import beyond_noise
-from pendpipe.analysis.noise import scatter
+from pendpipe.analysis.noise import before_rounding, scatter
 from pendpipe.analysis.torque import Apart
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
@@ -302,8 +301,10 @@ def _rounded(fitted: Fitted, samples: Samples) -> Fitted:
     dithered = math.hypot(_DITHERED, math.sqrt(1.0 / 12.0))
     if step is None or problem.step or not fitted.noise_rms < dithered * step:
         return fitted
+    free = 9 - len(fitted.held)
     for _ in range(_ROUNDS):
-        noise = best_noise(problem.residual(found.value), step, 0.1 * step)
+        left = problem.residual(found.value)
+        noise = before_rounding(scatter(float(left @ left), len(left) - free), step)
         problem = replace(problem, noise_rms=noise, step=step)
         found = _fitted(problem, found.value, found.held, found.start)
         if not math.isfinite(found.chi2):
@@ -371,9 +372,8 @@ def _numbers(
     """The seven parameters, their covariance, the intervals of a, b, c, and the drift's error."""
     value, held = fitted.value, fitted.held
     _, gradient, normal = fitted.quadratic(goodness)
-    own = covariance(normal, held)
-    if goodness.left is not None:
-        own += own @ _beyond_noise(fitted, goodness.left, goodness.noise_rms) @ own
+    left, noise = goodness.left, goodness.noise_rms
+    own = covariance(normal, held, None if left is None else _beyond_noise(fitted, left, noise))
     (amplitude, phase), jacobian = _first_turning_point(fitted, start_s)
     frequency = 0.5 * value[OMEGA] / math.pi
     numbers = np.array([*value[:3], frequency, amplitude, phase, value[OFFSET]])

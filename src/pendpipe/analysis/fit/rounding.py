@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.kernel import kernel
 
@@ -60,22 +58,3 @@ def rounded(
         score[i] = sign * slope / noise
         weight[i] = max(slope * slope - low * at_low + high * at_high, 0.0) / noise**2
     return total
-
-
-def best_noise(residual: FloatArray, step: float, start: float) -> float:
-    """The most likely noise before the rounding, between step/25 and step.
-
-    Its logarithm is where a parabola through the three best of nine has its vertex.
-    """
-    score, weight = np.empty_like(residual), np.empty_like(residual)
-
-    def unlikely(logarithm: float) -> float:
-        return float(rounded(residual, 0.5 * step, math.exp(logarithm), score, weight))
-
-    grid = np.linspace(math.log(0.04 * step), math.log(max(step, 2.0 * start)), 9)
-    costs = [unlikely(each) for each in grid.tolist()]
-    best = min(max(int(np.argmin(costs)), 1), 7)
-    before, least, after = costs[best - 1 : best + 2]
-    bend = before - 2.0 * least + after
-    turn = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
-    return math.exp(grid[best] + min(max(turn, -1.0), 1.0) * (grid[1] - grid[0]))

@@ -11,26 +11,14 @@ import numpy as np
 from pendpipe.analysis.fit.rounding import rounded
 from pendpipe.analysis.torque import TOP
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics.eq8 import BASELINE, START, TIME, A, B, C
-from pendpipe.dynamics.eq8_model import LOWER, SHARES, UPPER, Eq8Model
+from pendpipe.dynamics.eq8 import BASELINE, START, TIME
+from pendpipe.dynamics.eq8_model import LOWER, SHARES, UPPER, Eq8Model, known_losses
 from pendpipe.solve import Bounds, Problem, Quadratic, Summed
 
 DRIFT: Final = len(BASELINE)
 """Behind the model's eight values: by how much the zero rises in a second."""
 _PIECE: Final = 1 << 18
 """Readings whose Jacobian is in memory at a time: 16 MB."""
-_LEAST: Final = 1e-100
-"""Of a loss that is divided by."""
-
-
-def most_of_each(value: FloatArray) -> FloatArray:
-    """What a, b and c may be at most: no loss is more than the whole at the start.
-
-    It counts as the standard deviation of each beforehand where readings tell the sum alone.
-    """
-    y = abs(float(value[START]))
-    by_rate = np.array([y, 1.0, 1.0 / y])
-    return np.asarray(max(float(by_rate @ value[[A, B, C]]), _LEAST) / by_rate)
 
 
 @dataclass(frozen=True)
@@ -159,8 +147,7 @@ class Waveform(Eq8Model):
         is as it was, and that no loss is more than the whole.
         """
         scale = 1.0 if self.step else (self.noise_rms / noise_rms) ** 2
-        of_share, of_losses = SHARES.rows(len(value)), np.zeros(len(value))
-        of_losses[[A, B, C]] = most_of_each(value) ** -2.0
+        of_share = SHARES.rows(len(value))
         known = of_share.T @ of_share
-        normal = scale * (at.normal - known) + known + np.diag(of_losses)
+        normal = scale * (at.normal - known) + known + known_losses(value)
         return Quadratic(scale * at.chi2, scale * at.gradient, normal)

@@ -20,7 +20,8 @@ from pendpipe.diagnosis.forensics import (
 )
 from pendpipe.diagnosis.forensics.evidence import FEWEST, Evidence
 from pendpipe.diagnosis.found import Finding
-from pendpipe.diagnosis.refine import CLEAN, GROSS, LARGE_PHASE_ERROR
+from pendpipe.diagnosis.refine import CLEAN, GROSS
+from pendpipe.diagnosis.unwrapped import LARGE_PHASE_ERROR
 
 _IN_PHASE: Final = 0.3
 """Phase error in rad up to which residuals show errors of the times."""

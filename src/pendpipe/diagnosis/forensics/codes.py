@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.rounding import best_noise
-from pendpipe.analysis.noise import noise_rms
+from pendpipe.analysis.noise import before_rounding, noise_rms, scatter
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.forensics.local import Local, local_residual
@@ -18,8 +17,6 @@ from pendpipe.dynamics.any_law import lagrange
 if TYPE_CHECKING:
     from pendpipe.diagnosis.forensics.evidence import Evidence
 
-_DITHERED: Final = 0.6
-"""Rms of the errors in steps from which rounding is dithered."""
 _FIRST_CODES: Final = 256
 """Readings that show whether all lie on codes: a wrong step is a whole one off after 20 of them."""
 _FEWEST_CODES: Final = 16
@@ -135,7 +132,7 @@ def spacing_of(distinct: FloatArray) -> float | None:
 
 
 def noise_before_rounding(local: Local, step: float) -> float:
-    """Estimate the noise before rounding by maximum likelihood, as a fit does (`best_noise`).
+    """Estimate the noise before rounding, as a fit does (`before_rounding`).
 
     Outliers (glitches) are left out. The true angle comes from local fits, which take part of the
     noise.
@@ -147,12 +144,10 @@ def noise_before_rounding(local: Local, step: float) -> float:
     step
         Of the readings.
     """
-    if local.rms > _DITHERED * step:
-        # Rounding is dithered: variances add.
-        return math.sqrt(local.rms**2 - step**2 / 12.0)
     near = local.used & (np.abs(local.left) < 5.0 * local.rms + step)
     kept = 1.0 + float(np.mean(np.maximum(local.leverage[near], -0.9)))
-    return best_noise(local.left[near], step, 0.1 * step) / math.sqrt(kept)
+    left = local.left[near]
+    return before_rounding(scatter(float(left @ left), kept * len(left)), step)
 
 
 @dataclass(frozen=True)

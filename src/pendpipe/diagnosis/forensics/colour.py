@@ -19,7 +19,7 @@ from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.tails import tail_of_squares
 from pendpipe.diagnosis.found import COLOURED_NOISE, WANDERING_ZERO, Finding, Location
 from pendpipe.diagnosis.projection import tangent_basis
-from pendpipe.diagnosis.refine import CLEAN, LARGE_PHASE_ERROR
+from pendpipe.diagnosis.refine import CLEAN
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, compact
 
@@ -186,8 +186,6 @@ def find_random_torque(evidence: Evidence) -> Finding | None:
     motion seldom does: p = max(p_amplitude, p_phase)^2.
     """
     data, fit, sampled = evidence.data, evidence.fit, evidence.sampled
-    if fit.max_phase_error_rad > LARGE_PHASE_ERROR:
-        return None
     amplitude, phase, per_kick = _fluctuations(evidence)
     few = min(len(amplitude.weight), len(phase.weight)) < 5
     # A missing term of the law of motion, or a tone, is not a random walk.

@@ -15,7 +15,7 @@ from pendpipe.diagnosis.forensics.local import Local, local_residual, whitened_i
 from pendpipe.diagnosis.forensics.tails import Tail, fit_tail
 from pendpipe.diagnosis.found import Finding, Location
 from pendpipe.diagnosis.noise import TAPS
-from pendpipe.diagnosis.refine import GROSS, LARGE_PHASE_ERROR
+from pendpipe.diagnosis.refine import is_gross
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number
 
@@ -61,8 +61,7 @@ def find(evidence: Evidence) -> Finding | None:
     data, fit, noise = evidence.data, evidence.fit, evidence.noise
     residual, used = evidence.error, evidence.used
     local = _errors(evidence, ~used)
-    lost = fit.chi2 > GROSS * data.used or fit.max_phase_error_rad > LARGE_PHASE_ERROR
-    if lost or local.smooth():
+    if is_gross(fit, data) or local.smooth():
         return find_in_misfit(evidence)
     apart = used
     if noise.coloured:
