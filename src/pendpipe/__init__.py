@@ -1,7 +1,8 @@
 """How pendulums lose energy, from the instrument's bytes to the physics that was left out.
 
 `read` a recording from a file of any kind, `fit` period, Q and losses, `diagnose` what physics is
-missing, `simulate` a recording, `acquire` one from an instrument; `help(pp.fit)` tells more.
+missing, `predict` another experiment, `simulate` a recording, `acquire` one from an instrument;
+`help(pp.fit)` tells more.
 
 >>> import pendpipe as pp
 >>> recording = pp.read("examples/rod-pendulum.csv")
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from pendpipe.dynamics import Eq8
     from pendpipe.errors import InputError
     from pendpipe.estimate import Estimate
+    from pendpipe.prediction import predict
     from pendpipe.reading import inspect, read
     from pendpipe.recording import Recording
     from pendpipe.simulation.verbs import simulate
@@ -45,6 +47,7 @@ __all__ = [
     "fit_many",
     "inspect",
     "physics",
+    "predict",
     "read",
     "simulate",
     "turning_points",
@@ -58,6 +61,7 @@ _HOMES = {
     "acquire": "acquisition.verbs",
     "fit_many": "batch",
     "inspect": "reading",
+    "predict": "prediction",
     "read": "reading",
     "simulate": "simulation.verbs",
 }

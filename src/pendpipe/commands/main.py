@@ -32,6 +32,7 @@ COMMANDS: Final = {
     "turning-points": "find the turning points of a recording",
     "fit": "find period, Q and the losses a, b, c of free decays",
     "diagnose": "find which physics is missing: located, named, modelled",
+    "predict": "predict another decay, and the driven response, with bands",
     "page": "write an HTML page about recordings",
     "open": "open a page on this machine: drop recordings, see their sheets and table",
     "init": "begin a campaign of your own recordings in a folder",

@@ -44,7 +44,7 @@ _KEPT: Final = 0.05
 least: as no decay tells, and all springs do. T0 beside the mean is then within four errors."""
 _CORRELATED: Final = 0.9
 """Correlation of neighbours, at most, by which errors are enlarged."""
-_SECOND_ORDER: Final = 0.36
+SECOND_ORDER: Final = 0.36
 """Standard deviation of what losses lengthen a period by, over (loss/omega)^2: nothing for dry
 friction, pi^2/8 for hysteretic, and which it is the turning points do not tell."""
 _NEAR: Final = 3
@@ -190,7 +190,7 @@ def backbone_of(points: TurningPoints, law: Eq8, bent: FloatArray | None = None)
         plain = 2.0 / law.angular_frequency * _half_swing(np.append(rows, 0.0), law)
         without = plain * swing.value
         typical = float(np.median(decrement[rows >= smallest])) / law.angular_frequency
-        unsure = _SECOND_ORDER * typical**2
+        unsure = SECOND_ORDER * typical**2
         period_sd, scatter = plain * np.sqrt(swing.variance + unsure**2), swing.scatter
         small = Estimate(float(without[-1]), float(period_sd[-1]), "s")
         longer = swing.value[:-1] / swing.value[-1] - 1.0
