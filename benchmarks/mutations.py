@@ -126,10 +126,13 @@ def test_files(tree: Path, path: str) -> list[list[str]]:
     module, home = ".".join(parts).removesuffix(".__init__"), parts[1]
     parent, _, name = module.rpartition(".")
     wanted = re.compile(rf"\b{re.escape(module)}\b|from {re.escape(parent)} import .*\b{name}\b")
-    folder = tree / "tests" / FOLDERS.get(home, home if len(parts) > 2 else "core")
+    names = {FOLDERS.get(home, home if len(parts) > 2 else "core"), name}
+    folders = {tree / "tests" / each for each in names}  # a command's, also those of its own name
     found: list[list[str]] = [[], [], []]
     for file in sorted((tree / "tests").rglob("test_*.py")):
-        place = 0 if wanted.search(file.read_text("utf-8")) else 2 - (folder in file.parents)
+        place = (
+            0 if wanted.search(file.read_text("utf-8")) else 2 - bool(folders & set(file.parents))
+        )
         found[place].append(file.relative_to(tree).as_posix())
     return found
 

@@ -14,13 +14,14 @@ import numpy as np
 import pytest
 import yaml
 
+from pendpipe import fit, turning_points
 from pendpipe.cli import main
-from pendpipe.figures.data import error, number, typical_record
+from pendpipe.figures.data import Decay, error, number, typical_record
 from pendpipe.files import without_folders
 from pendpipe.physics import sphere_in_tank
 from pendpipe.quantities import with_error
 from pendpipe.recording import Recording
-from pendpipe.report.charts import Axis, Chart, areas, extremes, line, pack
+from pendpipe.report.charts import Axis, Chart, areas, extremes, line, pack, waveform
 from pendpipe.report.page import BUDGET_BYTES, inline_svg, render
 from pendpipe.report.tables import (
     STATES,
@@ -599,6 +600,7 @@ def test_the_band_of_a_pure_decay_falls_as_the_decay(periods_a_bucket: float, fa
     [
         (0.0, 10.0, False, ["0", "2", "4", "6", "8", "10"]),
         (0.9, 110.0, True, ["1", "2", "5", "10", "20", "50", "100"]),
+        (2.0, 19.0, True, ["5", "10", "15"]),
         (-4.0, 4.0, False, ["\N{MINUS SIGN}4", "\N{MINUS SIGN}2", "0", "2", "4"]),
         (2.0, 6.0, True, ["2", "3", "4", "5", "6"]),
     ],
@@ -614,6 +616,17 @@ def test_an_axis_has_round_numbers_where_they_lie(
     turned = [np.log(each) if logarithmic else each for each in (values, low, high)]
     expected = 100.0 + 200.0 * (turned[0] - turned[1]) / (turned[2] - turned[1])
     assert places == pytest.approx(expected, abs=0.05)
+
+
+@pytest.mark.parametrize(("periods", "kind"), [(40, "thin"), (4000, "band")])
+def test_readings_of_many_periods_are_drawn_as_a_band(periods: int, kind: str) -> None:
+    """A line of each reading, or the area between the least and the largest of a period."""
+    time = np.linspace(0.0, 2.0 * periods, 20 * periods)
+    angle = 0.1 * np.exp(-time / time[-1]) * np.cos(np.pi * time)
+    recording = Recording(time_s=time, angle_rad=angle)
+    points = turning_points(recording)
+    decay = Decay("a", points, fit(recording, points=points))
+    assert next(name for name, _ in waveform(recording, decay, np.nan).paths) == kind
 
 
 def test_a_gap_interrupts_the_line() -> None:
