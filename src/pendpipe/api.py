@@ -197,7 +197,7 @@ def fit(
     }
     from pendpipe.analysis.fit import fit_recording, fit_turning_points
     from pendpipe.analysis.fit.by_amplitudes import fit_amplitudes, in_seconds
-    from pendpipe.analysis.fit.doubts import doubted
+    from pendpipe.analysis.fit.consequence import doubted
     from pendpipe.analysis.fit.result import with_clock, with_scale
     from pendpipe.analysis.free_decay import measure_recording
     from pendpipe.analysis.turning_points import (

@@ -11,8 +11,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import pendpipe as pp
-from pendpipe.analysis.fit.by_points import fit_envelope, fit_points
-from pendpipe.analysis.fit.period import fit_period
+from pendpipe.analysis.fit.by_points import fit_envelope, fit_period, fit_points
 from pendpipe.analysis.torque import period_excess
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray

@@ -15,7 +15,8 @@ from pendpipe import cli
 from pendpipe.analysis.fit import fit_recording
 from pendpipe.analysis.fit.by_points import fit_energies
 from pendpipe.analysis.fit.fixed import Held
-from pendpipe.analysis.fit.printed import facts, pendulum_of
+from pendpipe.analysis.fit.printed import facts
+from pendpipe.analysis.fit.quality import pendulum_of
 from pendpipe.analysis.fit.start import start_values
 from pendpipe.analysis.torque import restoring_of, sine_coefficient
 from pendpipe.analysis.turning_points import TurningPoints, find_turning_points

@@ -14,10 +14,10 @@ from hypothesis import given, strategies as st
 
 from pendpipe import cli
 from pendpipe.analysis.fit import FitResult, fit_recording
+from pendpipe.analysis.fit.by_waveform import Waveform
 from pendpipe.analysis.fit.fixed import Held, parse_fixed
 from pendpipe.analysis.fit.rounding import rounded
 from pendpipe.analysis.fit.start import start_values
-from pendpipe.analysis.fit.waveform import Waveform
 from pendpipe.analysis.half_cycles import find_extremes
 from pendpipe.analysis.turning_points.find import count_half_cycles, smooth_times, turning_points_of
 from pendpipe.analysis.turning_points.measure import (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -87,22 +87,11 @@ def clear(points: TurningPoints, least: float = 0.0) -> TurningPoints:
     return points.chosen(seen & (amplitude > least * np.max(amplitude, where=seen, initial=0.0)))
 
 
-class Apart(NamedTuple):
-    """What turning points of sin x say of a motion by x that is as near as can be."""
-
-    chi2: float
-    """By which x would miss: what no frequency makes up for."""
-    pace: float
-    """Phase of sin x in a half cycle of x."""
-    late: float
-    """Phase by which x turns later at the first of the clear ones."""
-
-
-def told_apart(points: TurningPoints, readings: int, noise: float) -> Apart:
-    """How far a pendulum of sin x is from any motion by x."""
+def told_apart(points: TurningPoints, readings: int, noise: float) -> float:
+    """Chi^2 by which the motion by x that is nearest to turning points of sin x misses them."""
     part = clear(points)
     if len(part) < LEAST_HALF_CYCLES:
-        return Apart(0.0, math.pi, 0.0)
+        return 0.0
     amplitude, number = part.amplitude_rad, part.half_cycle - part.half_cycle[0]
     swings = (swing_phase(amplitude, "sine") - math.pi) * np.diff(number)
     late = np.concatenate([[0.0], np.cumsum(swings)])
@@ -110,8 +99,7 @@ def told_apart(points: TurningPoints, readings: int, noise: float) -> Apart:
     first, each = np.linalg.lstsq(line, amplitude * late)[0]
     left = amplitude * (late - first - each * number)
     in_half_cycle = readings / max(float(np.ptp(points.half_cycle)), 1.0)
-    chi2 = 0.5 * in_half_cycle * float(left @ left) / noise**2
-    return Apart(chi2, math.pi + float(each), float(first))
+    return 0.5 * in_half_cycle * float(left @ left) / noise**2
 
 
 def restoring_of(points: TurningPoints, *, stated: bool = True) -> Restoring:

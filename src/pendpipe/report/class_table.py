@@ -11,7 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from pendpipe.analysis.fit.printed import SHORT, pendulum_of, percent, period_name, short_size
+from pendpipe.analysis.fit.printed import SHORT, percent, period_name, short_size
+from pendpipe.analysis.fit.quality import pendulum_of
 from pendpipe.cells import csv_text, inert
 from pendpipe.errors import refuse_if
 from pendpipe.estimate import Estimate, chi_square_p_value

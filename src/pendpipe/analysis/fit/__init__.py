@@ -46,8 +46,8 @@ _MISSED: Final = 0.3
 """Of the first amplitude: a misfit beyond is that of another motion."""
 _LEAST: Final = 0.6
 """Of the first amplitude: so much of the decay is kept at least."""
-_CERTAIN: Final = 100.0
-"""Chi^2 between sin x and x from which the other torque need not be fitted."""
+_CERTAIN: Final = 50.0
+"""Half of chi^2 between sin x and x from which the other torque need not be fitted."""
 _FEWEST: Final = 15
 """Turning points of such a part."""
 
@@ -277,28 +277,24 @@ def _waveform(
         return result(fitted(restoring=restoring), restoring)
     first = restoring_of(points)
     second: Restoring = "linear" if first == "sine" else "sine"
-    forms, others = fitted(restoring=first), None
+    forms, others, odds = fitted(restoring=first), None, 0.0
     if forms is None:
         return result(fitted(restoring=second), second)
-    own, other, odds = forms.fitted, None, _SURE
+    own = forms.fitted
     if own.minimum.converged and forms.goodness.misfit == 1.0:
         # What fits to the noise tells by itself how far off the other is.
-        apart = told_apart(points, len(samples), forms.goodness.noise_rms)
-        odds = 0.5 * apart.chi2
-        if apart.chi2 < _CERTAIN:
-            other = own.with_torque(second, points, apart)
-    elif (others := fitted(restoring=second)) is not None:
-        other = others.fitted
-    if other is not None:
-        odds = min(max(own.better_by(other), -_SURE), _SURE)
+        odds = 0.5 * told_apart(points, len(samples), forms.goodness.noise_rms)
+    if odds < _CERTAIN:
+        others = fitted(restoring=second)
+        odds = min(max(own.better_by(others.fitted), -_SURE), _SURE) if others else _SURE
+    other = others.fitted if others else None
     pendulum, spring = (own, other) if first == "sine" else (other, own)
     for_spring = odds if first == "linear" else -odds
     no_pendulum = pendulum is not None and not pendulum.minimum.converged
     is_spring = for_spring > ODDS or no_pendulum
     if spring is not None and spring.minimum.converged and is_spring:
-        spring_forms = forms if first == "linear" else others or fitted(restoring="linear")
-        return replace(result(spring_forms, "linear"), torque_odds=for_spring)
-    found = result(forms if first == "sine" else others or fitted(restoring="sine"), "sine")
+        return replace(result(forms if own is spring else others, "linear"), torque_odds=for_spring)
+    found = result(forms if own is pendulum else others, "sine")
     found = replace(found, torque_odds=-for_spring)
     if spring is None or for_spring < -ODDS or not spring.minimum.converged:
         return found

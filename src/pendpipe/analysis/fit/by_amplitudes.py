@@ -14,11 +14,10 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import Decay, EnvelopeFit, fit_envelope, numbers_of
+from pendpipe.analysis.fit.by_points import Decay, EnvelopeFit, Period, fit_envelope, numbers_of
 from pendpipe.analysis.fit.fitted import PARAMETERS, Baseline, fast_beside
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness
-from pendpipe.analysis.fit.period import Period
 from pendpipe.analysis.fit.prediction import pendulum_decay
 from pendpipe.analysis.fit.quality import without_swings
 from pendpipe.analysis.fit.result import FitResult, result_of
@@ -132,7 +131,7 @@ def fit_amplitudes(
     fits = [(drag, fit_envelope(points, held.envelope, decay)) for drag, decay in decays]
     drag, envelope = min(fits, key=lambda each: _misfit(each[1]))
     spread = turning * period.sd / period.value if period else math.nan
-    times = Period(turning, points.start_s, np.diag([spread**2, 0.0]), math.nan, np.empty(0))
+    times = Period(turning, points.start_s, np.diag([spread**2, 0.0]), math.nan)
     value, matrix, intervals = _averaged(
         [numbers_of(points, each, times) for _, each in fits],
         np.exp(-0.5 * np.array([_misfit(each) - _misfit(envelope) for _, each in fits])),

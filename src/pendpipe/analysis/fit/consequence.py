@@ -9,7 +9,7 @@ stand out by a thousand standard deviations and move neither Q nor the period.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -25,12 +25,14 @@ from pendpipe.analysis.fit.decrement import (
     loss_of,
 )
 from pendpipe.analysis.fit.fitted import PARAMETERS, Fit, Fitted
-from pendpipe.analysis.fit.quality import qualities, relative_loss_sd, small_period
+from pendpipe.analysis.fit.quality import pendulum_of, qualities, relative_loss_sd, small_period
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8
 from pendpipe.estimate import Estimate
+from pendpipe.facts import Fact
 from pendpipe.levels import deviations
+from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 from pendpipe.quantities import compact
 
 _FEWEST: Final = 6
@@ -206,3 +208,47 @@ def _light(result: Fitted, problems: Sequence[str]) -> tuple[Light, str]:
             f" {100.0 * TOLERANCE:.0f} %; it is not the whole story: see pendpipe diagnose"
         )
     return "green", "period and Q are those of the turning points, and noise explains the rest"
+
+
+_ABSURD: Final = 2.0
+"""Ratio of g, or of its inverse, that no rod, no buoyancy and no stretched string makes of it."""
+_TALLEST_M: Final = 70.0
+"""The longest pendulum of Foucault (67 m); what is longer is given in cm."""
+
+
+def doubted(result: Fit, facts: Sequence[Fact], time_s: FloatArray) -> Fit:
+    """Take green from an answer that rests on a guess or is absurd, and say what settles it.
+
+    Parameters
+    ----------
+    result
+        A fit; amber and red keep their reasons. A period that rests on a guess is not quoted.
+    facts
+        Of the recording.
+    time_s
+        Of the readings that were fitted, shape (n,).
+    """
+    guessed = [fact for fact in facts if fact.changes]
+    why = [
+        *_absurd(result, time_s),
+        *(f"it rests on a guess: {fact.words}" for fact in guessed),
+    ]
+    if any("period" in fact.changes for fact in guessed):
+        kept = tuple(name for name in result.quotable if name != "period")
+        result = replace(result, quotable=kept)
+    if not why or result.light != "green":
+        return result
+    return replace(result, light="amber", light_reason=why[0])
+
+
+def _absurd(result: Fitted, time_s: FloatArray) -> Iterator[str]:
+    """Say what no pendulum gives, with the option that settles it."""
+    span, clock = float(np.ptp(time_s)), "check the unit of time (--unit s:)"
+    if span < small_period(result).value:
+        yield f"the readings span {span:.3g} s, less than a period: {clock}"
+    for name, found in pendulum_of(result).items():
+        usual = found.value / STANDARD_GRAVITY_M_PER_S2
+        if name == "g" and not 1.0 / _ABSURD < usual < _ABSURD:
+            yield f"g comes out as {found.value:.3g} m/s²: give the length in m (--length)"
+        if name == "length" and found.value > _TALLEST_M:
+            yield f"the pendulum would be {found.value:.3g} m long: {clock}"

@@ -16,12 +16,12 @@ from pendpipe.analysis.fit.quality import (
     LEAST_QUALITY,
     LOSSES,
     Quality,
-    mean_square,
+    pendulum_of,
     period_of_frequency,
     qualities,
     small_period,
+    swings_longer,
 )
-from pendpipe.analysis.torque import TOP, swing_phase
 from pendpipe.answer import SMALLEST, Answer
 from pendpipe.estimate import Z95, Estimate
 from pendpipe.quantities import compact, pretty_unit, stretch, with_error
@@ -309,38 +309,6 @@ def following(result: Fitted) -> str:
     return "pendpipe page FILE makes a sheet to hand out; --figure draws it, --json is for programs"
 
 
-def pendulum_of(result: Fitted) -> dict[str, Estimate]:
-    """Return ``g`` by the length of a simple pendulum, or its ``length`` by g: omega_0^2 = g/l.
-
-    With the torque of sin x the fitted omega is omega_0, that of small swings. Otherwise
-    omega_0 = omega 2 K(sin(y/2))/pi at the root-mean-square angle y, where that is known.
-    """
-    linear = result.restoring == "linear"
-    period = period_of_frequency(result.parameters["frequency"]) if linear else small_period(result)
-    omega = math.tau / period.value * (_lengthening(result) or 1.0)
-    relative = 2.0 * period.sd / period.value
-    if result.length is not None:
-        value, given, name, unit = omega**2 * result.length.value, result.length, "g", "m/s^2"
-    elif result.gravity is not None:
-        value, given, name, unit = result.gravity.value / omega**2, result.gravity, "length", "m"
-    else:
-        return {}
-    return {name: Estimate(value, math.hypot(relative, given.sd / given.value) * value, unit)}
-
-
-def _lengthening(result: Fitted) -> float | None:
-    """The swings' period over that of small ones; 1 of the torque of sin x, None of no angle."""
-    if result.restoring == "sine":
-        return 1.0
-    unit = result.parameters["amplitude"].unit
-    length = {"rad": math.inf, "m": result.length.value if result.length else None}.get(unit)
-    if length is None:
-        return None
-    size = math.sqrt(mean_square(result))
-    angle = size if unit == "rad" else math.asin(min(size / length, 1.0))
-    return float(swing_phase(np.array([min(angle, TOP)] * 2), "sine")[0]) / math.pi
-
-
 def _pendulum_line(result: Fitted) -> Iterator[tuple[str, str]]:
     """Print g, or the length, and what is not in it.
 
@@ -351,7 +319,7 @@ def _pendulum_line(result: Fitted) -> Iterator[tuple[str, str]]:
         said = "; not in it: the finite bob, the string's mass, buoyancy and added mass"
         if result.length is not None and result.length.sd == 0.0:
             said += "; the length's error, which --length 0.600(1) would give"
-        factor = _lengthening(result)
+        factor = swings_longer(result)
         if factor is None:
             said += f"; by T {_OF_AN_ANGLE}"
         elif factor > 1.0:

@@ -15,6 +15,7 @@ import numpy as np
 from pendpipe.analysis.fit.backbone import Backbone
 from pendpipe.analysis.fit.decrement import Light, losses_of
 from pendpipe.analysis.fit.fitted import Fit, Fitted
+from pendpipe.analysis.torque import TOP, swing_phase
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.errors import InputError, refuse_if
@@ -286,3 +287,35 @@ def small_frequency(result: Fitted) -> Estimate:
 def period_of_frequency(frequency: Estimate) -> Estimate:
     """Return 1/f, s."""
     return Estimate(1.0 / frequency.value, frequency.sd / frequency.value**2, "s")
+
+
+def pendulum_of(result: Fitted) -> dict[str, Estimate]:
+    """Return ``g`` by the length of a simple pendulum, or its ``length`` by g: omega_0^2 = g/l.
+
+    With the torque of sin x the fitted omega is omega_0, that of small swings. Otherwise
+    omega_0 = omega 2 K(sin(y/2))/pi at the root-mean-square angle y, where that is known.
+    """
+    linear = result.restoring == "linear"
+    period = period_of_frequency(result.parameters["frequency"]) if linear else small_period(result)
+    omega = math.tau / period.value * (swings_longer(result) or 1.0)
+    relative = 2.0 * period.sd / period.value
+    if result.length is not None:
+        value, given, name, unit = omega**2 * result.length.value, result.length, "g", "m/s^2"
+    elif result.gravity is not None:
+        value, given, name, unit = result.gravity.value / omega**2, result.gravity, "length", "m"
+    else:
+        return {}
+    return {name: Estimate(value, math.hypot(relative, given.sd / given.value) * value, unit)}
+
+
+def swings_longer(result: Fitted) -> float | None:
+    """The swings' period over that of small ones; 1 of the torque of sin x, None of no angle."""
+    if result.restoring == "sine":
+        return 1.0
+    unit = result.parameters["amplitude"].unit
+    length = {"rad": math.inf, "m": result.length.value if result.length else None}.get(unit)
+    if length is None:
+        return None
+    size = math.sqrt(mean_square(result))
+    angle = size if unit == "rad" else math.asin(min(size / length, 1.0))
+    return float(swing_phase(np.array([min(angle, TOP)] * 2), "sine")[0]) / math.pi

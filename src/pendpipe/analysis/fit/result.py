@@ -17,9 +17,10 @@ from pendpipe.analysis.fit.damping import damping_of
 from pendpipe.analysis.fit.decrement import Check, check_decrement
 from pendpipe.analysis.fit.fitted import PARAMETERS, PARTS, Fitted, units
 from pendpipe.analysis.fit.goodness import Goodness, combined
-from pendpipe.analysis.fit.printed import answer_of, called, pendulum_of
+from pendpipe.analysis.fit.printed import answer_of, called
 from pendpipe.analysis.fit.quality import (
     mean_square,
+    pendulum_of,
     period_of,
     qualities,
     quality_at,

@@ -7,9 +7,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.by_points import envelope_and_period
+from pendpipe.analysis.fit.by_points import Period, envelope_and_period
 from pendpipe.analysis.fit.fixed import Held
-from pendpipe.analysis.fit.period import Period
 from pendpipe.analysis.torque import TOP, clear, period_excess, swing_phase
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
@@ -17,12 +16,6 @@ from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.physics.decay import amplitude, time_at
 
-_SLIP: Final = 0.7
-"""Phase in rad by which the law's turning points may part from the measured ones."""
-_SLIPPED: Final = (
-    "the period changes with the amplitude or the time as Eq. 8's does not:"
-    " {:.2g} rad of phase along the record"
-)
 _HIGH: Final = 2.0
 """Amplitude in rad beyond which no turning point before the first is looked for with sin x."""
 _STOP: Final = 6.0
@@ -35,7 +28,6 @@ class Start(NamedTuple):
     value: FloatArray
     before: int
     """Half cycles from the release to the first turning point kept."""
-    warnings: tuple[str, ...]
 
 
 def start_values(
@@ -54,9 +46,6 @@ def start_values(
     points = points if restoring == "linear" else clear(points)
     envelope, period = envelope_and_period(points, held, restoring, start=True)
     a, b, c, y0, level = envelope.value.tolist()
-    # Times uncertain by more than 0.2 rad show no slip.
-    late = period.late_rad[period.angular_frequency * points.time_sd_s < 0.2]
-    slipped = held.angular_frequency is None and np.max(np.abs(late), initial=0.0) > _SLIP
     at_first, losses = "amplitude" in held.fixed, (a, b, c, held.likely_share(b))
     angle, time, before = _release(points, y0, losses, period, restoring, at_first=at_first)
     if restoring == "sine":
@@ -65,7 +54,7 @@ def start_values(
     angles = samples is None or samples.unit == points.unit
     offset = held.fixed.get("offset", float(np.mean(points.level_rad)) - (level if angles else 0.0))
     value = np.array([*losses, period.angular_frequency, angle, time, offset, 0.0])
-    return Start(value, before, (_SLIPPED.format(np.ptp(late)),) if slipped else ())
+    return Start(value, before)
 
 
 def _release(
