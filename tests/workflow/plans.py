@@ -1,26 +1,37 @@
-"""What Snakemake plans, asked in this process: another would take a second to begin."""
+"""What Snakemake plans and runs, in this process: another would take seconds to begin."""
 
 import contextlib
 import io
 import os
 import re
+import sys
+import warnings
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Self
 from unittest.mock import patch
+
+import pendpipe
+
+LIBRARY = str(Path(pendpipe.__file__).parents[1])
+"""What is tested is what the jobs run."""
 
 
 def snakemake(folder: Path, *arguments: str) -> tuple[int, str]:
-    """Status and words of a call that runs no job.
+    """Status and words of a call.
 
     It runs a loop of events of its own, which a thread that drives a browser has already: so it has
-    a thread of its own.
+    a thread of its own. It leaves the environments of its jobs open.
     """
     from snakemake.cli import main
 
     said = io.StringIO()
     with (
         ThreadPoolExecutor(1) as thread,
-        patch.dict(os.environ),
+        patch.dict(os.environ, PYTHONPATH=LIBRARY),
+        warnings.catch_warnings(action="ignore", category=ResourceWarning),
         contextlib.chdir(folder),
         contextlib.redirect_stdout(said),
         contextlib.redirect_stderr(said),
@@ -30,6 +41,36 @@ def snakemake(folder: Path, *arguments: str) -> tuple[int, str]:
         except SystemExit as end:
             return int(end.code or 0), said.getvalue()
     raise AssertionError("it always ends so")
+
+
+class _Here:
+    """A process in whose place Snakemake is called here; it is begun in the working folder."""
+
+    def __init__(self, command: Sequence[str]) -> None:
+        assert [*command[1:4]] == ["-P", "-m", "snakemake"]
+        self.status, self.said = snakemake(Path(), *command[4:])
+        print(self.said, file=sys.stderr)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def wait(self) -> int:
+        return self.status
+
+
+def campaign(folder: Path, *words: str) -> tuple[int, str]:
+    """Status and words of `pendpipe campaign`, which begins Snakemake."""
+    from pendpipe.cli import main
+
+    with (
+        patch("pendpipe.commands.small.subprocess", SimpleNamespace(Popen=_Here)),
+        contextlib.chdir(folder),
+        contextlib.redirect_stderr(said := io.StringIO()),
+    ):
+        return main(["campaign", *words]), said.getvalue()
 
 
 def jobs_in(said: str) -> dict[str, int]:

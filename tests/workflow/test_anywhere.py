@@ -17,7 +17,7 @@ from pendpipe.configuration.load import load_campaign, read_configuration, read_
 from pendpipe.project import SNAKEFILE
 from pendpipe.stages.chunks import SMALL, STAGES, batch_for, split
 
-from .plans import jobs_in, planned, snakemake
+from .plans import campaign, jobs_in, planned, snakemake
 
 # The workflow runs in any folder: begun by `init`, run by `campaign`, or used as a module.
 
@@ -36,11 +36,6 @@ def call(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
         text=True,
         check=False,
     )
-
-
-def jobs(done: subprocess.CompletedProcess[str]) -> dict[str, int]:
-    assert done.returncode == 0, done.stdout + done.stderr
-    return jobs_in(done.stdout + done.stderr)
 
 
 def begin(folder: Path) -> Path:
@@ -95,8 +90,7 @@ def test_jobs_of_snakemake_run_nothing_of_their_folder(
 def test_a_folder_that_the_user_names_is_a_profile(begun: Path) -> None:
     """Ours goes by its name, whatever lies in the working folder."""
     set_traps(begun)
-    done = call(begun, "pendpipe", "campaign", "-n", "--profile", "./default")
-    assert "nowhere" in done.stdout + done.stderr
+    assert "nowhere" in campaign(begun, "-n", "--profile", "./default")[1]
 
 
 @pytest.fixture(scope="module")
@@ -123,9 +117,10 @@ def test_a_campaign_that_was_begun_runs_to_its_report(
     assert any("did you mean 'rod-pendulum.csv'?" in line for line in lines), "of the lost file"
     assert "fit: 1 done" in lines
     assert "1 of 3 records were refused" in lines[-1]
-    alone = call(folder, "pendpipe", "campaign", "-n", "--record", "rod", "--", "--forcerun", "fit")
+    status, said = campaign(folder, "-n", "--record", "rod", "--", "--forcerun", "fit")
+    assert status == 0
     files = {f"{name}_files_{number}": 1 for number, name in enumerate(RECORDS_STAGES)}
-    assert jobs(alone) == dict.fromkeys(RECORDS_STAGES, 1) | files | {"all": 1, "total": 11}
+    assert jobs_in(said) == dict.fromkeys(RECORDS_STAGES, 1) | files | {"all": 1, "total": 11}
     assert not (folder / "sprung").exists(), "neither the run nor the plan uses them"
 
 
@@ -134,10 +129,10 @@ def test_a_line_a_stage_hides_no_fault(begun: Path) -> None:
     (begun / "recordings/rod-pendulum.csv").write_text("no recording\n", encoding="utf-8")
     with (begun / "config/config.yaml").open("a", encoding="utf-8") as configuration:
         configuration.write("strict: true\n")
-    done = call(begun, "pendpipe", "campaign", "--record", "rod")
-    assert done.returncode == 1
-    assert "Error in rule acquire" in done.stderr
-    assert "pendpipe: recordings/rod-pendulum.csv" in done.stderr
+    status, said = campaign(begun, "--record", "rod")
+    assert status == 1
+    assert "Error in rule acquire" in said
+    assert "pendpipe: recordings/rod-pendulum.csv" in said
 
 
 def test_the_workflow_is_a_module_of_others(
@@ -164,11 +159,10 @@ rule all:
     names = ("turning_points", "fit", "fit_files_3", "records")
     for path in (paths := [folder / name for name in targets]):
         path.write_bytes(path.read_bytes()[:-5])
-    ran = call(
-        *(folder, "snakemake", "--cores", "2", *targets),
-        *("--forcerun", "pendpipe_turning_points"),
-    )
-    assert set(jobs(ran)) == {f"pendpipe_{name}" for name in names} | {"total"}
+    words = ("--cores", "2", *targets, "--forcerun", "pendpipe_turning_points")
+    status, said = snakemake(folder, *words)
+    assert status == 0, said
+    assert set(jobs_in(said)) == {f"pendpipe_{name}" for name in names} | {"total"}
     for path in paths:
         assert path.read_bytes() == (ended[0] / path.relative_to(folder)).read_bytes()
     assert len(list(paths[0].parent.glob("fit.json.damaged-*"))) == 1
@@ -275,8 +269,8 @@ def test_a_table_of_published_numbers_is_a_campaign_of_one_job(
     shutil.copytree(ROOT / "examples/published/newton-1687", folder)
     words = ("--snakefile", str(SNAKEFILE))
     assert planned(folder, *words) == {"published": 1, "all": 1, "total": 2}
-    done = call(folder, "pendpipe", "campaign", "--cores", "1")
-    assert done.returncode == 0, done.stdout + done.stderr
+    status, said = campaign(folder, "--cores", "1")
+    assert status == 0, said
     content = json.loads((folder / "results/campaign_diagnosis.json").read_text("utf-8"))
     (case,) = content["cases"]
     assert case["statement"] in (folder / "results/campaign_diagnosis.txt").read_text("utf-8")

@@ -4,8 +4,6 @@ import json
 import os
 import re
 import shutil
-import subprocess
-import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,7 +13,6 @@ import pytest
 import yaml
 from snakemake.utils import update_config
 
-import pendpipe
 from pendpipe import provenance
 from pendpipe.cli import main
 from pendpipe.configuration.load import read_records
@@ -28,7 +25,6 @@ from .plans import jobs_in, snakemake
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
-LIBRARY = Path(pendpipe.__file__).parents[1]
 """What is tested, wherever it is installed."""
 SMALL = ROOT / "tests/workflow/small"
 NO_DECAY = Path("tests/workflow/small/no-decay.csv")
@@ -56,20 +52,10 @@ class Campaign:
 
     def run(self) -> str:
         """Run Snakemake, which must end well."""
-        command = [sys.executable, "-m", "snakemake", "--cores", "2", "--snakefile", str(SNAKEFILE)]
-        done = subprocess.run(
-            command,
-            cwd=self.folder,
-            env=os.environ | {"PYTHONPATH": str(LIBRARY)},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stdout + done.stderr
-        return done.stdout + done.stderr
+        return self.ask("--cores", "2")
 
     def ask(self, *arguments: str) -> str:
-        """What Snakemake says without a job."""
+        """What Snakemake says, which must end well."""
         status, said = snakemake(self.folder, "--snakefile", str(SNAKEFILE), *arguments)
         assert status == 0, said
         return said
