@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Self
 from unittest.mock import patch
 
 import pendpipe
@@ -43,22 +42,11 @@ def snakemake(folder: Path, *arguments: str) -> tuple[int, str]:
     raise AssertionError("it always ends so")
 
 
-class _Here:
-    """A process in whose place Snakemake is called here; it is begun in the working folder."""
-
-    def __init__(self, command: Sequence[str]) -> None:
-        assert [*command[1:4]] == ["-P", "-m", "snakemake"]
-        self.status, self.said = snakemake(Path(), *command[4:])
-        print(self.said, file=sys.stderr)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-    def wait(self) -> int:
-        return self.status
+def _here(command: Sequence[str]) -> contextlib.AbstractContextManager[SimpleNamespace]:
+    """Call Snakemake, in the place of a process that is begun in the working folder."""
+    status, said = snakemake(Path(), *command[command.index("snakemake") + 1 :])
+    print(said, file=sys.stderr)
+    return contextlib.nullcontext(SimpleNamespace(wait=lambda: status))
 
 
 def campaign(folder: Path, *words: str) -> tuple[int, str]:
@@ -66,7 +54,7 @@ def campaign(folder: Path, *words: str) -> tuple[int, str]:
     from pendpipe.cli import main
 
     with (
-        patch("pendpipe.commands.small.subprocess", SimpleNamespace(Popen=_Here)),
+        patch("pendpipe.commands.small.subprocess", SimpleNamespace(Popen=_here)),
         contextlib.chdir(folder),
         contextlib.redirect_stderr(said := io.StringIO()),
     ):
