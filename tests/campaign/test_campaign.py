@@ -271,6 +271,17 @@ def test_a_class_of_two_is_told_apart_by_another_fluid_and_not_by_repeats() -> N
     assert 4.0 < sigma["half glycerol, half water"] < 9.0
     assert sigma["the same records once more"] < 3.0
     assert sigma["the same records once more"] >= 0.999 * min(runs[0].now.values())
+    # The next record is predicted with a band: a repeat where the truth has it, and less sure than
+    # the repeat in a fluid that was not there.
+    predicted = {run.what: run.predicted for run in runs}
+    again, other = (
+        predicted[name] for name in ("the same records once more", "half glycerol, half water")
+    )
+    for run, values in zip(DESIGN.runs, measured.values, strict=True):
+        for number, value in enumerate(values) if run.record in again else ():
+            expected = again[run.record][number]
+            assert abs(expected.value - value) < 4.0 * expected.sd
+    assert all(other[name][1].sd > again[name][1].sd for name in other)
     for rival in rivals:  # without further runs: what this campaign can say
         assert runs[0].now[rival.last.identifier] == pytest.approx(np.sqrt(rival.chi2), rel=0.01)
 

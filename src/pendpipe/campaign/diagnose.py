@@ -5,7 +5,7 @@ to the records, and which further runs would tell the rivals of a class apart.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
@@ -17,6 +17,7 @@ from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.campaign.design import Design, Run
 from pendpipe.campaign.effects import CATALOGUE
 from pendpipe.campaign.fit import (
+    STEP,
     Candidate,
     JointFit,
     Measured,
@@ -362,6 +363,8 @@ class NextRun(NamedTuple):
     then: dict[str, float]
     lost: tuple[str, ...]
     """Records whose pendulum would turn over."""
+    predicted: Mapping[str, tuple[Estimate, Estimate]]
+    """Frequency and b of each new record that swings, with what the campaign leaves open."""
 
     @property
     def worst(self) -> float:
@@ -387,8 +390,34 @@ def next_measurements(fit: JointFit, rivals: Sequence[JointFit]) -> list[NextRun
         return []
     with np.errstate(invalid="ignore", divide="ignore"):  # without the sphere some turn over
         now, _ = _sigmas(fit, rivals, None)
-        found = [NextRun(what, now, *_sigmas(fit, rivals, change)) for what, change in RUNS.items()]
+        found = [
+            NextRun(what, now, *_sigmas(fit, rivals, change), _expected(fit, change))
+            for what, change in RUNS.items()
+        ]
     return sorted(found, key=lambda run: -run.worst)
+
+
+def _expected(fit: JointFit, change: Callable[[Run], Run]) -> dict[str, tuple[Estimate, Estimate]]:
+    """What new records would show, with the errors of the campaign's unknowns and own clamping."""
+    design, again = _extended(fit.design, change)
+    at, there = _carried(fit, fit, design), fit.design.index
+    steps = STEP * np.eye(len(at))
+    slopes = (predict(design, fit.added, at + steps) - predict(design, fit.added, at - steps)) / (
+        2.0 * STEP
+    )
+    rows = [there.get(each.name) for each in design.nuisances]
+    rows += range(len(fit.unknowns) - len(fit.added), len(fit.unknowns))
+    known = [number for number, row in enumerate(rows) if row is not None]
+    covariance = np.eye(len(at))
+    covariance[np.ix_(known, known)] = fit.covariance[np.ix_(*2 * [[rows[k] for k in known]])]
+    variance = np.einsum("irj,ik,krj->rj", slopes, covariance, slopes)
+    values, found = predict(design, fit.added, at), {}
+    for number in range(len(fit.design.runs), len(again)):
+        if np.isfinite(values[number]).all():
+            pairs = zip(values[number], np.sqrt(variance[number]), ("Hz", "1/s"), strict=True)
+            frequency, b = (Estimate(float(y), float(sd), unit) for y, sd, unit in pairs)
+            found[design.runs[number].record] = frequency, b
+    return found
 
 
 def _sigmas(
@@ -621,6 +650,10 @@ def _effect(search: CampaignSearch, found: Found, runs: Sequence[NextRun]) -> di
                 "rivals": run.then,
                 "now": run.now,
                 "would_not_swing": list(run.lost),
+                "predicted": {
+                    record: {"frequency": f.as_json(), "b": b.as_json()}
+                    for record, (f, b) in run.predicted.items()
+                },
             }
             for run in runs
         ],

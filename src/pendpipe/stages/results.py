@@ -102,6 +102,12 @@ def left_out(
     return {far.record: f"off the others: {off(far)}" for far in found}
 
 
+def surprises(diagnosis: Path | None) -> dict[str, float]:
+    """By how many sigma each record is off what all the others predict of it."""
+    rows = read_json(diagnosis)["records"] if diagnosis else []
+    return {row["record"]: row["pull_from_the_others"] for row in rows}
+
+
 def enough(design: Design) -> bool:
     """Whether records can be compared: k and one effect are free."""
     return len(design.runs) >= FEWEST_RECORDS and design.wet.sum() >= 2.0

@@ -15,7 +15,7 @@ from pendpipe.estimate import Z95, Estimate
 from pendpipe.files import write_json
 from pendpipe.options import INPUT, OUTPUT, flags
 from pendpipe.stages.archive import gathered
-from pendpipe.stages.results import RecordResult, campaign_data, left_out, read_results
+from pendpipe.stages.results import RecordResult, campaign_data, left_out, read_results, surprises
 
 
 @command(
@@ -36,7 +36,11 @@ def run(arguments: Arguments) -> None:
     with gathered(campaign.folder, "fit.json", "calibration.json") as folder:
         results = read_results(campaign, folder)
     out = left_out(campaign, results, arguments.diagnosis)
-    write_json(arguments.out, separate_campaign(campaign, results, out))
+    content = separate_campaign(campaign, results, out)
+    known = surprises(arguments.diagnosis)
+    for row in content["records"]:
+        row["surprise"] = known.get(row["record"])
+    write_json(arguments.out, content)
 
 
 def separate_campaign(
