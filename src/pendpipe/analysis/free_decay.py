@@ -9,7 +9,7 @@ A decay is a run of half cycles that follow one another.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -29,7 +29,7 @@ from pendpipe.analysis.half_cycles import (
 from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.find import find_turning_points
 from pendpipe.analysis.turning_points.table import Cut, TurningPoints
-from pendpipe.arrays import BoolArray, FloatArray
+from pendpipe.arrays import FloatArray
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.quantities import after_number, with_error
 from pendpipe.recording import Recording
@@ -54,6 +54,12 @@ _LONG: Final = 1.6
 """By which a flat side holds more readings than a crest has there."""
 _SMOOTH: Final = 0.03
 """Of means of neighbours, which chance makes smooth as well."""
+
+
+_PRICE: Final = 2.0
+"""Of two half cycles that go on, which a disturbance costs: fewer behind it show nothing."""
+_NEAR: Final = 5
+"""Half cycles back to which a motion goes on, disturbed ones among them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +104,6 @@ class Run:
         return float(np.median(np.diff(self.middle_s)))
 
     @property
-    def path(self) -> float:
-        """How far the pendulum has gone."""
-        return float(self.swing.sum())
-
-    @property
     def worth(self) -> float:
         """What it tells of loss and period, the error of a swing over that of their rates.
 
@@ -120,36 +121,85 @@ class Run:
 
 def best_runs(cycles: HalfCycles, piece: slice) -> list[Run]:
     """Find the runs among the half cycles of a piece of the record, the most telling first."""
-    count = len(cycles)
-    if count < LEAST_HALF_CYCLES:
+    if len(cycles) < LEAST_HALF_CYCLES:
         return []
-    follows, swings = _follows(cycles).tolist(), cycles.swing.tolist()
-    runs: list[Run] = []
-    first, floor = 0, swings[0]
-    for leg in range(1, count):
-        allowed = _RISE * floor + _TAIL * swings[first] + cycles.step
-        if not follows[leg - 1] or swings[leg] > allowed:
-            runs.append(Run(piece, cycles, first, leg - 1))
-            first, floor = leg, swings[leg]
-        floor = min(floor, swings[leg])
-    runs.append(Run(piece, cycles, first, count - 1))
-    joined = _joined([_trimmed(run) for run in runs])
-    kept = [run for run in joined if run.legs >= LEAST_HALF_CYCLES and _regular(run)]
-    return sorted((_undriven(run) for run in kept), key=lambda run: -run.worth)
+    chains = [chain for chain in _chains(cycles) if _regular(cycles, chain)]
+    runs = (Run(piece, cycles, one[0], one[-1], one[-1] - one[0] + 1 - len(one)) for one in chains)
+    return sorted((_undriven(_fading(run)) for run in runs), key=lambda run: -run.worth)
 
 
-def _follows(cycles: HalfCycles) -> BoolArray:
-    """Say for each half cycle but the last whether the next one may follow it freely."""
+def _chains(cycles: HalfCycles) -> list[list[int]]:
+    """Align half cycles to chains, each of one free motion: a chain ends where its score is most.
+
+    (Smith and Waterman's alignment of pieces.) A half cycle goes on from the one before at a score
+    of up to 1, or over disturbed ones, at a price.
+    """
+    half = _running_median(np.diff(cycles.middle_s))
+    follows, usual = _follows(cycles, half).tolist(), half.tolist()
+    swing, step = cycles.swing.tolist(), cycles.step
+    score, before = [0.0] * len(swing), [-1] * len(swing)
+    # Of the chain up to each: its first and its least swing, and the largest of the last three.
+    first, floor, top = swing[:], swing[:], swing[:]
+    for here in range(1, len(swing)):
+        size, at = swing[here], here - 1
+        links = [(score[at] + follows[at], at)]
+        if follows[at] < 0.0 or size > _RISE * floor[at] + _TAIL * first[at] + step:
+            links = [
+                (score[at] + _over(cycles, at, here, top[at], usual), at)
+                for at in range(max(0, here - _NEAR), here)
+            ]
+        # What is smaller than the next, and begins the motion, is a pull.
+        pulled = 0.93 * size - 0.5 * step
+        links = [link for link in links if before[link[1]] >= 0 or swing[link[1]] >= pulled]
+        most, at = max(links, default=(0.0, 0))
+        if most > 0.0:
+            three = sorted((size, swing[at], swing[before[at]] if before[at] >= 0 else size))
+            score[here], before[here], first[here], top[here] = most, at, first[at], three[-1]
+            # Of the least a wild one is none.
+            floor[here] = min(floor[at], three[1])
+    chains, free = list[list[int]](), [True] * len(swing)
+    for last in sorted(range(len(swing)), key=score.__getitem__, reverse=True):
+        chain, at = [last], before[last]
+        while at >= 0 and free[last]:
+            chain.append(at)
+            at = before[at]
+        if all(free[chain[-1] : last + 1]) and len(chain) > 1:
+            free[chain[-1] : last + 1] = [False] * (last + 1 - chain[-1])
+            chains.append(chain[::-1])
+    return chains
+
+
+def _follows(cycles: HalfCycles, usual: FloatArray) -> FloatArray:
+    """Score for each half cycle but the last how freely the next one follows it, shape (m - 1,).
+
+    1 where half period and swing are those before, 0 at the limits of either.
+    """
     swing, half = cycles.swing, np.diff(cycles.middle_s)
-    usual = _running_median(half)
+    before, after, step = swing[:-1], swing[1:], cycles.step
     # A step of the converter moves the passage of the middle by this share of a half period.
-    blur = 0.5 * cycles.step / np.minimum(swing[1:], swing[:-1])
-    steady = np.abs(np.log(half / usual)) < _PERIOD + np.minimum(blur, 0.3)
-    rises = swing[1:] > _RISE * swing[:-1] + cycles.step
+    blur = np.minimum(0.5 * step / np.minimum(before, after), 0.3)
+    late = np.log(half / usual) / (_PERIOD + blur)
     loss = np.concatenate(([0.0], swing[:-2] - swing[1:-1]))
     # Coulomb friction takes the same from each half cycle, so the last ones shrink fast.
-    drops = (swing[1:] < _FALL * swing[:-1]) & (swing[1:] < swing[:-1] - 1.6 * loss - cycles.step)
-    return np.asarray(steady & ~rises & ~drops)
+    low = np.minimum(_FALL * before, before - 1.6 * loss - step)
+    change = after - before
+    off = np.where(change > 0.0, change / ((_RISE - 1.0) * before + step), change / (before - low))
+    return np.asarray(1.0 - np.maximum(late**2, off**2))
+
+
+def _over(cycles: HalfCycles, at: int, here: int, top: float, usual: Sequence[float]) -> float:
+    """Score whether a motion goes on over a disturbance (a tracking error, lost samples).
+
+    `top` is the largest of the last three swings before: where a turning point is lost in a gap,
+    the swings beside it are too small.
+    """
+    size, pause = float(cycles.swing[here]), float(cycles.middle_s[here] - cycles.middle_s[at])
+    # Half periods of the five half cycles before, and behind.
+    behind, ahead = usual[max(at - 3, 0)], usual[min(here + 2, len(usual) - 1)]
+    off = math.log(size / top) / math.log(1.15 if size > top else 2.0)
+    alike = abs(ahead / behind - 1.0) < _PERIOD and abs(off) < 1.0
+    goes_on = alike and size > 3.0 * cycles.step and pause < 4.5 * behind
+    return 1.0 - off**2 - _PRICE if goes_on else -math.inf
 
 
 def _running_median(values: FloatArray) -> FloatArray:
@@ -159,41 +209,23 @@ def _running_median(values: FloatArray) -> FloatArray:
     return np.asarray(np.nanmedian(windows, axis=1))
 
 
-def _trimmed(run: Run) -> Run:
-    """Drop half cycles at the front that are smaller than what follows: a pull."""
-    first, swing = run.first, run.cycles.swing
-    while run.last - first >= 2 and swing[first] < (
-        0.93 * swing[first + 1] - 0.5 * run.cycles.step
-    ):
-        first += 1
-    return replace(run, first=first)
-
-
-def _joined(runs: list[Run]) -> list[Run]:
-    """Join runs that a few disturbed half cycles part (a tracking error, lost samples)."""
-    out: list[Run] = []
-    for run in (run for run in runs if run.legs >= 2):
-        if out and _continues(out[-1], run):
-            before = out.pop()
-            lost = run.first - before.last - 1
-            run = replace(run, first=before.first, bridged=before.bridged + run.bridged + lost)
-        out.append(run)
-    return [_fading(run) for run in out]
-
-
-def _regular(run: Run) -> bool:
+def _regular(cycles: HalfCycles, chain: list[int]) -> bool:
     """Say whether periods and amplitudes go on as smoothly as a pendulum's do."""
-    half, usual = np.diff(run.middle_s), float(np.median(run.swing))
-    blur = run.cycles.step / usual
+    swing, one_on = cycles.swing[chain], np.diff(chain) == 1
+    half = np.diff(cycles.middle_s[chain])[one_on]
+    if len(half) < LEAST_HALF_CYCLES - 1:
+        return False
+    usual = float(np.median(swing))
+    blur = cycles.step / usual
     # Where the sides differ, half cycles two apart are alike; of a few that says too little.
     apart = 2 if len(half) > 6 else 1
     waver = float(np.median(np.abs(half[apart:] - half[:-apart]))) / float(np.median(half))
     # Viscous loss takes the same share of each half cycle, Coulomb friction the same amount: a
     # strong one of either bends what is even under the other.
-    kinks = float(np.min(np.median(_bends(run.swing, usual), axis=1)))
-    if kinks >= _WAVER and run.legs > 6:
+    kinks = float(np.min(np.median(_bends(swing, usual), axis=1)))
+    if kinks >= _WAVER and len(swing) > 6:
         # A zero that drifts shortens and lengthens swings in turn, and not the means of neighbours.
-        means = 0.5 * (run.swing[1:] + run.swing[:-1])
+        means = 0.5 * (swing[1:] + swing[:-1])
         kinks = _WAVER / _SMOOTH * float(np.min(np.mean(_bends(means, usual), axis=1)))
     return waver < _WAVER + 0.5 * blur and kinks < _WAVER + 2.0 * blur
 
@@ -203,24 +235,8 @@ def _bends(swing: FloatArray, usual: float) -> FloatArray:
     return np.asarray(np.abs([np.diff(np.log(swing), 2), np.diff(swing, 2) / usual]))
 
 
-def _continues(before: Run, after: Run) -> bool:
-    """Say whether `after` goes on where `before` was broken off."""
-    half = before.half_period_s
-    pause = float(after.middle_s[0] - before.middle_s[-1])
-    # Where a turning point is lost in a gap, the swings beside it are too small.
-    begun = float(after.swing[0])
-    ratio, strong = begun / float(np.max(before.swing[-3:])), begun > 3.0 * after.cycles.step
-    if not (
-        strong and before.legs >= LEAST_HALF_CYCLES and pause < 4.5 * half and 0.5 < ratio < 1.15
-    ):
-        return False
-    return after.legs > 1 and abs(after.half_period_s / half - 1.0) < _PERIOD
-
-
 def _fading(run: Run) -> Run:
     """Note whether the run's own last swing follows it, and then rest or the record's end."""
-    if run.legs < LEAST_HALF_CYCLES:
-        return run
     cycles = run.cycles
     if run.last + 1 == len(cycles):
         return replace(run, fades=cycles.ending < _RISE * float(run.swing[-1]) + cycles.step)
@@ -331,6 +347,8 @@ _CATCHABLE: Final = 9
 """Half cycles of a decay whose last ones tell what the next would have lost."""
 _SPOILT: Final = 3.0
 """Of the usual loss: what loses more in a half cycle was caught, and what has less left rests."""
+_AS_MUCH: Final = 0.2
+"""Of what the most telling run tells, from which one is preferred that falls."""
 _COUNTED: Final = 0.25
 """Half cycles by which the count across a gap may be off."""
 _NODE: Final = 4
@@ -406,10 +424,16 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
         for run in best_runs(cycles, piece)
         if every - run.legs <= math.factorial(min(run.legs, _MANY))
     ]
-    told = max(found, key=lambda run: run.worth, default=None)
+    most = max((run.worth for run in found), default=0.0)
+    # A drive that comes or goes may tell as much, but does not fall.
+    told = max(
+        found,
+        key=lambda run: (run.worth > _AS_MUCH * most and _falls(run, least), run.worth),
+        default=None,
+    )
     used = _chained(found, told) if told else []
-    unused = sum(run.path for run in found) - sum(run.path for run in used)
-    alone = told and unused <= 0.3 * told.path and _falls(told, least)
+    unused = sum(run.worth for run in found if run not in used)
+    alone = told and unused <= 0.3 * told.worth and _falls(told, least)
     ends = (float(told.middle_s[0]), float(told.middle_s[-1])) if told else (math.inf, math.inf)
     held = told is not None and told.driven
     beat = _beating(
@@ -425,7 +449,7 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
             "handling, a clamp or a drive can't be analysed",
         )
     _refuse_without_fall(place, time[told.piece], values[told.piece], told, least)
-    others = [run for run in found if run.path > 0.05 * told.path and run not in used]
+    others = [run for run in found if run.worth > 0.05 * told.worth and run not in used]
     may_turn_over = recording.quantity == "angle_rad"
     return _described(time, values, used, others, least, may_turn_over=may_turn_over)
 
@@ -553,7 +577,7 @@ def _goes_on(run: Run, follower: Run) -> bool:
     whole number, and the side on which the follower begins is that number's. So must their loss.
     """
     cycles, later = run.cycles, follower.cycles
-    if run.last + 1 < len(cycles) or follower.first > 1 or follower.legs < LEAST_HALF_CYCLES:
+    if run.last + 1 < len(cycles) or follower.first > 1:
         return False
     before, behind = run.middle_s[-_BLOCKS:], follower.middle_s[:_BLOCKS]
     halves = [float(np.mean(np.diff(part))) for part in (before, behind)]
