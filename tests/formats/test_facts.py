@@ -69,6 +69,30 @@ def test_each_fact_is_in_the_json_and_in_the_answer_to_why(tmp_path: Path, answe
     assert told["weak_guesses"] == [fact.words for fact in facts if fact.how == "guessed"]
 
 
+@pytest.mark.parametrize(
+    ("header", "columns", "said"),
+    [
+        ("time (s),theta", [np.mod(TIME + 86390.0, 86400.0)], "begins again at 0 after 86400"),
+        ("dt (ms),theta", [np.full(2000, 20.0)], "added up"),
+        ("s,ns,theta", [np.floor(TIME), 1e9 * np.mod(TIME, 1.0)], "'s' and 'ns' joined"),
+    ],
+)
+def test_a_clock_that_is_made_of_what_the_file_has_is_a_fact(
+    tmp_path: Path, header: str, columns: list[Any], said: str
+) -> None:
+    rows = "".join(
+        ",".join(f"{value:.6f}" for value in row) + "\n"
+        for row in zip(*columns, ANGLE, strict=True)
+    )
+    (tmp_path / "a.csv").write_text(f"{header}\n{rows}")
+    recording = read(tmp_path / "a.csv")
+    fact = recording.fact("clock")
+    assert fact is not None
+    assert fact.how == "shown"
+    assert said in fact.said
+    np.testing.assert_allclose(np.diff(recording.time_s), 0.02, atol=1e-6)
+
+
 @pytest.mark.parametrize("period_s", [0.03, 1.0, 15.0])
 @pytest.mark.parametrize("unit_s", [1.0, 1e-3, 1e-6])
 def test_seconds_are_shown_where_no_other_unit_gives_a_swing(

@@ -160,6 +160,8 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         told = options.columns[0] is not None or time.role in ("time", "index")
         rate = None if told else 0.5 ** min(len(time.values) - 2, 1000)
         facts.insert(0, Fact("time column", time.label, "stated" if told else "shown", "", rate))
+        if time.made:
+            facts.insert(1, Fact("clock", "repaired", "shown", f"'{time.label}' {time.made}"))
     return Choice(time, counts, readings, channels, tuple(facts), found)
 
 
@@ -194,7 +196,7 @@ def _parts(table: Table, options: ReadOptions) -> list[str]:
 def _settled(column: Column) -> Column:
     """Undo a clock's overflow; and "run1" counts nothing where it swings."""
     if column.role == "time" or not column.name:
-        column = replace(column, values=_counted_on(column.values))
+        column = _counted_on(column)
     swings = column.role == "index" and column.swing.clear
     return replace(column, role="unknown") if swings else column
 
@@ -204,9 +206,10 @@ def _summed(column: Column) -> Column:
     unit = unit_of(column.unit)
     lasts = unit is not None and unit.kind == "time" and column.values.min() > 0.0
     named = re.fullmatch(r"(d|δ|delta)[_ ]?t|interval\w*", plain(column.name))
-    return (
-        replace(column, values=np.cumsum(column.values), role="time") if lasts and named else column
-    )
+    if not (lasts and named):
+        return column
+    made = "holds times since the row above: added up"
+    return replace(column, values=np.cumsum(column.values), role="time", made=made)
 
 
 def _whole_times(columns: list[Column]) -> list[Column]:
@@ -219,7 +222,8 @@ def _whole_times(columns: list[Column]) -> list[Column]:
         falls = np.diff(fraction) < 0.0
         if in_part and in_whole and np.any(falls) and np.all(steps[falls] == 1.0):
             seconds = whole.values * turn + fraction
-            one = replace(whole, values=seconds, name="time", unit="s", role="time")
+            made = f"is '{whole.label}' and '{part.label}' joined"
+            one = replace(whole, values=seconds, name="time", unit="s", role="time", made=made)
             return _whole_times([one if c is whole else c for c in columns if c is not part])
     return columns
 
@@ -236,16 +240,18 @@ _TURNS: Final = (2.0**16, 2.0**32, *(size * days for size in (86400.0, 864e5) fo
 """Ticks of a clock's turn: ``micros()`` takes 71 minutes, a day and a week are in s and ms."""
 
 
-def _counted_on(values: FloatArray) -> FloatArray:
+def _counted_on(column: Column) -> Column:
     """Count on where a clock begins again at 0: of 16 or 32 bits, of the day, of the GPS week."""
-    steps = np.diff(values)
+    values, steps = column.values, np.diff(column.values)
     for turn in _TURNS:
         over = steps < -0.5 * turn
         across = np.abs(steps[over] + turn).max(initial=0.0)
         on = over.any() and values.max() < turn and steps[~over].min(initial=1.0) >= 0.0
         if on and across < 10.0 * np.median(np.abs(steps)):
-            return np.asarray(values + turn * np.append(0, np.cumsum(over)))
-    return values
+            made = f"begins again at 0 after {turn:.10g} {over.sum()} time(s): counted on"
+            values = values + turn * np.append(0, np.cumsum(over))
+            return replace(column, values=values, made=made)
+    return column
 
 
 def _time(table: Table, options: ReadOptions) -> tuple[Column | None, bool]:

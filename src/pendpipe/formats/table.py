@@ -491,6 +491,8 @@ class Column:
         What it holds, once that is settled.
     of
         What it is a column of, where a line above the names says so: a tracked mass.
+    made
+        How its values were made of those in the file, where they are others.
     """
 
     name: str
@@ -503,6 +505,7 @@ class Column:
     limits: tuple[float, float] | None = None
     role: Role = "unknown"
     of: str = ""
+    made: str = ""
 
     @cached_property
     def clean(self) -> FloatArray:
