@@ -1,12 +1,17 @@
 """Are others' files read right, are their periods right, is a green light ever false.
 
     python -m benchmarks.files [--only NAME] [--number N]
+    python -m benchmarks.files --drawn 300
+    python -m benchmarks.files --why
 
 Four collections beside the project, in ../shared, each with what is known of it: the files of
 `tests/formats/shared_files.tsv`; `strangers/second` and `third`, whose raw files are read there in
 a simple way of their own and have a period found by hand, or by the crossings of the level; and
 `inputs4`, whose answers stand in `files.tsv`. A green light is false where the period, or a Q that
 is known, lies outside its band.
+
+``--drawn`` asks tables in dialects instead, as `tests/formats/test_dialects.py` draws them from the
+hash of the commit at work, and ``--why`` prints how five of that folder's samples are understood.
 """
 
 from __future__ import annotations
@@ -18,16 +23,20 @@ import json
 import re
 import sys
 import tempfile
+from collections import Counter
 from functools import cache
 from pathlib import Path
+from random import Random
 from typing import Any, Final
 from unittest.mock import patch
 
 import numpy as np
 
+from benchmarks.house import git
 from benchmarks.journal import ROOT, answers, judge_parser
 from benchmarks.known_physics import run
 from benchmarks.table import head, share, table_row
+from pendpipe.formats import inspect
 
 SHARED: Final = ROOT.parent / "shared"
 KINDS: Final = Path(__file__).with_suffix(".tsv")
@@ -236,11 +245,48 @@ def _value(estimate: Any) -> float:
 ASKED: Final = {"recordings": _recording, "second": _second, "third": _third, "inputs4": _kind}
 
 
+WHY: Final = (
+    "plain_table/a_clock_begins_again_beside_three_digits.csv",
+    "plain_table/nul_bytes_and_two_rows_in_one.txt",
+    "windaq/swing.wdh",
+    "seismograph/sac.txt",
+    "swings/matlab-a-clock-that-is-infinite-twice.mat",
+)
+"""Samples of `tests/formats` whose clocks, damage, scale and units are found in different ways."""
+
+
+def why() -> int:
+    """Print the facts of five files."""
+    for name in WHY:
+        print(name, *inspect(ROOT / "tests/formats" / name).why, sep="\n  ")
+    return 0
+
+
+def drawn(number: int) -> int:
+    """Read tables in dialects drawn from the commit's hash; none may be wrong without a word."""
+    dialects = importlib.import_module("tests.formats.test_dialects")
+    hash_at_work = git("rev-parse", "HEAD").decode().strip()
+    random, counts = Random(hash_at_work), Counter[str]()
+    with tempfile.TemporaryDirectory() as folder:
+        for place in range(1, number + 1):
+            sample = dialects.draw(random)
+            found, said = dialects.outcome(Path(folder) / "recording.txt", sample)
+            counts[found] += 1
+            if found == "wrong":
+                print(f"* {place}: {sample.story}: {said}")
+    print(f"{number} tables of commit {hash_at_work[:8]}: {dict(counts)}")
+    return int(counts["wrong"] > 0)
+
+
 def main() -> int:
     """Ask what was not asked of this code yet; print the rows that fail and a line a collection."""
     parser = judge_parser(__doc__, "files", 0)
     parser.add_argument("--only", default="", help="part of a name")
+    parser.add_argument("--drawn", type=int, default=0, help="tables of dialects")
+    parser.add_argument("--why", action="store_true", help="the facts of five files")
     told = parser.parse_args()
+    if told.why or told.drawn:
+        return why() if told.why else drawn(told.drawn)
     wanted = [row for row in rows() if told.only in "/".join(row)][: told.number or None]
     judged = list(
         zip(
