@@ -182,5 +182,11 @@ def test_the_command_prints_draws_and_writes(tmp_path: Path, capsys: Any) -> Non
     content = json.loads((tmp_path / "a.json").read_text())
     assert len(content["decay"]["time_s"]) == len(content["decay"]["amplitude_low"]) == 96
     assert (tmp_path / "a.svg").stat().st_size > 10_000
+    page = tmp_path / "a.html"
+    assert main(["page", *words[1:], "--no-diagnosis", "--out", str(page)]) == 0
+    shown = page.read_text()
+    assert "<h2>Predicted from one decay" in shown
+    assert "What another experiment would show" in shown
+    assert "<dt>largest state</dt>" in shown
     with pytest.raises(SystemExit, match="2"):
         main([*words[:3], "0.9"])

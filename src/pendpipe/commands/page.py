@@ -13,8 +13,10 @@ from pendpipe import api
 from pendpipe.analysis.fit.fixed import parse_fixed
 from pendpipe.arguments import FILES, Arguments, command, name_of, tell
 from pendpipe.commands.fit import OPTIONS, fitted, length_of, take_lengths
+from pendpipe.commands.predict import PREDICTED
 from pendpipe.errors import InputError, NotAnalysableError, refuse_if
-from pendpipe.options import OUTPUT
+from pendpipe.options import OUTPUT, given
+from pendpipe.prediction import predict
 from pendpipe.process import cores, in_order
 from pendpipe.report.class_table import Fitted, class_page
 
@@ -40,6 +42,7 @@ class Sheet(NamedTuple):
             "help": "leave out the diagnosis",
         },
     }
+    | PREDICTED
     | OPTIONS
 )
 def run(arguments: Arguments) -> int:
@@ -90,7 +93,9 @@ def _sheet(arguments: Arguments, file: str) -> Sheet:
         except NotAnalysableError as problem:
             # What can't be diagnosed was fitted.
             notes.append(f"not diagnosed: {problem}")
-    page = render_recording(name, recording, result, outcome)
+    asked = given(arguments, predict) | {"points": arguments.points}
+    wanted = any(each is not None for each in asked.values())
+    page = render_recording(name, recording, result, outcome, wanted and predict(result, **asked))
     return Sheet(Fitted(file, replace(result, points=None, decay=None)), page, tuple(notes))
 
 

@@ -9,7 +9,7 @@ the decays they open, and that is said.
 """
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pendpipe.arguments import FILES, Arguments, command, print_answer
 from pendpipe.commands.fit import OPTIONS, fitted, take_lengths
@@ -18,13 +18,16 @@ from pendpipe.files import write_json
 from pendpipe.options import INPUT, OUTPUT, flags, flags_of, given
 from pendpipe.prediction import predict
 
+PREDICTED: Final = flags_of(predict) | {
+    "--points": {"type": Path, "metavar": "CSV", "help": "what was measured, to compare"} | INPUT
+}
+"""What is predicted, by whatever command."""
+
 
 @command(
     FILES
-    | flags_of(predict)
+    | PREDICTED
     | {
-        "--points": {"type": Path, "metavar": "CSV", "help": "what was measured, to compare"}
-        | INPUT,
         "--out": {"type": Path, "metavar": "JSON", "help": "the prediction"} | OUTPUT,
         "--figure": {
             "type": Path,

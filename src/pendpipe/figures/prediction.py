@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from pendpipe.figures.style import BLUE, GREY, INK, VERMILION, Mark, Panel, curve, figure_of
+from pendpipe.figures.style import BLUE, GREY, INK, VERMILION, Mark, Panel, curve, figure_of, styled
 from pendpipe.quantities import after_number
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 
+@styled
 def draw_prediction(tables: "Mapping[str, DataFrame]", unit: str) -> Figure:
     """Draw what was predicted, in a unit: a panel for each quantity."""
     amplitude = f"Amplitude ({after_number(unit).strip()})" if unit else "Amplitude"

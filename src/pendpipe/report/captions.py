@@ -124,6 +124,13 @@ OF_A_RECORDING: Final = {
         "Points that scatter about zero mean that the law describes the decay; a trend is"
         " physics that it lacks.",
     ),
+    "prediction": Caption(
+        "What another experiment would show",
+        "The next decay, and amplitude and phase when it is driven, with bands that hold 95 %;"
+        " measured points where a table was given.",
+        "Dashed states are unstable. Grey lies beyond the amplitudes of the decay: there the"
+        " prediction extrapolates. Red points lie outside of their bands.",
+    ),
     "residual_map": CAPTIONS["residual_map"],
     "residual_spectrum": Caption(
         "Spectrum of the residual",

@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from html import escape, unescape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 from urllib.parse import quote
 
 from markupsafe import Markup
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from pendpipe.diagnosis.result import Diagnosis
+    from pendpipe.prediction import Prediction
     from pendpipe.report.charts import Chart
 
 BUDGET_BYTES: Final = 5_000_000
@@ -399,6 +400,7 @@ def render_recording(
     recording: Recording,
     result: FitResult,
     outcome: Diagnosis | None = None,
+    prediction: Prediction | Literal[False] = False,
 ) -> str:
     """Make the page of one recording: a sheet to print, and the rest below a fold.
 
@@ -412,6 +414,8 @@ def render_recording(
         The fit, with its readings.
     outcome
         The diagnosis; None where none was asked for.
+    prediction
+        Of another experiment; False where none was asked for.
 
     Returns
     -------
@@ -428,6 +432,7 @@ def render_recording(
         from pendpipe.figures.diagnosis import draw_each
 
         drawings += list(draw_each(outcome))
+    drawings += [("prediction", prediction.plot())] if prediction else []
     return fill_template(
         "pendpipe.report",
         "recording.html",
@@ -441,6 +446,7 @@ def render_recording(
         sheet=_inlined(draw_sheet(decay, recording), "sheet", _SHEET),
         diagnosis=None if outcome is None else outcome.summary,
         details="" if outcome is None else outcome.details,
+        predicted=prediction and prediction.answer,
         numbers=[(title, str(each)) for title, each in result.numbers().items()],
         figures=[
             {"svg": _inlined(figure, f"figure-{key}", caption), "caption": caption}
