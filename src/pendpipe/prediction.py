@@ -233,6 +233,7 @@ def _drawn(
             size = max(loss.value, _SMALL * loss.sd)
             rows.append((lasts, size, period.sd / period.value, loss.sd / size))
     lasts, size, *relative = np.array(rows).T
+    refuse_if(not np.all(size > 0.0), fit.name, "it shows no loss", "give a longer recording")
     last = (inside == logs) & (logs > np.log(seen) @ (1.0 / 3.0, 2.0 / 3.0))
     found = []
     for middle, sd in zip((np.log(math.tau / lasts), np.log(size)), relative, strict=True):
@@ -261,8 +262,8 @@ def _together(
     scale = weight.sum(axis=0) - (weight**2).sum(axis=0) / weight.sum(axis=0)
     # Alike at all amplitudes, in the logarithms: three decays tell little of each.
     several = k[0] > 1
-    between = excess[:, several].sum(axis=1) / scale[:, several].sum(axis=1)
-    between = np.maximum(between, 0.0)[:, None]
+    whole = np.maximum(scale[:, several].sum(axis=1), 1e-300)  # none, where no two overlap
+    between = np.maximum(excess[:, several].sum(axis=1) / whole, 0.0)[:, None]
     weight = near / (variance + between)
     weight /= weight.sum(axis=0)
     mean = (weight[:, :, None] * drawn).sum(axis=0)
@@ -319,7 +320,7 @@ def decay_from(curves: Curves, amplitude: float) -> "DataFrame":
 def phase_of(curves: Curves, frequency_hz: FloatArray, amplitude: FloatArray) -> FloatArray:
     """Phase in degrees at drive frequencies and amplitudes, shape (draws, n); negative: it lags.
 
-    It does not depend on the force: ``tan phi = -2 lambda Omega/(omega^2 - Omega^2)``.
+    It does not depend on the force: ``tan phi = -2 lambda g Omega/(omega^2 - Omega^2)``.
     """
     drive = math.tau * frequency_hz
     omega, loss = curves.driven(amplitude, drive)

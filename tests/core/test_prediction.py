@@ -124,6 +124,22 @@ def test_beyond_what_was_seen_it_says_so_and_not_far(pendulum: Any) -> None:
         pp.predict(pendulum, amplitude=2.5)
 
 
+def test_decays_without_a_common_amplitude_make_one_curve(spring: Any) -> None:
+    small = pp.fit(recorded(SPRING, 0.01), restoring="linear")
+    points = spring.points.amplitude_rad.min(), small.points.amplitude_rad.max()
+    assert points[0] > points[1]
+    found = pp.predict([spring, small], amplitude=0.25).decay
+    assert np.isfinite(found.to_numpy(dtype=float)).all()
+    with pytest.raises(InputError, match="in m and rad"):
+        pp.predict([spring, pp.fit("examples/rod-pendulum.csv", restoring="linear"), metres()])
+
+
+def metres() -> Any:
+    """A decay of a spring, in metres."""
+    angle = recorded(SPRING, 0.3).values
+    return pp.fit(pp.Recording(time_s=TIME, displacement_m=angle))
+
+
 def table_of(path: Path, law: Eq8, constant: float) -> Path:
     """A table of driven states of a spring, by its transfer function."""
     hertz = np.linspace(0.76, 0.83, 12)
