@@ -14,8 +14,7 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics import FINDERS
 from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.found import Finding
-from pendpipe.diagnosis.noise import Noise, white_noise
-from pendpipe.diagnosis.noise_estimate import estimate_noise
+from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.dynamics.eq8 import OMEGA
 from pendpipe.effects.model import Model

@@ -15,10 +15,9 @@ from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.hypothesis import first_noise
-from pendpipe.diagnosis.refine import refine
+from pendpipe.diagnosis.refine import alignment, anchored, refine, unwrapped
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.run import diagnose_recording
-from pendpipe.diagnosis.unwrapped import alignment, anchored, unwrapped
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.dynamics.eq8 import OMEGA, START, TIME, B, Restoring
 from pendpipe.effects.catalogue import by_identifier

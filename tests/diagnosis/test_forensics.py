@@ -14,8 +14,8 @@ from pendpipe.diagnosis.data import gather
 from pendpipe.diagnosis.faults import _applied, correct
 from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.glitches import _described, find_in_misfit, smallest_p_value
-from pendpipe.diagnosis.forensics.lost_samples import LostSamples, find_lost_samples, loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
+from pendpipe.diagnosis.forensics.slips import LostSamples, find_lost_samples, loss_confirmed
 from pendpipe.diagnosis.forensics.tails import Tail
 from pendpipe.diagnosis.found import Confirmation, Finding
 from pendpipe.diagnosis.noise import white_noise
@@ -387,9 +387,7 @@ def test_lost_samples_that_no_motion_could_follow_are_not_corrected(
     """After a loss longer than the motion there is nothing to compare: the record stays."""
     fit, data, noise = null_fit()
     late = LostSamples(float(data.time_s[-20]), 10**9, 1e9)
-    monkeypatch.setattr(
-        "pendpipe.diagnosis.forensics.lost_samples.find_lost_samples", lambda *_: [late]
-    )
+    monkeypatch.setattr("pendpipe.diagnosis.forensics.slips.find_lost_samples", lambda *_: [late])
     samples = prepare(Recording(data.time_s, data.values, "angle_rad"), "the test")
     state = correct(hypothesis_of(fit, data, noise, (), fit, samples), task_of(samples))
     assert np.array_equal(state.data.time_s, data.time_s)
@@ -406,9 +404,7 @@ def test_a_loss_that_is_placed_a_reading_off_makes_no_glitch(
     record = fitted(AIR, motion + drawn_white(generator(), AIR.count))
     (lost,) = find_lost_samples(record.data, record.fit)
     placed = lost._replace(time_s=float(AIR.times()[place + late]))
-    monkeypatch.setattr(
-        "pendpipe.diagnosis.forensics.lost_samples.find_lost_samples", lambda *_: [placed]
-    )
+    monkeypatch.setattr("pendpipe.diagnosis.forensics.slips.find_lost_samples", lambda *_: [placed])
     begun = hypothesis_of(record.fit, record.data, record.noise, (), record.fit, record.samples)
     state = correct(begun, task_of(record.samples))
     (fault,) = state.faults

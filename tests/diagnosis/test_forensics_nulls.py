@@ -14,7 +14,7 @@ from pendpipe.diagnosis.faults import correct
 from pendpipe.diagnosis.forensics import Finder
 from pendpipe.diagnosis.forensics.colour import note_level
 from pendpipe.diagnosis.forensics.evidence import Evidence
-from pendpipe.diagnosis.forensics.lost_samples import find_lost_samples
+from pendpipe.diagnosis.forensics.slips import find_lost_samples
 from pendpipe.diagnosis.forensics.tails import Tail, fit_tail, tail_of_squares
 from pendpipe.diagnosis.found import Finding
 from pendpipe.diagnosis.hypothesis import Hypothesis, Task, settled

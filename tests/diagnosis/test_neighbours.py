@@ -13,13 +13,11 @@ from pendpipe.diagnosis.faults import _applied
 from pendpipe.diagnosis.found import Finding
 from pendpipe.diagnosis.held_out import completed, held_out, predicted_worse
 from pendpipe.diagnosis.hypothesis import CHOICE, FURTHER, Hypothesis, Step, price
-from pendpipe.diagnosis.neighbours import describing, shares_a_misfit, simpler
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit, refine
-from pendpipe.diagnosis.remainder import remainder_of
+from pendpipe.diagnosis.refine import Fit, refine, remainder_of
 from pendpipe.diagnosis.rivals import NO_SCAN, Rival, Scale, off_harmonics
 from pendpipe.diagnosis.run import diagnose_recording
-from pendpipe.diagnosis.search import run_search
+from pendpipe.diagnosis.search import describing, run_search, shares_a_misfit, simpler
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording

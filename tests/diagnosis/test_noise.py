@@ -14,13 +14,12 @@ from scipy.stats import binom, chi2, kstest
 from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.detect import Band, ToneScan, tone_scan
 from pendpipe.diagnosis.forensics.colour import note_wander
 from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.tracking import rows_of, wander, wander_confirmed
-from pendpipe.diagnosis.noise import Noise, white_noise
-from pendpipe.diagnosis.noise_estimate import _about_lines, estimate_noise, stands_out
+from pendpipe.diagnosis.noise import Noise, _about_lines, estimate_noise, stands_out, white_noise
 from pendpipe.diagnosis.run import diagnose_recording
-from pendpipe.diagnosis.spectrum import Band, ToneScan, tone_scan
 from pendpipe.formats import read
 from pendpipe.recording import Recording, read_plain, write_plain
 

@@ -7,7 +7,7 @@ import pytest
 
 import pendpipe as pp
 from pendpipe.analysis.fit.quality import small_frequency
-from pendpipe.diagnosis.remainder import with_errors
+from pendpipe.diagnosis.refine import with_errors
 from pendpipe.diagnosis.values import constants_of
 from pendpipe.dynamics import Eq8, Release, sample
 from pendpipe.recording import Recording

@@ -17,8 +17,7 @@ from pendpipe.diagnosis.found import FittedModel, FoundEffect, Location, Mate, v
 from pendpipe.diagnosis.held_out import HeldOut
 from pendpipe.diagnosis.location import curve_told, locate, mains_of
 from pendpipe.diagnosis.noise import white_noise
-from pendpipe.diagnosis.refine import Fit, refine
-from pendpipe.diagnosis.remainder import Remainder, remainder_of, with_errors
+from pendpipe.diagnosis.refine import Fit, Remainder, refine, remainder_of, with_errors
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.rivals import near_harmonic_by_chance
 from pendpipe.diagnosis.summary import Change, Summary, numbers_of

@@ -17,7 +17,7 @@ from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data, gather
-from pendpipe.diagnosis.unwrapped import anchored
+from pendpipe.diagnosis.refine import anchored
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.dynamics.eq8 import BASELINE, OFFSET, OMEGA, SHARE, START, TIME, A, B, C
 from pendpipe.dynamics.eq8_model import Eq8Model, Seen, values_of

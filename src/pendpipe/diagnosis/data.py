@@ -198,8 +198,6 @@ def with_scatter(data: Data, samples: Samples, model: Callable[[FloatArray], Flo
     model
         The readings of a model at some times; an error that is slow does no harm.
     """
-    if data.fold == 1:
-        return data
     kept = np.flatnonzero(data.weight > 0.0)
     kept = kept[:: max(len(kept) * data.fold // _MOST_SCATTERED, 1)]
     rows = data.rows[kept]

@@ -17,11 +17,19 @@ from pendpipe.diagnosis.data import Data, with_lattice
 from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Detection, detect, prepare
 from pendpipe.diagnosis.found import COLOURED_NOISE, Finding
 from pendpipe.diagnosis.instants import with_better_instants
-from pendpipe.diagnosis.noise import Noise, white_noise
-from pendpipe.diagnosis.noise_estimate import estimate_noise
-from pendpipe.diagnosis.refine import GROSS, Fit, best_fit, is_gross, loses_phase, refine
+from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise
+from pendpipe.diagnosis.refine import (
+    GROSS,
+    INCOMPLETE,
+    Fit,
+    Remainder,
+    best_fit,
+    is_gross,
+    loses_phase,
+    refine,
+    remainder_of,
+)
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.remainder import INCOMPLETE, Remainder, remainder_of
 from pendpipe.dynamics.eq8 import OMEGA, Restoring
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.reading import SoftClipping

@@ -12,8 +12,7 @@ from pendpipe.analysis.fit.printed import short_size
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.found import Location
-from pendpipe.diagnosis.refine import Fit
-from pendpipe.diagnosis.unwrapped import LARGE_PHASE_ERROR
+from pendpipe.diagnosis.refine import LARGE_PHASE_ERROR, Fit
 from pendpipe.diagnosis.values import curve_values, curves_of, last_in
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
@@ -107,7 +106,7 @@ def curve_told(fit: Fit, effect: Curve, unit: str) -> dict[str, Any]:
     return {"name": effect.name, "summary": told, **found}
 
 
-_MAINS_HZ: Final = (50.0, 60.0)
+_MAINS_HZ: Final = (50.0, 60.0)  # of the world's grids
 _MAINS_SD: Final = 4e-4
 """Relative standard deviation of a grid's frequency: 20 mHz at 50 Hz."""
 _BY_CHANCE: Final = 0.05

@@ -20,9 +20,8 @@ from pendpipe.analysis.fit.quality import small_frequency
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.hypothesis import Hypothesis, Step
-from pendpipe.diagnosis.refine import Fit, best_fit
+from pendpipe.diagnosis.refine import Fit, best_fit, with_errors
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.remainder import with_errors
 from pendpipe.diagnosis.rivals import Rival
 from pendpipe.diagnosis.values import constants_of, quality_factors_of, small_periods
 from pendpipe.estimate import LISTED, Estimate, averaged

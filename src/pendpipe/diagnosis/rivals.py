@@ -13,6 +13,7 @@ from scipy.special import chdtrc, chdtri
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import (
+    OFF_HARMONIC,
     Chance,
     Detection,
     Lead,
@@ -20,10 +21,17 @@ from pendpipe.diagnosis.detect import (
 )
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.projection import finer_shape
-from pendpipe.diagnosis.refine import ROUNDS, SETTLED, Evaluation, Fit, fitted, pulled, searching
+from pendpipe.diagnosis.refine import (
+    ROUNDS,
+    SETTLED,
+    Evaluation,
+    Fit,
+    fitted,
+    pulled,
+    remainder_of,
+    searching,
+)
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.remainder import remainder_of
-from pendpipe.diagnosis.spectrum import OFF_HARMONIC
 from pendpipe.diagnosis.values import last_in
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.dynamics.eq8 import OMEGA

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,19 +21,18 @@ from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis import Progress, silent
 from pendpipe.diagnosis.begin import begin
-from pendpipe.diagnosis.cycles import SmallSwings, small_swings
+from pendpipe.diagnosis.cycles import small_swings
 from pendpipe.diagnosis.data import with_scatter
 from pendpipe.diagnosis.forensics.codes import with_true_step
-from pendpipe.diagnosis.forensics.lost_samples import loss_confirmed
 from pendpipe.diagnosis.forensics.sampling_times import gap_note
+from pendpipe.diagnosis.forensics.slips import loss_confirmed
 from pendpipe.diagnosis.found import FittedModel, FoundEffect, Location, verdict_of
-from pendpipe.diagnosis.held_out import HeldOut, held_out
+from pendpipe.diagnosis.held_out import held_out
 from pendpipe.diagnosis.hypothesis import Hypothesis, Task, catalogue_beside
 from pendpipe.diagnosis.projection import whitened
 from pendpipe.diagnosis.quoted import quoted
-from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.refine import Fit, remainder_of, with_errors
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.remainder import remainder_of, with_errors
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.search import baseline_fitted, run_search
 from pendpipe.diagnosis.values import parameters_of
@@ -151,8 +150,11 @@ def diagnose_recording(
     except NoMotionError as error:
         remedy = "cut it with --start and --stop, or change what is held with --fix"
         raise NotAnalysableError(place, f"the model can't follow it ({error})", remedy) from error
-    effects = _in_order(found, samples)
-    verdict = verdict_of(effects, found.p_value, level)
+    effects, predicted = _in_order(found, samples), None
+    if verdict_of(effects, found.p_value, level) != "consistent" and not _adds_nothing(found):
+        progress("predicting cycles that are left out of the fit")
+        both = found.baseline, found.fit
+        predicted = held_out(*both, found.data, found.noise, beginning.held, found.held)
     # A part of b that is held bounds b here alone.
     before, after = _models(found, None if beginning.model.parts else fit, baseline, level)
     gap = gap_note((whole or recording).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
@@ -161,7 +163,7 @@ def diagnose_recording(
         before,
         after,
         (*_presumed(found), *effects),
-        _left_out(found, beginning.held, progress) if verdict != "consistent" else None,
+        predicted,
         warnings=(*points.notes, *stamps),
         provenance=dict(provenance or {}),
         name=Path(place).name if str(place) != "recording" else "",
@@ -210,30 +212,24 @@ def _models(
     if _adds_nothing(found) and found.fit.error_scale == 1.0:
         return before, before
     said = quoted(found, fit, level)
+    leading, swings, after = said.leading, None, before
     # One law has one noise and one error of each number, whatever it leaves.
-    after = before
     if not _adds_nothing(found):
-        parameters = {**parameters_of(said.leading, found.data), **said.constants}
+        parameters = {**parameters_of(leading, found.data), **said.constants}
         after = replace(_fitted_model(found.fit, found, name), parameters=parameters)
+    if remainder_of(leading, found.data, found.noise).systematic:
+        swings = small_swings(leading, found.data, found.noise)
     after = replace(
         after,
         quality_factors=said.quality_factors,
         period_span_s=said.period_span_s,
-        small_swings=_small_swings(said.leading, found),
+        small_swings=swings if swings and swings.significant else None,
     )
     return before, after
 
 
 def _adds_nothing(found: Hypothesis) -> bool:
     return found.fit.value is found.baseline.value
-
-
-def _left_out(found: Hypothesis, held: Sequence[int], progress: Progress) -> HeldOut | None:
-    """Predict cycles that are left out of the fit, by the baseline and by another model."""
-    if _adds_nothing(found):
-        return None
-    progress("predicting cycles that are left out of the fit")
-    return held_out(found.baseline, found.fit, found.data, found.noise, held, found.held)
 
 
 def _in_order(found: Hypothesis, samples: Samples) -> tuple[FoundEffect, ...]:
@@ -252,14 +248,6 @@ def _checked(effect: FoundEffect, found: Hypothesis, samples: Samples) -> FoundE
     when, period_s = effect.location.time_s, found.fit.at.span.period_s
     at = effect.parameters["time"].value if "time" in effect.parameters else when[0]
     return replace(effect, confirmed=loss_confirmed(samples, at, period_s))
-
-
-def _small_swings(law: Fit, found: Hypothesis) -> SmallSwings | None:
-    """Compare the frequency at small amplitudes with the law, where that leaves a misfit."""
-    if not remainder_of(law, found.data, found.noise).systematic:
-        return None
-    swings = small_swings(law, found.data, found.noise)
-    return swings if swings is not None and swings.significant else None
 
 
 def _fit_of(

@@ -12,9 +12,8 @@ from pendpipe.diagnosis.found import CANDIDATE, Finding, FoundEffect, Mate
 from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Step, is_further
 from pendpipe.diagnosis.instants import with_instants
 from pendpipe.diagnosis.location import curve_told, locate
-from pendpipe.diagnosis.refine import SETTLED, Fit, best_fit, is_gross, refine
+from pendpipe.diagnosis.refine import SETTLED, Fit, best_fit, is_gross, refine, with_errors
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.diagnosis.remainder import with_errors
 from pendpipe.diagnosis.rivals import (
     NEAR,
     Rival,

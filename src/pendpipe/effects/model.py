@@ -350,10 +350,6 @@ class Model(Eq8Model):
         """When the motion may end: after the last reading, unless half cycles are asked for."""
         return math.inf if self.half_cycles is not None else float(self.time_s[-1])
 
-    @property
-    def _nodes(self) -> int:
-        return max([self.order, *(effect.nodes for effect in self.effects)])
-
     def _kicks(self, value: FloatArray) -> list[Kick]:
         """The sudden changes within the record, as they come."""
         kicks = [effect.kick(value[place]) for effect, place in self.places()]
@@ -362,8 +358,9 @@ class Model(Eq8Model):
 
     def _smooth(self, law: Law, value: FloatArray) -> Motion:
         """The motion without kicks, on as many half cycles as it takes."""
+        nodes = max([self.order, *(effect.nodes for effect in self.effects)])
         if self.half_cycles is not None:
-            return self._from_guesses(law, value, Clock(self.half_cycles, self._nodes))
+            return self._from_guesses(law, value, Clock(self.half_cycles, nodes))
         omega, begin = float(value[OMEGA]), float(value[TIME])
         needed = (self.time_s[-1] - begin) * omega / math.pi
         # Before its first turning point a motion is carried on by a cycle, and no further.
@@ -373,7 +370,7 @@ class Model(Eq8Model):
         known = [] if last is None else [last.clock.count]
         for count in [*known, *(math.ceil(needed * more) + 1 for more in _MORE)]:
             if needed - 1.0 < count < 1.3 * needed + 4.0:
-                motion = self._from_guesses(law, value, Clock(count, self._nodes))
+                motion = self._from_guesses(law, value, Clock(count, nodes))
                 if motion.time_s[-1, -1] >= self.time_s[-1]:
                     return motion
         raise NoMotionError("the frequency is out of reach")

@@ -13,15 +13,13 @@ from pendpipe.diagnosis.forensics import (
     colour,
     converter,
     glitches,
-    lost_samples,
     sampling_times,
     slips,
     tracking,
 )
 from pendpipe.diagnosis.forensics.evidence import FEWEST, Evidence
 from pendpipe.diagnosis.found import Finding
-from pendpipe.diagnosis.refine import CLEAN, GROSS
-from pendpipe.diagnosis.unwrapped import LARGE_PHASE_ERROR
+from pendpipe.diagnosis.refine import CLEAN, GROSS, LARGE_PHASE_ERROR
 
 _IN_PHASE: Final = 0.3
 """Phase error in rad up to which residuals show errors of the times."""
@@ -69,7 +67,7 @@ def _last(name: str, find: Callable[[Evidence], Finding | None]) -> Finder:
 
 FINDERS: Final = (
     Finder("time-stamps", sampling_times.find_irregular, most_phase_rad=_IN_PHASE),
-    Finder("dropped-samples", lost_samples.find, repeats=True),
+    Finder("dropped-samples", slips.find_lost, repeats=True),
     Finder("tracking-noise", tracking.find, most_phase_rad=LARGE_PHASE_ERROR, repeats=True),
     Finder("count-slips", slips.find_counts, most_phase_rad=_ON_ITS_TURN),
     Finder("clock-slips", slips.find_clock, most_phase_rad=_IN_PHASE),

@@ -11,7 +11,7 @@ import numpy as np
 from pendpipe.analysis.noise import before_rounding, noise_rms, scatter
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
-from pendpipe.diagnosis.forensics.local import Local, local_residual
+from pendpipe.diagnosis.forensics.evidence import Local, local_residual
 from pendpipe.dynamics.any_law import lagrange
 
 if TYPE_CHECKING:

@@ -18,8 +18,7 @@ from pendpipe.diagnosis.forensics.codes import (
     raw_readings,
     read_codes,
 )
-from pendpipe.diagnosis.forensics.evidence import FEWEST
-from pendpipe.diagnosis.forensics.local import local_residual
+from pendpipe.diagnosis.forensics.evidence import FEWEST, local_residual
 from pendpipe.diagnosis.found import Finding, Location
 from pendpipe.estimate import Estimate
 from pendpipe.levels import FALSE_ALARM
@@ -38,6 +37,7 @@ vain is one end of a hundred records, a reading or two."""
 
 Side = Literal["upper", "lower"]
 _SIGN: Final[dict[Side, float]] = {"upper": 1.0, "lower": -1.0}
+"""Of an angle at that end of the range."""
 _FEWEST_EXPECTED: Final = 6.0
 """Expected readings of a code (or a residue) from which it is tested."""
 _MOST_BITS: Final = 7

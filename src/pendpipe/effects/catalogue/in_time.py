@@ -46,7 +46,7 @@ def _beating(time_s: FloatArray, values: FloatArray, period_s: float) -> Start |
     size, phase = other.amplitude.value, other.phase_rad
     sizes = size * math.cos(phase), -size * math.sin(phase)
     found = np.array([*sizes, other.frequency.value, 1.0 / other.loss.value])
-    return Start(BEATING_MODE, law, Release(float(time_s[0] + turn), largest), found)
+    return Start(beating_mode, law, Release(float(time_s[0] + turn), largest), found)
 
 
 def tone_at(cosine: float, sine: float, phase: FloatArray) -> FloatArray:
@@ -107,7 +107,7 @@ def second_mode(
     return np.asarray(tone_at(cosine, sine, 2.0 * math.pi * f_2 * time) * np.exp(-time / tau_2))
 
 
-BEATING_MODE: Final[Effect] = subclass(
+beating_mode: Final[Effect] = subclass(
     type(second_mode),
     "beating_mode",
     "The form of `second-mode` that is expected, where the swings grow again.",
@@ -226,7 +226,7 @@ def parametric_drive(
     return np.asarray(-pendulum.torque(motion.angle) * torque)
 
 
-BROADBAND_DRIVE: Final[Effect] = without_template(
+broadband_drive: Final[Effect] = without_template(
     __name__,
     "Random torque (seismic, air): amplitude and phase walk, and never come to rest.",
     identifier="broadband-drive",

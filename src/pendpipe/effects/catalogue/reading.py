@@ -188,7 +188,7 @@ def tone_pickup(
     return tone_at(cosine, sine, 2.0 * math.pi * f_a * elapsed(sampled.time_s))
 
 
-CLIPPING: Final[Effect] = without_template(
+clipping: Final[Effect] = without_template(
     __name__,
     """Readings beyond the range are cut off: sharply, or over a width w about the level.
 
@@ -206,7 +206,7 @@ CLIPPING: Final[Effect] = without_template(
     ),
     discriminating_test="widen the range, or release it with less amplitude",
 )
-MISSING_CODES: Final[Effect] = without_template(
+missing_codes: Final[Effect] = without_template(
     __name__,
     "Codes that the converter never gives; their share falls to the neighbours.",
     identifier="missing-codes",
@@ -215,7 +215,7 @@ MISSING_CODES: Final[Effect] = without_template(
     parameters=(Parameter("number", "1", 0.0, 4096.0, word="number"),),
     discriminating_test="record a slow ramp: the same codes must be missing",
 )
-COARSE_QUANTISATION: Final[Effect] = without_template(
+coarse_quantisation: Final[Effect] = without_template(
     __name__,
     "Steps coarser than the noise, and than the converter's bits promise.",
     identifier="coarse-quantisation",
@@ -224,7 +224,7 @@ COARSE_QUANTISATION: Final[Effect] = without_template(
     parameters=(Parameter("step", "rad", 0.0, math.inf, word="step"),),
     discriminating_test="narrow the range, or add noise of the size of a step",
 )
-COUNT_SLIPS: Final[Effect] = without_template(
+count_slips: Final[Effect] = without_template(
     __name__,
     "An encoder loses whole counts, or gains them: the level jumps, the motion does not.",
     identifier="count-slips",
@@ -307,7 +307,7 @@ def clock_drift(time_s: FloatArray, rate: float, tau: float) -> FloatArray:
     return np.asarray(rate * tau * (late - relaxed(late, tau)))
 
 
-JITTER: Final[Effect] = without_template(
+jitter: Final[Effect] = without_template(
     __name__,
     "Sampling instants that scatter: noise in proportion to the velocity.",
     identifier="jitter",
@@ -318,7 +318,7 @@ JITTER: Final[Effect] = without_template(
 )
 
 
-CLOCK_SLIPS: Final[Effect] = without_template(
+clock_slips: Final[Effect] = without_template(
     __name__,
     "The clock misses whole samples, or repeats them, again and again.",
     identifier="clock-slips",
@@ -404,7 +404,7 @@ DroppedSamples = type(dropped_samples)
 OffsetStep = type(offset_step)
 
 
-GLITCHES: Final[Effect] = without_template(
+glitches: Final[Effect] = without_template(
     __name__,
     "Single readings far off.",
     identifier="glitches",
@@ -416,7 +416,7 @@ GLITCHES: Final[Effect] = without_template(
     ),
     discriminating_test="change cable and supply, and record at rest",
 )
-TRACKING_NOISE: Final[Effect] = without_template(
+tracking_noise: Final[Effect] = without_template(
     __name__,
     """The tracked mark wanders on the bob, or the tracker on the mark.
 
@@ -433,7 +433,7 @@ TRACKING_NOISE: Final[Effect] = without_template(
     ),
     discriminating_test="track another mark on the bob, or the same mark again",
 )
-COLOURED_NOISE: Final[Effect] = without_template(
+coloured_noise: Final[Effect] = without_template(
     __name__,
     """Noise that grows to low frequencies.
 
