@@ -18,7 +18,8 @@ from pendpipe.diagnosis.faults import _with
 from pendpipe.diagnosis.forensics import slips
 from pendpipe.diagnosis.forensics.codes import noise_before_rounding, spacing_of, with_true_step
 from pendpipe.diagnosis.forensics.converter import worst_comb
-from pendpipe.diagnosis.forensics.evidence import Evidence, Local
+from pendpipe.diagnosis.forensics.evidence import Evidence
+from pendpipe.diagnosis.forensics.local import Local
 from pendpipe.diagnosis.found import Finding
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import Fit, refine

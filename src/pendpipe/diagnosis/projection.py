@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betainc, chdtrc
 
-from pendpipe.arrays import FloatArray, scaled_qr
-from pendpipe.diagnosis.refine import Fit, pulled
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.refine import Fit, pulled, span_of
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.effects import Effect
 from pendpipe.effects.model import responses
@@ -32,14 +32,7 @@ def tangent_basis(fit: Fit) -> FloatArray:
     Values at a bound are included, unless the readings pull them far beyond it.
     """
     known = pulled(fit)
-    return _span(fit.jacobian[:, [index for index in fit.free if index not in known]])
-
-
-def _span(part: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the space that columns span."""
-    left, small, _ = scaled_qr(part)
-    mixing, sizes, _ = np.linalg.svd(small)
-    return np.asarray(left @ mixing[:, sizes > 1e-9 * sizes[0]])
+    return span_of(fit.jacobian[:, [index for index in fit.free if index not in known]])
 
 
 def whitened(

@@ -20,7 +20,7 @@ import numpy as np
 
 from pendpipe.analysis.demodulation import lock_in
 from pendpipe.analysis.misfit import beyond_noise, misfit_of
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, scaled_qr
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.dynamics.any_law import NoMotionError
@@ -290,6 +290,13 @@ def pulled(fit: Fit) -> list[int]:
         if seen and abs(float(rest @ fit.residual)) > _FAR_BEYOND_SD * alone:
             found.append(index)
     return found
+
+
+def span_of(columns: FloatArray, least: float = 1e-9) -> FloatArray:
+    """Return an orthonormal basis of what columns span, but for a `least` part of the largest."""
+    left, small, _ = scaled_qr(columns)
+    mixing, sizes, _ = np.linalg.svd(small)
+    return np.asarray(left @ mixing[:, sizes > least * sizes[0]])
 
 
 def refine(

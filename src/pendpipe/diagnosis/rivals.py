@@ -535,9 +535,9 @@ def _started(
     effect = lead.effect
     if isinstance(effect, ReleasedParameter):
         held = effect.without(held)
-    start = np.concatenate(
-        [base.value, _sizes(effect), finer_shape(base, noise, effect, lead.shape)]
-    )
+    # An effect without a free size is there; of others none is, at first.
+    sizes = np.ones(1) if effect.parameter_free else np.zeros(min(effect.sizes, effect.count))
+    start = np.concatenate([base.value, sizes, finer_shape(base, noise, effect, lead.shape)])
     try:
         model = base.model.adding(effect)
         refit = searching(model, data, noise, start, held=held, little=little)
@@ -545,11 +545,6 @@ def _started(
     except (NoMotionError, np.linalg.LinAlgError):
         return None
     return refit
-
-
-def _sizes(effect: Effect) -> FloatArray:
-    """Start sizes: 1 for an effect without a free size, else 0."""
-    return np.ones(1) if effect.parameter_free else np.zeros(min(effect.sizes, effect.count))
 
 
 def _finished(refit: Search[Evaluation], useful: float) -> Fit | None:

@@ -319,6 +319,8 @@ def describing(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:
 
     Where nothing was found in what chance does not explain, a curve says so, whatever it is worth.
     """
+    if not state.remainder.systematic or _ends_with_curve(state):
+        return
     fits = _with_curves(state.fit, state, in_time=True)
     if not fits:
         return
@@ -414,7 +416,7 @@ def run_search(state: Hypothesis, task: Task) -> Hypothesis:
     while True:
         state = with_other_noise(task.scanned(correct(state, task)), task)
         seen.add(state.key)
-        for some in (_additions, simpler, _descriptions):
+        for some in (_additions, simpler, describing):
             new = [each for each in some(state, task) if each.key not in seen]
             best = max(new, key=lambda each: each.lower, default=None)
             if best is not None and best.lower > 0.0:
@@ -473,11 +475,6 @@ def _from(state: Hypothesis, after: Hypothesis) -> Hypothesis:
     fit = refine(model, after.data, after.noise, state.fit.value, held=state.held, rounds=0)
     (found,) = compared(replace(after, fit=fit, steps=state.steps), [after])
     return found
-
-
-def _descriptions(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:
-    if state.remainder.systematic and not _ends_with_curve(state):
-        yield from describing(state, task)
 
 
 def _ends_with_curve(state: Hypothesis) -> bool:

@@ -216,11 +216,12 @@ def _slowed(fit: Fit) -> FloatArray:
 
 def _between(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:
     """Return cubics through the four neighbours of each place; NaN of fewer."""
-    if len(x) < 4:
+    four = np.arange(-2, 2)
+    if len(x) < len(four):
         return np.full(len(at), math.nan)
-    rows = np.clip(np.searchsorted(x, at), 2, len(x) - 2)[:, None] + np.arange(-2, 2)
+    rows = np.clip(np.searchsorted(x, at), 2, len(x) - 2)[:, None] + four
     nodes, total = x[rows], np.zeros(len(at))
-    for k in range(4):
+    for k in range(len(four)):
         others = np.delete(nodes, k, axis=1)
         own = nodes[:, k, None]
         total += y[rows[:, k]] * np.prod((at[:, None] - others) / (own - others), axis=1)

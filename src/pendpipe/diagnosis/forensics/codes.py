@@ -11,7 +11,7 @@ import numpy as np
 from pendpipe.analysis.noise import before_rounding, noise_rms, scatter
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
-from pendpipe.diagnosis.forensics.evidence import Local, local_residual
+from pendpipe.diagnosis.forensics.local import Local, local_residual
 from pendpipe.dynamics.any_law import lagrange
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ def raw_readings(evidence: Evidence) -> Raw:
     start = np.clip(np.searchsorted(data.time_s, when) - 3, 0, len(data) - 6)
     weights = lagrange(data.time_s, start, when)
     near = evidence.fit.at.reading[start + np.arange(len(weights))[:, None]]
-    used = np.interp(when, data.time_s, data.weight) > 0.99
+    used = np.interp(when, data.time_s, data.weight) == 1.0
     read = np.sum(weights * near, axis=0)
     return Raw(values, values - read, np.interp(when, data.time_s, phase), used)
 

@@ -18,7 +18,8 @@ from pendpipe.diagnosis.forensics.codes import (
     raw_readings,
     read_codes,
 )
-from pendpipe.diagnosis.forensics.evidence import FEWEST, local_residual
+from pendpipe.diagnosis.forensics.evidence import FEWEST
+from pendpipe.diagnosis.forensics.local import local_residual
 from pendpipe.diagnosis.found import Finding, Location
 from pendpipe.estimate import Estimate
 from pendpipe.levels import FALSE_ALARM
@@ -165,7 +166,8 @@ def find_missing_codes(evidence: Evidence) -> Finding | None:
         "found": Estimate(comb.found, math.sqrt(max(comb.found, 1.0)), ""),
         "expected": Estimate(comb.expected, 0.0, ""),
     }
-    named = ", ".join(map(str, codes[:5])) + (", ..." if comb.number > 5 else "")
+    first = codes[:5]
+    named = ", ".join(map(str, first)) + (", ..." if comb.number > len(first) else "")
     lead = ""
     if comb.period:
         parameters["period"] = Estimate(float(comb.period), 0.0, "")

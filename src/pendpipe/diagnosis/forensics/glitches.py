@@ -10,13 +10,8 @@ from scipy.special import bdtrc
 
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.forensics.evidence import (
-    FEWEST,
-    Evidence,
-    Local,
-    local_residual,
-    whitened_in_time,
-)
+from pendpipe.diagnosis.forensics.evidence import FEWEST, Evidence
+from pendpipe.diagnosis.forensics.local import Local, local_residual, whitened_in_time
 from pendpipe.diagnosis.forensics.tails import Tail, fit_tail
 from pendpipe.diagnosis.found import Finding, Location
 from pendpipe.diagnosis.noise import TAPS

@@ -10,7 +10,7 @@ from scipy.special import ndtr
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.forensics.codes import read_codes
-from pendpipe.diagnosis.forensics.evidence import whitened_series
+from pendpipe.diagnosis.forensics.local import whitened_series
 from pendpipe.diagnosis.forensics.tails import tail_of_squares
 from pendpipe.diagnosis.found import Finding
 from pendpipe.estimate import Estimate

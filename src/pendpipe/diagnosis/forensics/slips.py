@@ -20,11 +20,11 @@ import numpy as np
 from scipy.special import ndtr, stdtr
 
 from pendpipe.analysis.turning_points.measure import Samples
-from pendpipe.arrays import BoolArray, FloatArray, IntArray, scaled_qr
+from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.found import Confirmation, Finding, Location
-from pendpipe.diagnosis.refine import CLEAN, Fit, alignment
+from pendpipe.diagnosis.refine import CLEAN, Fit, alignment, span_of
 from pendpipe.effects.model import jacobian
 from pendpipe.estimate import Estimate
 
@@ -196,9 +196,7 @@ def _slow(data: Data, fit: Fit) -> FloatArray:
         parts += [waves * np.cos(turns), waves * np.sin(turns)]
     parts.append(jacobian(fit.model, fit.value, fit.at)[:, list(fit.free)])
     columns = np.concatenate(parts, axis=1) * data.weight[:, None]
-    basis, triangle, _ = scaled_qr(columns)
-    mixing, lengths, _ = np.linalg.svd(triangle)
-    return np.asarray(basis @ mixing[:, lengths > 1e-6 * lengths[0]])
+    return span_of(columns, 1e-6)
 
 
 def _steps(rows: IntArray, unit: FloatArray) -> FloatArray:
