@@ -572,13 +572,18 @@ def predict(
     >>> len(found.decay), found.response.branch.tolist()
     (96, ['lower', 'upper', 'lower', 'upper'])
     """
-    curves = curves_of(
-        [_fit_of(each) for each in (source if isinstance(source, list | tuple) else [source])]
+    size, moves = support or drive_force, support is not None
+    refuse_if(
+        (drive is not None and size is None) or (drive is amplitude is points is None),
+        "predict",
+        "it is not said what to predict",
+        "give an amplitude (--from), or frequencies (--drive) with a force (--drive-force) or the"
+        " motion of the support (--support), or what was measured (--points)",
     )
+    sources = source if isinstance(source, list | tuple) else [source]
+    curves, driven = curves_of([_fit_of(each) for each in sources]), None
     decay = None if amplitude is None else decay_from(curves, amplitude)
-    driven, moves = None, support is not None
-    if (size := support if moves else drive_force) is not None:
-        refuse_if(drive is None, "predict", "no frequency is given", "say --drive LOW:HIGH in Hz")
+    if drive is not None and size is not None:
         hertz = np.asarray(drive, dtype=np.float64)
         driven = response(curves, hertz, size * (math.tau * hertz) ** (2.0 * moves))
     if isinstance(points, str | Path) and is_turning_points(points):

@@ -131,13 +131,19 @@ def test_decays_without_a_common_amplitude_make_one_curve(spring: Any) -> None:
     found = pp.predict([spring, small], amplitude=0.25).decay
     assert np.isfinite(found.to_numpy(dtype=float)).all()
     with pytest.raises(InputError, match="in m and rad"):
-        pp.predict([spring, pp.fit("examples/rod-pendulum.csv", restoring="linear"), metres()])
+        pp.predict([spring, metres()], amplitude=0.25)
 
 
 def metres() -> Any:
     """A decay of a spring, in metres."""
     angle = recorded(SPRING, 0.3).values
     return pp.fit(pp.Recording(time_s=TIME, displacement_m=angle))
+
+
+@pytest.mark.parametrize("asked", [{}, {"drive": [0.8]}, {"drive_force": 0.1}])
+def test_half_a_question_is_asked_back(spring: Any, asked: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="not said what to predict"):
+        pp.predict(spring, **asked)
 
 
 def table_of(path: Path, law: Eq8, constant: float) -> Path:
