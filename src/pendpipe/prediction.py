@@ -574,7 +574,8 @@ def predict(
     """
     size, moves = support or drive_force, support is not None
     refuse_if(
-        (drive is not None and size is None) or (drive is amplitude is points is None),
+        (drive is not None and size is None)
+        or all(each is None for each in (drive, amplitude, points)),
         "predict",
         "it is not said what to predict",
         "give an amplitude (--from), or frequencies (--drive) with a force (--drive-force) or the"
