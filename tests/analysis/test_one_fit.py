@@ -25,6 +25,7 @@ from pendpipe.dynamics import Eq8, Release, sample, turning_points
 from pendpipe.errors import InputError
 from pendpipe.levels import REFUTED
 from pendpipe.recording import Recording, write_plain
+from pendpipe.report.class_table import Fitted, record
 
 from ..effects.integration import swung
 
@@ -599,6 +600,8 @@ def test_two_coupled_pendulums_are_named_with_their_modes() -> None:
     found = sorted(map(float, re.findall(r"([0-9.]+) Hz", result.light_reason)))
     truth = 0.5 * OMEGA / math.pi
     assert found == pytest.approx([truth / 1.07, truth], rel=1e-4)
+    row = record(Fitted("beat.csv", result))
+    assert (row["T_s"], row["T0_s"], row["light"]) == (None, None, "red"), "nor in a class"
 
 
 def test_a_decay_that_is_slow_and_loud_is_measured() -> None:

@@ -120,7 +120,8 @@ def record(fitted: Fitted) -> dict[str, Any]:
     if fit is None:
         return row
     unit = fit["amplitude"].unit
-    numbers = {period_name(fit): (fit.period, "_s")}
+    # Of two modes that beat neither is the period.
+    numbers = {period_name(fit): (fit.period, "_s")} if fit.hindered != "beat" else {}
     ends = {"g": "_m_per_s2", "length": "_m"}
     numbers |= {name: (each, ends[name]) for name, each in pendulum_of(fit).items()}
     if fit.quality_factors:
