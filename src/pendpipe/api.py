@@ -190,14 +190,10 @@ def fit(
     method = None if method == "auto" else method
     length, given = _measured("length_m", length_m, "m"), _measured("period", period, "s")
     torque = _torque(restoring, is_pendulum=bool(length or gravity))
-    kept: dict[str, Any] = {
-        "length": length,
-        "gravity": _measured("gravity", gravity, "m/s^2"),
-        "drawn_by": _FIGURES_OF_A_FIT,
-    }
     from pendpipe.analysis.fit import fit_recording, fit_turning_points
     from pendpipe.analysis.fit.by_amplitudes import fit_amplitudes, in_seconds
     from pendpipe.analysis.fit.consequence import doubted
+    from pendpipe.analysis.fit.fitted import Told
     from pendpipe.analysis.fit.result import with_clock, with_scale
     from pendpipe.analysis.free_decay import measure_recording
     from pendpipe.analysis.turning_points import (
@@ -206,6 +202,8 @@ def fit(
         read_turning_points,
     )
 
+    told = Told(None, None, length, _measured("gravity", gravity, "m/s^2"))
+    kept: dict[str, Any] = {"told": told, "drawn_by": _FIGURES_OF_A_FIT}
     if isinstance(recording, str | Path) and is_turning_points(recording):
         recording = read_turning_points(recording)
     if isinstance(recording, TurningPoints):
@@ -255,6 +253,7 @@ def fit(
     result = result if clock_ppm is None else with_clock(result, clock_ppm)
     result = result if scale_percent is None else with_scale(result, scale_percent)
     cuts = (*(cut._asdict() for cut in points.cuts), *result.cuts)
+    kept["told"] = replace(told, clock_ppm=clock_ppm, scale_percent=scale_percent)
     result = replace(result, cuts=cuts, name=own, decay=decay, **kept)
     return doubted(result, motion.facts, decay.time_s)
 

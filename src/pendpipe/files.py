@@ -424,12 +424,16 @@ finite: Final = partial(plain, only_finite=True)
 def fields_of(value: Any) -> dict[str, Any]:
     """Return the fields of a dataclass or a named tuple by the names that they have in JSON.
 
-    A field's metadata may hold another name than its own (``json``); of None it is left out.
+    A field's metadata may hold another name than its own (``json``); of None it is left out, and
+    of "" its own fields stand among the others.
     """
     if not is_dataclass(value):
         return dict(value._asdict())
-    names = {each.name: each.metadata.get("json", each.name) for each in fields(value)}
-    return {there: getattr(value, here) for here, there in names.items() if there}
+    found: dict[str, Any] = {}
+    for each in fields(value):
+        there, own = each.metadata.get("json", each.name), getattr(value, each.name)
+        found |= fields_of(own) if there == "" else {there: own} if there else {}
+    return found
 
 
 def write_whole(path: str | Path, content: str | bytes) -> None:

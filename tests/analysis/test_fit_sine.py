@@ -14,6 +14,7 @@ import pendpipe as pp
 from pendpipe import cli
 from pendpipe.analysis.fit import fit_recording
 from pendpipe.analysis.fit.by_points import fit_energies
+from pendpipe.analysis.fit.fitted import Told
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.printed import facts
 from pendpipe.analysis.fit.quality import pendulum_of
@@ -193,7 +194,7 @@ def test_x_that_the_readings_prefer_is_fitted_and_said() -> None:
     recording = recorded(sample(law, Release(-0.2, 0.07), TIME), TIME, 1e-4)
     auto, linear = (fit_recording(recording, restoring=each) for each in (None, "linear"))  # type: ignore[arg-type]
     assert auto.parameters == linear.parameters
-    assert (auto.torque_odds or 0.0) > math.log(1000.0)
+    assert (auto.form.torque_odds or 0.0) > math.log(1000.0)
     assert "x fits better than sin x, 10^" in str(auto)
 
 
@@ -207,8 +208,8 @@ def test_an_angle_swings_by_sin_x_where_its_readings_cannot_tell() -> None:
         noise = 5e-4 * np.random.default_rng(seed).standard_normal(len(time))
         result = fit_recording(Recording(time, values + noise, "angle_rad"))
         assert result.restoring == "sine"
-        assert abs(result.torque_odds or math.inf) < math.log(1000.0)
-        assert result.other_frequency is not None
+        assert abs(result.form.torque_odds or math.inf) < math.log(1000.0)
+        assert result.form.other_frequency is not None
         assert any("--restoring linear" in warning for warning in result.warnings)
         off = result["frequency"].value - 0.5 * OMEGA / math.pi
         assert abs(off) < 4.0 * result["frequency"].sd
@@ -329,7 +330,7 @@ def test_a_rate_is_that_of_a_pendulum(amplitude: float) -> None:
         assert low - result[name].sd <= value <= high + result[name].sd
     assert result.noise_rms_rad == pytest.approx(1e-3, rel=0.05)
     # Its length tells g as that of an angle does: within three standard deviations of the truth.
-    g = pendulum_of(replace(result, length=Estimate(0.4, 0.0, "m")))["g"].value
+    g = pendulum_of(replace(result, told=Told(length=Estimate(0.4, 0.0, "m"))))["g"].value
     assert g == pytest.approx(0.4 * (2.0 * math.pi * result["frequency"].value) ** 2, rel=1e-12)
     assert g == pytest.approx(0.4 * OMEGA**2, rel=12.0 * result["frequency"].sd * math.pi / OMEGA)
 
@@ -340,7 +341,7 @@ def test_g_of_a_linear_fit_is_that_of_small_swings() -> None:
     law = Eq8(OMEGA, viscous=1e-4, restoring="sine")
     values = sample(law, Release(-0.2, 0.5), time)
     result = fit_recording(recorded(values, time, 1e-3), restoring="linear")
-    line = dict(facts(replace(result, length=Estimate(0.4, 0.0, "m"))))["g"]
+    line = dict(facts(replace(result, told=Told(length=Estimate(0.4, 0.0, "m")))))["g"]
     assert float(line.partition("(")[0]) == pytest.approx(0.4 * OMEGA**2, rel=1e-3)
     longer = 2.0 * ellipk(math.sin(0.25) ** 2) / math.pi
     said = re.search(r"finite-amplitude correction (\S+) % included", line)

@@ -116,8 +116,8 @@ def test_the_frequency_is_eq_8s_at_low_q(share: float) -> None:
 def test_one_recording_does_not_tell_hysteretic_from_viscous() -> None:
     """Only Eq. 8's third harmonic would, which another drag or the sensor swamps."""
     quiet = fitted(rms=1e-5)
-    assert quiet.quality_factor_hysteretic is None
-    assert quiet.quality_factor_viscous is None
+    assert quiet.form.quality_factor_hysteretic is None
+    assert quiet.form.quality_factor_viscous is None
     b = quiet.parameters["b"]
     assert abs(b.value - TRUTH["b"]) < 4.0 * b.sd
 

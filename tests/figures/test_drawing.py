@@ -14,6 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from pendpipe import diagnose, physics
 from pendpipe.analysis.fit.by_points import fit_envelope
+from pendpipe.analysis.fit.fitted import Agreement, Form
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.turning_points import (
     TurningPoints,
@@ -48,15 +49,10 @@ def a_fit(method: str, restoring: str, frequency: float, **values: float) -> Fit
     given = {"frequency": frequency, "phase": 0.0, "offset": 0.0, **values}
     return FitResult(
         method=method,  # type: ignore[arg-type]
-        baseline="eq8",
         parameters={name: Estimate(value, 0.0, "") for name, value in given.items()},
         covariance=np.diag([0.0, 1e-8, 0.0]),
-        noise_rms_rad=1e-5,
-        residual_rms_rad=1e-5,
-        chi2_per_dof=1.0,
-        samples=1000,
-        turning_points=200,
-        restoring=restoring,  # type: ignore[arg-type]
+        form=Form(restoring=restoring),  # type: ignore[arg-type]
+        agreement=Agreement(1e-5, 1e-5, 1.0, None, 1000, 200),
     )
 
 

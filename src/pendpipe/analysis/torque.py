@@ -19,8 +19,6 @@ TOP: Final = 3.13
 """Amplitude in rad beyond which a half swing says nothing of the frequency."""
 
 
-_LARGE: Final = 0.2
-"""Of the largest amplitude: below, sin x lengthens the period by 4 % of what it does there."""
 _FEWEST: Final = 6
 """Turning points: the times have four numbers, among them the coefficient and a drift."""
 
@@ -80,11 +78,10 @@ def phases(
     return found
 
 
-def clear(points: TurningPoints, least: float = 0.0) -> TurningPoints:
-    """Take those below the top that stand out of the noise, and above a part of the largest."""
+def clear(points: TurningPoints) -> TurningPoints:
+    """Take those below the top that stand out of the noise."""
     amplitude = points.amplitude_rad
-    seen = (amplitude > SEEN * points.angle_sd_rad) & (amplitude < TOP)
-    return points.chosen(seen & (amplitude > least * np.max(amplitude, where=seen, initial=0.0)))
+    return points.chosen((amplitude > SEEN * points.angle_sd_rad) & (amplitude < TOP))
 
 
 def told_apart(points: TurningPoints, readings: int, noise: float) -> float:
@@ -121,17 +118,14 @@ def may_be_sine(points: TurningPoints) -> bool:
 
 
 def sine_coefficient(points: TurningPoints) -> Coefficient:
-    """Fit the times with a free coefficient of sin x, at the larger amplitudes.
+    """Fit the times with a free coefficient of sin x.
 
     A half swing lasts [pi (1 + losses) + eta (K + K' - pi)]/omega: the times are linear in
     1/omega and in eta/omega. The level's error makes them alternate.
 
     By what the coefficient changes if the frequency may drift in time, it is uncertain too.
     """
-    part = clear(points, _LARGE)
-    if len(part) < _FEWEST:
-        # Of a strong loss few are large.
-        part = clear(points).first(_FEWEST)
+    part = clear(points)
     if len(part) < _FEWEST or points.unit != "rad":
         return Coefficient(0.0, math.inf, 0.0)
     amplitude, omega = part.amplitude_rad, 2.0 * math.pi * part.apparent_frequency_hz

@@ -83,8 +83,8 @@ def begin(
     seen: Seen = "rate" if samples.unit == "rad/s" else "angle"
     law, span = Eq8Model(seen=seen, parts=held.parts), slice(None)
     starts: tuple[Start, ...] = ()
-    if fit is not None and fit.model and fit.values is not None and fit.light != "red":
-        law, value, at_release = fit.model, fit.values, fit.values[TIME] >= samples.time_s[0]
+    if fit is not None and fit.minimum and fit.light != "red":
+        (law, value), at_release = fit.minimum, bool(fit.minimum[1][TIME] >= samples.time_s[0])
     else:
         torque = fit.restoring if fit else restoring_of(angles, stated=stated)
         law = replace(law, restoring="linear" if beats else torque)

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from pendpipe.analysis.fit.by_waveform import (
     waveform_result,
 )
 from pendpipe.analysis.fit.decrement import Light
-from pendpipe.analysis.fit.fitted import Baseline, Method
+from pendpipe.analysis.fit.fitted import Baseline, Method, Verdict
 from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.printed import period_text
 from pendpipe.analysis.fit.quality import without_swings
@@ -115,12 +115,12 @@ def fit_recording(
     result = _fit(samples, method, restoring, baseline, fixed, points, length_m, place, stated)
     result = replace(result, points=replace(points, readings=None))
     if arm and arm.sd:
-        result = replace(with_scale(result, 100.0 * arm.sd / arm.value), scale_percent=None)
+        result = with_scale(result, 100.0 * arm.sd / arm.value)
     if points.beats:
         # What its turning points lose is no mode's loss, and their period none's.
         why = f"two modes beat: {points.beats}; Eq. 8 has one"
-        alone: dict[str, Any] = {"decrement_check": (), "other_frequency": None, "quotable": ()}
-        return replace(result, light="red", light_reason=why, hindered="beat", shown=None, **alone)
+        form, beat = replace(result.form, other_frequency=None), Verdict("red", why, "beat")
+        return replace(result, form=form, verdict=beat, decrement_check=(), shown=None)
     by_points = result.method == "turning-points"
     swing = result["amplitude"].value if by_points else 0.5 * float(np.ptp(samples.values))
     missed = result.residual_rms_rad / abs(swing)
@@ -135,9 +135,9 @@ def fit_recording(
     if points.mostly_cut:
         light: Light = "red" if result.light == "red" else "amber"
         why = f"most of it was cut: {points.mostly_cut}"
-        return replace(result, light=light, light_reason=why, hindered="cut", quotable=())
+        return replace(result, verdict=Verdict(light, why, "cut"))
     refuse_if(
-        not result.settled,
+        not result.agreement.settled,
         place,
         f"the {result.method.replace('-', ' ')} fit did not converge",
         "cut the recording with --start and --stop, or see pendpipe diagnose",
@@ -228,25 +228,30 @@ def _fit(
     if method == "waveform" or _stands(result):
         return result
     again = partial(
-        fit_points, baseline=baseline, fixed=fixed, restoring=restoring, bent=result.bent
+        fit_points, baseline=baseline, fixed=fixed, restoring=restoring, bent=result.agreement.bent
     )
     by_points = again(points)
     if _stands(by_points):
         # What all readings deny is not quoted.
         kept = tuple(name for name in by_points.quotable if name in ("period", "Q"))
-        why = result.light_reason if result.settled else "the fit did not converge"
+        why = result.light_reason if result.agreement.settled else "the fit did not converge"
         reason = (
             f"don't quote a, b, c: with all readings {why}; period and Q are the turning points'"
         )
-        return replace(_amber(by_points, reason), quotable=kept)
+        return replace(by_points, verdict=Verdict("amber", reason, quotable=kept))
     for part in _larger_amplitudes(points):
         larger = _waveform(samples, part, baseline, fixed, restoring, length_m, stated=stated)
         if not _stands(larger):
             larger = again(part)
         if _stands(larger):
             return _of_larger(larger, points, part)
-    settled = [each for each in (result, by_points) if each.settled]
-    return min(settled, key=_worst, default=by_points)
+    settled = [each for each in (result, by_points) if each.agreement.settled]
+    # The largest relative contradiction between the law's loss and the decay's is the least.
+    return min(
+        settled,
+        key=lambda one: max((abs(each.excess) for each in one.decrement_check), default=math.inf),
+        default=by_points,
+    )
 
 
 def _waveform(
@@ -269,7 +274,7 @@ def _waveform(
             return waveform_result(forms, samples, points, baseline, fixed or {})
         # No motion of the law comes near the readings.
         lost = fit_points(points, baseline=baseline, fixed=fixed, restoring=torque)
-        return replace(lost, method="waveform", settled=False)
+        return replace(lost, method="waveform", agreement=replace(lost.agreement, settled=False))
 
     if restoring is None and not (stated and may_be_sine(points)):
         restoring = restoring_of(points, stated=stated)
@@ -293,9 +298,10 @@ def _waveform(
     no_pendulum = pendulum is not None and not pendulum.minimum.converged
     is_spring = for_spring > ODDS or no_pendulum
     if spring is not None and spring.minimum.converged and is_spring:
-        return replace(result(forms if own is spring else others, "linear"), torque_odds=for_spring)
+        found = result(forms if own is spring else others, "linear")
+        return replace(found, form=replace(found.form, torque_odds=for_spring))
     found = result(forms if own is pendulum else others, "sine")
-    found = replace(found, torque_odds=-for_spring)
+    found = replace(found, form=replace(found.form, torque_odds=-for_spring))
     if spring is None or for_spring < -ODDS or not spring.minimum.converged:
         return found
     return _with_other_frequency(found, float(spring.value[OMEGA]) / math.tau)
@@ -311,21 +317,13 @@ def _with_other_frequency(found: FitResult, as_spring: float) -> FitResult:
         f"as a pendulum {period_text(own)}; as a spring or torsion wheel {period_text(other)}:"
         " --restoring linear"
     )
-    return replace(found, other_frequency=other, warnings=(*found.warnings, said))
-
-
-def _worst(result: FitResult) -> float:
-    """The largest relative contradiction between the law's loss and the decay's."""
-    return max((abs(check.excess) for check in result.decrement_check), default=math.inf)
+    form = replace(found.form, other_frequency=other)
+    return replace(found, form=form, warnings=(*found.warnings, said))
 
 
 def _stands(result: FitResult) -> bool:
     """Whether it settled, and does not contradict the decay."""
-    return result.settled and result.light != "red"
-
-
-def _amber(result: FitResult, reason: str) -> FitResult:
-    return replace(result, light="amber", light_reason=reason)
+    return result.agreement.settled and result.light != "red"
 
 
 def _larger_amplitudes(points: TurningPoints) -> Iterator[TurningPoints]:
@@ -345,4 +343,5 @@ def _of_larger(result: FitResult, points: TurningPoints, part: TurningPoints) ->
     below = f"below {size} the decay does not follow the fitted law"
     cut = {"start_s": float(part.time_s[-1]), "stop_s": points.stop_s, "reason": below}
     why = f"don't quote anything below {size}: there the decay does not follow the fitted law"
-    return replace(_amber(result, why), cuts=(*result.cuts, cut))
+    verdict = replace(result.verdict, light="amber", light_reason=why)
+    return replace(result, verdict=verdict, cuts=(*result.cuts, cut))

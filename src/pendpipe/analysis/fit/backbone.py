@@ -186,8 +186,11 @@ def backbone_of(points: TurningPoints, law: Eq8, bent: FloatArray | None = None)
     nothing, longer = np.full(_ROWS, math.nan), np.zeros(_ROWS)
     small, period, period_sd, scatter = Estimate(math.nan, math.nan, "s"), nothing, nothing, 1.0
     if np.all(np.isfinite(clear.time_sd_s)):
-        swing = _period(clear, law, np.append(rows, 0.0))
-        plain = 2.0 / law.angular_frequency * _half_swing(np.append(rows, 0.0), law)
+        asked = np.append(rows, 0.0)
+        swing = _period(clear, law, asked)
+        # Two half swings of each amplitude, without losses.
+        whole = 2.0 * swing_phase(np.repeat(asked, 2), law.restoring)[::2]
+        plain = whole / law.angular_frequency
         without = plain * swing.value
         typical = float(np.median(decrement[rows >= smallest])) / law.angular_frequency
         unsure = SECOND_ORDER * typical**2
@@ -225,11 +228,6 @@ def _misread(
     slope = np.gradient(decrement, np.log(rows))
     moved = np.abs(change * decrement) + np.abs(off * slope)
     return np.asarray(4.0 * (moved + np.abs(_UNSURE * longer) * (np.abs(slope) + decrement)))
-
-
-def _half_swing(amplitude: FloatArray, law: Eq8) -> FloatArray:
-    """Phase of half a swing without losses, shape (m,)."""
-    return np.array([float(swing_phase(np.array([y, y]), law.restoring)[0]) for y in amplitude])
 
 
 def _losses(law: Eq8) -> tuple[float, float, float, float]:

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.fit.by_points import Decay, EnvelopeFit, Period, fit_envelope, numbers_of
-from pendpipe.analysis.fit.fitted import PARAMETERS, Baseline, fast_beside
+from pendpipe.analysis.fit.fitted import PARAMETERS, Agreement, Baseline, Form, fast_beside
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness
 from pendpipe.analysis.fit.prediction import pendulum_decay
@@ -131,7 +131,7 @@ def fit_amplitudes(
     fits = [(drag, fit_envelope(points, held.envelope, decay)) for drag, decay in decays]
     drag, envelope = min(fits, key=lambda each: _misfit(each[1]))
     spread = turning * period.sd / period.value if period else math.nan
-    times = Period(turning, points.start_s, np.diag([spread**2, 0.0]), math.nan)
+    times = Period(turning, points.start_s, np.diag([spread**2, 0.0]), math.nan, np.empty(0))
     value, matrix, intervals = _averaged(
         [numbers_of(points, each, times) for _, each in fits],
         np.exp(-0.5 * np.array([_misfit(each) - _misfit(envelope) for _, each in fits])),
@@ -156,13 +156,14 @@ def fit_amplitudes(
         goodness=Goodness(math.nan, math.nan, (), 1.0),
         said=said,
         fixed=fixed,
+        form=Form(baseline, drag_form="undecided" if sine else "energy"),
+        agreement=Agreement(
+            residual_rms_rad=float(np.sqrt(np.mean(envelope.residual**2))),
+            samples=len(points),
+            turning_points=len(points),
+            settled=envelope.converged,
+        ),
         method="amplitudes",
-        baseline=baseline,
-        residual_rms_rad=float(np.sqrt(np.mean(envelope.residual**2))),
-        samples=len(points),
-        turning_points=len(points),
-        settled=envelope.converged,
-        drag_form="undecided" if sine else "energy",
     )
     quantities: dict[str, Quantity] = {"rad": "angle_rad", "m": "displacement_m"}
     shown = Recording(

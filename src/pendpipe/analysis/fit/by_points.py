@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.fitted import Baseline
+from pendpipe.analysis.fit.fitted import Agreement, Baseline, Form
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness, tail
 from pendpipe.analysis.fit.result import FitResult, result_of
@@ -212,6 +212,8 @@ class Period(NamedTuple):
     covariance: FloatArray
     """Of the two, shape (2, 2); it holds what the unknown share adds."""
     chi2_per_dof: float
+    late_rad: FloatArray
+    """Phase by which each turning point is later than the law's, shape (k,)."""
 
 
 def fit_period(
@@ -271,7 +273,8 @@ def fit_period(
         matrix += part * np.outer(off_by, off_by)
         # All times share what the unknown division of b does to the half cycles' shape.
         matrix[1, 1] += (b / (4.0 * float(found[0]) ** 2)) ** 2 * part
-    return Period(float(found[0]), first_s + float(begun[0]), matrix, chi2)
+    omega = float(found[0])
+    return Period(omega, first_s + float(begun[0]), matrix, chi2, omega * late)
 
 
 _LATE: Final = 3.0
@@ -355,12 +358,14 @@ def fit_points(
         ),
         said=[late] if period.chi2_per_dof > _LATE else [],
         fixed=fixed,
+        form=Form(baseline),
+        agreement=Agreement(
+            residual_rms_rad=float(np.sqrt(np.mean(envelope.residual**2))),
+            samples=points.samples,
+            turning_points=len(points),
+            settled=envelope.converged,
+        ),
         method="turning-points",
-        baseline=baseline,
-        residual_rms_rad=float(np.sqrt(np.mean(envelope.residual**2))),
-        samples=points.samples,
-        turning_points=len(points),
-        settled=envelope.converged,
     )
 
 

@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from pendpipe.analysis.fit.fitted import Baseline, DragForm
+from pendpipe.analysis.fit.fitted import Agreement, Baseline, DragForm, Form
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness, Left, combined, judge
 from pendpipe.analysis.fit.result import FitResult, result_of
@@ -464,7 +464,7 @@ def waveform_result(
     residual = problem.residual(fitted.value)
     times = problem.time_s
     inside = (points.time_s >= times[0]) & (points.time_s <= times[-1])
-    drift, said = None, []
+    drift, said = None, [*fitted.start.warnings]
     if DRIFT not in fitted.held:
         drift = Estimate(float(fitted.value[DRIFT]), drift_sd, f"{samples.unit}/s")
         per = with_error(drift.value, drift.sd, drift.unit, short=True)
@@ -479,19 +479,19 @@ def waveform_result(
         goodness=goodness,
         said=said,
         fixed=fixed,
+        form=Form(baseline, drag_form=form),
+        agreement=Agreement(
+            residual_rms_rad=math.sqrt(float(residual @ residual) / len(residual)),
+            samples=len(residual),
+            turning_points=len(points),
+            # A motion that has lost its phase has no frequency of its own, or none that moves.
+            settled=fitted.minimum.converged
+            and value[4] > 0.0
+            and (OMEGA in fitted.held or matrix[3, 3] > 0.0),
+        ),
         method="waveform",
-        baseline=baseline,
-        residual_rms_rad=math.sqrt(float(residual @ residual) / len(residual)),
-        samples=len(residual),
-        turning_points=len(points),
-        # A motion that has lost its phase has no frequency of its own, or none that moves.
-        settled=fitted.minimum.converged
-        and value[4] > 0.0
-        and (OMEGA in fitted.held or matrix[3, 3] > 0.0),
-        drag_form=form,
         zero_drift=drift,
-        model=problem.eq8,
-        values=fitted.value[: len(BASELINE)].copy(),
+        minimum=(problem.eq8, fitted.value[: len(BASELINE)].copy()),
     )
 
 

@@ -24,7 +24,7 @@ from pendpipe.analysis.fit.decrement import (
     Light,
     loss_of,
 )
-from pendpipe.analysis.fit.fitted import PARAMETERS, Fit, Fitted
+from pendpipe.analysis.fit.fitted import PARAMETERS, Fit, Fitted, Verdict
 from pendpipe.analysis.fit.quality import pendulum_of, qualities, relative_loss_sd, small_period
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
@@ -61,7 +61,7 @@ def judged(result: Fit, points: TurningPoints, law: Eq8, *, misfit: float) -> Fi
     shown = None
     if result.refuted and not any(check.contradicts for check in result.decrement_check):
         # Of a law that contradicts the decay nothing is quoted, and another may be tried.
-        shown = backbone_of(points, law, result.bent)
+        shown = backbone_of(points, law, result.agreement.bent)
     if shown is not None:
         result = replace(_off_by(result, shown), shown=shown)
     elif misfit > 1.0:
@@ -69,7 +69,7 @@ def judged(result: Fit, points: TurningPoints, law: Eq8, *, misfit: float) -> Fi
     clear = int(np.sum(points.amplitude_rad > CLEAR * points.angle_sd_rad))
     quotable, problems = _quotable(result, clear)
     light, reason = _light(result, problems)
-    return replace(result, light=light, light_reason=reason, quotable=quotable)
+    return replace(result, verdict=Verdict(light, reason, quotable=quotable))
 
 
 def _off_by(result: Fit, shown: Backbone) -> Fit:
@@ -235,10 +235,10 @@ def doubted(result: Fit, facts: Sequence[Fact], time_s: FloatArray) -> Fit:
     ]
     if any("period" in fact.changes for fact in guessed):
         kept = tuple(name for name in result.quotable if name != "period")
-        result = replace(result, quotable=kept)
+        result = replace(result, verdict=replace(result.verdict, quotable=kept))
     if not why or result.light != "green":
         return result
-    return replace(result, light="amber", light_reason=why[0])
+    return replace(result, verdict=replace(result.verdict, light="amber", light_reason=why[0]))
 
 
 def _absurd(result: Fitted, time_s: FloatArray) -> Iterator[str]:

@@ -64,65 +64,102 @@ _APART: Final = {"json": None}
 """Of fields that are not in ``fit.json``, or in another form."""
 
 
-@dataclass(frozen=True, repr=False)
-class Fitted:
-    """What was fitted of one recording, with its errors, and how far it may be believed.
+_AMONG: Final = {"json": ""}
+"""Of fields whose own fields stand among the others of ``fit.json``."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """Which law was fitted, of those in question.
 
     Parameters
     ----------
-    method, baseline
-        How it was fitted (to all readings, to turning points, or to amplitudes alone, whose
-        frequency, phase and noise are NaN), and with which model.
-    parameters
-        The seven of `PARAMETERS`: the rates of Eq. 13, Eq. 8's frequency omega/(2 pi),
-        |y| at the first turning point kept, the phase at the first sample kept (the motion
-        is there ``offset + amplitude cos(phase)`` to first order), and the level.
+    baseline
+        The model's name.
+    restoring
+        The torque that the numbers belong to.
+    drag, drag_form
+        The form that the fitted law has: the likelier; and which the readings prefer, undecided
+        where neither is a thousand times as likely as the other: then the errors cover both.
+    hysteretic_share
+        Part of b that the fitted law has as hysteretic; hardly any recording tells it.
     quality_factor_hysteretic, quality_factor_viscous
         The parts of b that are held; None elsewhere: one recording does not tell them apart.
-    covariance
-        Of the parameters in their order, shape (7, 7).
-    noise_rms_rad, residual_rms_rad, chi2_per_dof
-        Noise of one reading (never below step/sqrt(12)); what the model leaves; and their
-        comparison.
-    samples, turning_points
-        How many of each were used.
-    cuts
-        Spans left out: ``start_s``, ``stop_s``, ``reason``.
-    provenance, warnings
-        Where it comes from; and what the reader should know.
-    restoring
-        Which restoring torque the numbers belong to.
-    settled
-        Whether the search came to its end; a fit that did not is no result.
-    decrement_check
-        The law's loss beside that of the turning points, the large amplitude first.
-    fit_p_value
-        Of the one test of fit, over all its questions (`goodness`, `decrement`).
-    drag_form
-        Which form of the drag the readings prefer; undecided where neither is a thousand times as
-        likely as the other: then the errors cover both.
-    drag
-        The form that `law` has: the likelier.
-    zero_drift
-        By how much the zero rises in a second, where the readings ask for it.
-    other_frequency
-        Eq. 8's frequency with the other torque, where the readings can't
-        decide between the two and the frequencies differ by more than their error.
     torque_odds
         Logarithm of the likelihood of the fitted torque over the other's; None where it was not
         asked for.
+    other_frequency
+        Eq. 8's frequency with the other torque, where the readings can't
+        decide between the two and the frequencies differ by more than their error.
+    """
+
+    baseline: Baseline = "eq8"
+    restoring: Restoring = "linear"
+    drag: Literal["energy", "speed"] = "energy"
+    drag_form: DragForm = "energy"
+    hysteretic_share: float = 0.5
+    quality_factor_hysteretic: Estimate | None = None
+    quality_factor_viscous: Estimate | None = None
+    torque_odds: float | None = field(default=None, metadata={"json": "torque_log_odds"})
+    other_frequency: Estimate | None = None
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How the law agrees with what was fitted.
+
+    Parameters
+    ----------
+    noise_rms_rad, residual_rms_rad, chi2_per_dof
+        Noise of one reading (never below step/sqrt(12)); what the model leaves; and their
+        comparison.
+    fit_p_value
+        Of the one test of fit, over all its questions (`goodness`, `decrement`).
+    samples, turning_points
+        How many of each were used.
+    settled
+        Whether the search came to its end; a fit that did not is no result.
+    bent
+        Third harmonic that the law does not have (`goodness.Goodness.bent`).
+    """
+
+    noise_rms_rad: float = math.nan
+    residual_rms_rad: float = math.nan
+    chi2_per_dof: float = math.nan
+    fit_p_value: float | None = None
+    samples: int = 0
+    turning_points: int = 0
+    settled: bool = field(default=True, metadata=_APART)
+    bent: FloatArray | None = field(default=None, metadata=_APART)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How far the numbers may be believed.
+
+    Parameters
+    ----------
     light, light_reason
-        How far the numbers may be believed, by what the misfit does to them (`consequence`), and
-        why.
+        By what the misfit does to them (`consequence`), and why.
     hindered
         Why a law tells little of the decay: two modes beat, most of it was cut, or a cycle loses
         most of the swing.
     quotable
         What may be quoted: ``"period"``, ``"Q"``, ``"losses"``, ``"a"``, ``"b"``, ``"c"``.
-    shown
-        The backbone, where it is known already (`backbone`).
-    hysteretic_share
-        Part of b that the fitted law has as hysteretic; hardly any recording tells it.
+    """
+
+    light: Light = "amber"
+    light_reason: str = "the decrement was not checked"
+    hindered: Hindrance = ""
+    quotable: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Told:
+    """What the user says of the apparatus.
+
+    Parameters
+    ----------
     clock_ppm
         What the clock may be off by, in parts per million, where that is in the error of the
         period.
@@ -130,14 +167,47 @@ class Fitted:
         What the scale of the readings (V/rad, a camera's) may be off by, in percent; None where
         that is not in the errors.
     length, gravity
-        Of a simple pendulum, where it was given: the other of the two is a number of the fit.
+        Of a simple pendulum: the other of the two is a number of the fit.
+    """
+
+    clock_ppm: float | None = None
+    scale_percent: float | None = None
+    length: Estimate | None = None
+    gravity: Estimate | None = None
+
+
+@dataclass(frozen=True, repr=False)
+class Fitted:
+    """What was fitted of one recording, with its errors, and how far it may be believed.
+
+    Parameters
+    ----------
+    method
+        How it was fitted: to all readings, to turning points, or to amplitudes alone, whose
+        frequency, phase and noise are NaN.
+    parameters
+        The seven of `PARAMETERS`: the rates of Eq. 13, Eq. 8's frequency omega/(2 pi),
+        |y| at the first turning point kept, the phase at the first sample kept (the motion
+        is there ``offset + amplitude cos(phase)`` to first order), and the level.
+    covariance
+        Of the parameters in their order, shape (7, 7).
+    form, agreement, verdict, told
+        Which law; how it agrees; how far to believe it; what the user says of the apparatus.
+    decrement_check
+        The law's loss beside that of the turning points, the large amplitude first.
+    zero_drift
+        By how much the zero rises in a second, where the readings ask for it.
+    cuts
+        Spans left out: ``start_s``, ``stop_s``, ``reason``.
+    provenance, warnings
+        Where it comes from; and what the reader should know.
+    shown
+        The backbone, where it is known already (`backbone`).
     name
         Of the file that was fitted.
-    model, values
+    minimum
         Eq. 8 in its form with its sensor, and its values at the minimum; None where the fit was
         read from a file, or is none of the readings.
-    bent
-        Third harmonic that the law does not have (`goodness.Goodness.bent`).
     points, decay
         The turning points and the readings of the fitted decay; None where the fit was read
         from a file.
@@ -146,45 +216,100 @@ class Fitted:
     """
 
     method: Method
-    baseline: Baseline
     parameters: Mapping[str, Estimate]
     covariance: FloatArray = field(metadata=_APART)
-    noise_rms_rad: float
-    residual_rms_rad: float
-    chi2_per_dof: float
-    samples: int
-    turning_points: int
-    quality_factor_hysteretic: Estimate | None = None
-    quality_factor_viscous: Estimate | None = None
+    form: Form = field(default_factory=Form, metadata=_AMONG)
+    agreement: Agreement = field(default_factory=Agreement, compare=False, metadata=_AMONG)
+    verdict: Verdict = field(default_factory=Verdict, metadata=_AMONG)
+    told: Told = field(default_factory=Told, metadata=_AMONG)
+    decrement_check: tuple[Check, ...] = ()
+    zero_drift: Estimate | None = None
     cuts: tuple[Mapping[str, Any], ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
-    restoring: Restoring = "linear"
-    settled: bool = field(default=True, metadata=_APART)
-    decrement_check: tuple[Check, ...] = ()
-    fit_p_value: float | None = None
-    drag_form: DragForm = "energy"
-    drag: Literal["energy", "speed"] = "energy"
-    zero_drift: Estimate | None = None
-    other_frequency: Estimate | None = None
-    torque_odds: float | None = field(default=None, metadata={"json": "torque_log_odds"})
-    light: Light = "amber"
-    light_reason: str = "the decrement was not checked"
-    hindered: Hindrance = ""
-    quotable: tuple[str, ...] = ()
     shown: Backbone | None = field(default=None, compare=False, metadata=_APART)
-    hysteretic_share: float = 0.5
-    clock_ppm: float | None = None
-    scale_percent: float | None = None
-    length: Estimate | None = None
-    gravity: Estimate | None = None
     name: str = field(default="", compare=False, metadata=_APART)
-    model: Eq8Model | None = field(default=None, compare=False, metadata=_APART)
-    values: FloatArray | None = field(default=None, compare=False, metadata=_APART)
-    bent: FloatArray | None = field(default=None, compare=False, metadata=_APART)
+    minimum: tuple[Eq8Model, FloatArray] | None = field(
+        default=None, compare=False, metadata=_APART
+    )
     points: TurningPoints | None = field(default=None, compare=False, metadata=_APART)
     decay: Recording | None = field(default=None, compare=False, metadata=_APART)
     drawn_by: Callable[[], Any] | None = field(default=None, compare=False, metadata=_APART)
+
+    @property
+    def baseline(self) -> Baseline:
+        """The model's name."""
+        return self.form.baseline
+
+    @property
+    def restoring(self) -> Restoring:
+        """The torque that the numbers belong to."""
+        return self.form.restoring
+
+    @property
+    def drag_form(self) -> DragForm:
+        """The form of the drag that the readings prefer."""
+        return self.form.drag_form
+
+    @property
+    def noise_rms_rad(self) -> float:
+        """Noise of one reading."""
+        return self.agreement.noise_rms_rad
+
+    @property
+    def residual_rms_rad(self) -> float:
+        """What the model leaves."""
+        return self.agreement.residual_rms_rad
+
+    @property
+    def chi2_per_dof(self) -> float:
+        """Of the readings."""
+        return self.agreement.chi2_per_dof
+
+    @property
+    def fit_p_value(self) -> float | None:
+        """Of the one test of fit."""
+        return self.agreement.fit_p_value
+
+    @property
+    def samples(self) -> int:
+        """How many readings were used."""
+        return self.agreement.samples
+
+    @property
+    def turning_points(self) -> int:
+        """How many turning points were used."""
+        return self.agreement.turning_points
+
+    @property
+    def light(self) -> Light:
+        """How far the numbers may be believed."""
+        return self.verdict.light
+
+    @property
+    def light_reason(self) -> str:
+        """Why."""
+        return self.verdict.light_reason
+
+    @property
+    def hindered(self) -> Hindrance:
+        """Why a law tells little of the decay."""
+        return self.verdict.hindered
+
+    @property
+    def quotable(self) -> tuple[str, ...]:
+        """What may be quoted."""
+        return self.verdict.quotable
+
+    @property
+    def length(self) -> Estimate | None:
+        """Of a simple pendulum, where it was given."""
+        return self.told.length
+
+    @property
+    def gravity(self) -> Estimate | None:
+        """Where it was given."""
+        return self.told.gravity
 
     @property
     def quality_factor_limit(self) -> Estimate | None:
@@ -212,7 +337,7 @@ class Fitted:
         """
         if self.shown is not None or self.points is None or not self.decrement_check:
             return self.shown
-        return backbone_of(self.points, self.law, self.bent)
+        return backbone_of(self.points, self.law, self.agreement.bent)
 
     @property
     def lawless(self) -> Backbone | None:
@@ -229,15 +354,15 @@ class Fitted:
     @property
     def law(self) -> Eq8:
         """Eq. 8 with the fitted numbers; b is divided as the readings like it best."""
-        held, frequency = self.quality_factor_hysteretic, self.value("frequency")
+        held, frequency = self.form.quality_factor_hysteretic, self.value("frequency")
         a, b, c = map(self.value, "abc")
-        best = self.hysteretic_share * b
+        best = self.form.hysteretic_share * b
         share = best if held is None else math.pi * frequency / held.value
         hysteretic = min(max(share, 0.0), b)
         omega = math.tau * frequency
         if not math.isfinite(omega):
             omega = fast_beside(a, b, c, self.value("amplitude"))
-        return Eq8(omega, a, hysteretic, b - hysteretic, c, self.restoring, self.drag)
+        return Eq8(omega, a, hysteretic, b - hysteretic, c, self.restoring, self.form.drag)
 
     def value(self, name: str) -> float:
         """Value of one parameter."""

@@ -30,7 +30,7 @@ def predicted(result: Fitted, time_s: FloatArray) -> FloatArray:
         since, rates = time_s - points.time_s[0], map(result.value, "abc")
         if result.restoring == "linear":
             return amplitude(since, y0, *rates)
-        return pendulum_decay(result.hysteretic_share, result.drag, since, y0, *rates)[0]
+        return pendulum_decay(result.form.hysteretic_share, result.form.drag, since, y0, *rates)[0]
     side = float(points.side[0])
     # The phase at the first reading counts from a turning point on the positive side.
     late = result.value("phase") - (0.0 if side > 0.0 else math.pi)

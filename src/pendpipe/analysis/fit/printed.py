@@ -114,14 +114,14 @@ def _remarks(result: Fitted) -> Iterator[str]:
     """What must be known before any number is read."""
     if result.light != "green":
         yield result.light_reason
-    if result.restoring == "linear" and result.torque_odds is not None:
-        digits = result.torque_odds / math.log(10.0)
+    if result.restoring == "linear" and result.form.torque_odds is not None:
+        digits = result.form.torque_odds / math.log(10.0)
         # How far out the noise goes nobody has tested.
         ratio = f"10^{digits:.0f}" if digits < -math.log10(SMALLEST) else "10^12 or more"
         yield f"x fits better than sin x, {ratio} to 1: a spring or torsion wheel, no pendulum"
     if result.decay is not None and READ_AS in result.decay.metadata:
         yield f"a guess: {result.decay.metadata[READ_AS]} (--unit)"
-    if (other := result.other_frequency) is not None:
+    if (other := result.form.other_frequency) is not None:
         text = period_text(other)
         yield f"as a spring or torsion wheel (--restoring linear) its period would be {text}"
     if result.cuts:
@@ -161,7 +161,7 @@ def facts(result: Fitted, *, law: bool = False) -> Iterator[tuple[str, str]]:
         text += "; twice that, if the axis lies along the string (--column)"
     yield small, text
     by_clock = period.sd < _CLOCK * period.value and result.method != "amplitudes"
-    if by_clock and result.clock_ppm is None:
+    if by_clock and result.told.clock_ppm is None:
         moved = with_error(float(f"{_CLOCK * period.value:.1g}"), None, "s")
         yield "clock", f"an error of 50 ppm adds {moved}, not included here (--clock-ppm)"
     if known:

@@ -14,7 +14,7 @@ import numpy as np
 
 from pendpipe.analysis.fit.backbone import Backbone
 from pendpipe.analysis.fit.decrement import Light, losses_of
-from pendpipe.analysis.fit.fitted import Fit, Fitted
+from pendpipe.analysis.fit.fitted import Fit, Fitted, Verdict
 from pendpipe.analysis.torque import TOP, swing_phase
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8, Release, turning_points
@@ -59,7 +59,8 @@ class Quality:
     @property
     def quality_factor(self) -> Estimate:
         """``pi tau/T``: tau the damping time and T the period at y."""
-        return _times(self.damping_time_s, math.pi / self.period_s, "")
+        time, factor = self.damping_time_s, math.pi / self.period_s
+        return Estimate(factor * time.value, factor * time.sd, "")
 
     @property
     def dominant(self) -> str | None:
@@ -188,7 +189,7 @@ def without_swings(result: Fit) -> Fit:
     if result.light != "green":
         said = f"{said}; {result.light_reason}"
     light: Light = "red" if result.light == "red" else "amber"
-    return replace(result, light=light, light_reason=said, hindered="overdamped", quotable=kept)
+    return replace(result, verdict=Verdict(light, said, "overdamped", kept))
 
 
 def quality_by_law(result: Fitted, amplitude: float) -> Quality:
@@ -255,10 +256,6 @@ def period_of(result: Fitted, amplitude: float) -> float:
     except ValueError:
         return 1.0 / result.value("frequency")
     return float(cycle.time_s[2]) if amplitude > 0.0 else 1.0 / result.value("frequency")
-
-
-def _times(estimate: Estimate, factor: float, unit: str) -> Estimate:
-    return Estimate(factor * estimate.value, factor * estimate.sd, unit)
 
 
 def mean_square(result: Fitted) -> float:

@@ -15,7 +15,7 @@ from pendpipe.analysis.fit.backbone import Backbone
 from pendpipe.analysis.fit.consequence import judged, scaled
 from pendpipe.analysis.fit.damping import damping_of
 from pendpipe.analysis.fit.decrement import Check, check_decrement
-from pendpipe.analysis.fit.fitted import PARAMETERS, PARTS, Fitted, units
+from pendpipe.analysis.fit.fitted import PARAMETERS, PARTS, Agreement, Fitted, Form, units
 from pendpipe.analysis.fit.goodness import Goodness, combined
 from pendpipe.analysis.fit.printed import answer_of, called
 from pendpipe.analysis.fit.quality import (
@@ -31,7 +31,7 @@ from pendpipe.analysis.turning_points import TurningPoints, write_turning_points
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import Eq8
 from pendpipe.errors import InputError, nearest, refuse_if
-from pendpipe.estimate import Estimate, number
+from pendpipe.estimate import Estimate
 from pendpipe.files import fields_of, plain, read_json, write_json, writing
 from pendpipe.levels import REFUTED
 from pendpipe.quantities import compact
@@ -237,23 +237,31 @@ class FitResult(Fitted):
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> FitResult:
         """Rebuild a result from the content of ``fit.json``."""
-        names = ((each.name, each.metadata.get("json", each.name)) for each in fields(cls))
-        there = {here: content[name] for here, name in names if content.get(name) is not None}
-        found: dict[str, Any] = {name: _read(entry) for name, entry in there.items()}
+        found = _fields_in(cls, content)
         shown, known = content.get("backbone"), content["covariance"]
         places = [PARAMETERS.index(name) for name in known["order"]]
         covariance = np.zeros((len(PARAMETERS), len(PARAMETERS)))
         covariance[np.ix_(places, places)] = np.array(known["matrix"], dtype=np.float64)
         found |= {
-            "noise_rms_rad": number(content["noise_rms_rad"]),
-            "residual_rms_rad": number(content["residual_rms_rad"]),
-            "chi2_per_dof": number(content["chi2_per_dof"]),
             "parameters": {name: _read(each) for name, each in content["parameters"].items()},
             "decrement_check": tuple(Check(**check) for check in content["decrement_check"]),
             "shown": shown and Backbone.from_json(shown),
             "covariance": covariance,
         }
         return cls(**found)
+
+
+def _fields_in(kind: Any, content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields that a dataclass has in JSON (`files.fields_of`)."""
+    found: dict[str, Any] = {}
+    for each in fields(kind):
+        there = each.metadata.get("json", each.name)
+        if there == "":
+            part: Any = each.default_factory
+            found[each.name] = part(**_fields_in(part, content))
+        elif content.get(there) is not None:
+            found[each.name] = _read(content[there])
+    return found
 
 
 def _read(entry: Any) -> Any:
@@ -280,6 +288,8 @@ def result_of(
     goodness: Goodness,
     said: Iterable[str],
     fixed: Mapping[str, float],
+    form: Form,
+    agreement: Agreement,
     **rest: Any,
 ) -> FitResult:
     """Dress a fit's numbers, compare its law with the decay, and say what the reader should know.
@@ -300,6 +310,8 @@ def result_of(
         Warnings of the fit itself; the notes of the turning points stand before them.
     fixed
         What is held, by name; one recording does not tell the parts of b.
+    form, agreement
+        As far as `law` and `goodness` do not tell them.
     **rest
         The other fields of `FitResult`.
     """
@@ -318,18 +330,25 @@ def result_of(
             each._replace(overruled=white if each.contradicts else "") for each in checks
         )
     p_values = (*goodness.p_values, *(each.p_value for each in checks if not each.overruled))
-    rest |= {name: Estimate(fixed[name], 0.0, "") for name in PARTS if name in fixed}
+    held_parts: Any = {name: Estimate(fixed[name], 0.0, "") for name in PARTS if name in fixed}
     result = FitResult(
         parameters=parameters,
         covariance=covariance,
-        restoring=law.restoring,
-        hysteretic_share=law.share,
-        drag=law.drag,
-        noise_rms_rad=goodness.noise_rms,
-        chi2_per_dof=goodness.chi2_per_dof,
-        fit_p_value=combined(p_values),
+        form=replace(
+            form,
+            restoring=law.restoring,
+            drag=law.drag,
+            hysteretic_share=law.share,
+            **held_parts,
+        ),
+        agreement=replace(
+            agreement,
+            noise_rms_rad=goodness.noise_rms,
+            chi2_per_dof=goodness.chi2_per_dof,
+            fit_p_value=combined(p_values),
+            bent=goodness.bent,
+        ),
         decrement_check=checks,
-        bent=goodness.bent,
         **rest,
     )
     result = judged(result, points, law, misfit=goodness.misfit)
@@ -379,7 +398,7 @@ def with_clock(result: FitResult, clock_ppm: float) -> FitResult:
     Every time is stretched alike: the frequency, and the rates b (1/s), a and c, by the same part.
     """
     powers = dict.fromkeys(("frequency", "a", "b", "c"), 1.0)
-    return replace(_stretched(result, powers, 1e-6 * clock_ppm), clock_ppm=clock_ppm)
+    return _stretched(result, powers, 1e-6 * clock_ppm)
 
 
 def with_scale(result: FitResult, scale_percent: float) -> FitResult:
@@ -391,7 +410,7 @@ def with_scale(result: FitResult, scale_percent: float) -> FitResult:
     powers = {"amplitude": 1.0, "offset": 1.0, "c": 1.0, "a": -1.0}
     if result.restoring == "sine":
         powers["frequency"] = mean_square(result) / 8.0
-    return replace(_stretched(result, powers, 0.01 * scale_percent), scale_percent=scale_percent)
+    return _stretched(result, powers, 0.01 * scale_percent)
 
 
 def _stretched(result: FitResult, powers: Mapping[str, float], part: float) -> FitResult:

@@ -16,6 +16,12 @@ from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.physics.decay import amplitude, time_at
 
+_SLIP: Final = 0.7
+"""Phase in rad by which the law's turning points may part from the measured ones."""
+_SLIPPED: Final = (
+    "the period changes with the amplitude or the time as Eq. 8's does not:"
+    " {:.2g} rad of phase along the record"
+)
 _HIGH: Final = 2.0
 """Amplitude in rad beyond which no turning point before the first is looked for with sin x."""
 _STOP: Final = 6.0
@@ -28,6 +34,7 @@ class Start(NamedTuple):
     value: FloatArray
     before: int
     """Half cycles from the release to the first turning point kept."""
+    warnings: tuple[str, ...]
 
 
 def start_values(
@@ -46,6 +53,9 @@ def start_values(
     points = points if restoring == "linear" else clear(points)
     envelope, period = envelope_and_period(points, held, restoring, start=True)
     a, b, c, y0, level = envelope.value.tolist()
+    # Times uncertain by more than 0.2 rad show no slip.
+    late = period.late_rad[period.angular_frequency * points.time_sd_s < 0.2]
+    slipped = held.angular_frequency is None and np.max(np.abs(late), initial=0.0) > _SLIP
     at_first, losses = "amplitude" in held.fixed, (a, b, c, held.likely_share(b))
     angle, time, before = _release(points, y0, losses, period, restoring, at_first=at_first)
     if restoring == "sine":
@@ -54,7 +64,7 @@ def start_values(
     angles = samples is None or samples.unit == points.unit
     offset = held.fixed.get("offset", float(np.mean(points.level_rad)) - (level if angles else 0.0))
     value = np.array([*losses, period.angular_frequency, angle, time, offset, 0.0])
-    return Start(value, before)
+    return Start(value, before, (_SLIPPED.format(np.ptp(late)),) if slipped else ())
 
 
 def _release(

@@ -261,10 +261,6 @@ def _further(places: Places, measured: Measured, noise: float, count: int) -> Pl
     """Carry the last known half cycles on at their own mean period."""
     time, weight = times_and_weights(places, measured, noise)
     known = np.flatnonzero(weight > 0.0)[-60:]
-    # As many of the last as it takes to know the period well, and no more: it may change.
-    used = np.cumsum(weight[known][::-1])
-    enough = int(np.searchsorted(used, 400.0 * weight[known].max())) + 1
-    known = known[-max(enough, 24) :]
     line = np.polynomial.Polynomial.fit(
         places.number[known], time[known], 1, w=np.sqrt(weight[known])
     )
