@@ -181,11 +181,6 @@ class Hypothesis:
         assert self.now is not None
         return self.now
 
-    @property
-    def named(self) -> Fit:
-        """The fit with the named effects only."""
-        return self.without_curve or self.fit
-
     def without(self, *steps: Step) -> Fit | None:
         """Fit the model again without the effects of some of its steps, once for all who ask.
 

@@ -466,15 +466,10 @@ def _additions(state: Hypothesis, task: Task, *, names_first: bool = False) -> I
     if one.lower < -one.steps[-1].predicted_worse and shares_a_misfit(step, state):
         trial = task.scanned(correct(one.settle(one.fit), task))
         for more in _additions(trial, task, names_first=True):
-            yield _from(state, more)
-
-
-def _from(state: Hypothesis, after: Hypothesis) -> Hypothesis:
-    """Compare a neighbour of a neighbour with the hypothesis before both."""
-    model = state.fit.model.at_times(after.data.time_s)
-    fit = refine(model, after.data, after.noise, state.fit.value, held=state.held, rounds=0)
-    (found,) = compared(replace(after, fit=fit, steps=state.steps), [after])
-    return found
+            # A neighbour of a neighbour is compared with the hypothesis before both.
+            model, value = state.fit.model.at_times(more.data.time_s), state.fit.value
+            fit = refine(model, more.data, more.noise, value, held=state.held, rounds=0)
+            yield from compared(replace(more, fit=fit, steps=state.steps), [more])
 
 
 def _ends_with_curve(state: Hypothesis) -> bool:

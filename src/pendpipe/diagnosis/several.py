@@ -368,7 +368,7 @@ def _misfit(found: Hypothesis) -> float:
     A curve of the motion against the time is no law: what it describes is a misfit too.
     """
     drawn = [effect for effect in found.fit.model.effects if effect.in_time]
-    law = found.fit if all(map(happened, drawn)) else found.named
+    law = found.fit if all(map(happened, drawn)) else found.without_curve or found.fit
     return remainder_of(law, found.data, found.noise).error_scale
 
 

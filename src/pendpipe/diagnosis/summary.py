@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from pendpipe.analysis.fit.printed import short_size
 from pendpipe.analysis.fit.quality import period_of_frequency
+from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.answer import Answer, Table, factor, percent, printed
 from pendpipe.diagnosis.found import CANDIDATE, COLOURED_NOISE, FoundEffect, Outcome
 from pendpipe.diagnosis.refine import Remainder
@@ -488,7 +489,7 @@ def details_of(outcome: Outcome) -> list[str]:
         what = f"the motion of {whole}, whose zero wanders" if outcome.wanders else whole
         agrees = f"the residual of {size} rms agrees with the noise ({noise_is})"
         step = outcome.search.data.step if outcome.search is not None else 0.0
-        if left < noise_rms <= step / 12.0**0.5:
+        if left < noise_rms <= quantisation_rms(step):
             agrees = f"it leaves {size} rms, less than the rounding adds ({noise_is})"
         p = outcome.unexplained_p_value
         chance = " more than chance would" if p >= outcome.level else ", but more than by chance"

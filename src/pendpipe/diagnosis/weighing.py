@@ -70,7 +70,7 @@ def beside(found: Hypothesis, effect: Effect) -> Hypothesis:
     if effect.kind == "unnamed":
         return found
     # A curve added to the named effects could imitate any of them.
-    return replace(found, fit=found.named)
+    return replace(found, fit=found.without_curve or found.fit)
 
 
 def effect_named(found: Hypothesis, step: Step) -> FoundEffect:

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.fft import dct
 from scipy.special import ndtr
 
+from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.blocks import blocks_of
 from pendpipe.diagnosis.forensics.evidence import Evidence
@@ -51,7 +52,7 @@ def note_level(evidence: Evidence) -> Finding | None:
     """Say by how much the noise's level changes along the record, where it does and is seen."""
     data, level = evidence.data, evidence.noise.level
     # Of noise below that of rounding nothing is seen.
-    if level is None or data.time_noise or evidence.noise.rms <= data.step / math.sqrt(12.0):
+    if level is None or data.time_noise or evidence.noise.rms <= quantisation_rms(data.step):
         return None
     first, last = (float(np.sqrt(np.mean(part**2))) for part in np.array_split(level, 2))
     ratio = float(level.max() / level.min())

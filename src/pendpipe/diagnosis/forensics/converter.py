@@ -9,6 +9,7 @@ import numpy as np
 from scipy.fft import irfft, rfft
 from scipy.special import gammaincc, log_ndtr, ndtr, xlogy
 
+from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.diagnosis.forensics.codes import (
     Coded,
@@ -98,7 +99,7 @@ def find_clipping(evidence: Evidence) -> Finding | None:
         at = lattice.position(np.array([end.limit for end in ends]))
         codes = tuple(np.rint(at).astype(int).tolist())
     number, mask = int(np.count_nonzero(clipped)), np.asarray(clipped.any(axis=1))
-    sd, when = step / math.sqrt(12.0), data.time_s[mask]
+    sd, when = quantisation_rms(step), data.time_s[mask]
     parameters = {f"{end.side}_level": Estimate(end.limit, sd, data.unit) for end in ends}
     parameters["number"] = Estimate(float(number), 0.0, "")
     sides = " and ".join(end.side for end in ends)

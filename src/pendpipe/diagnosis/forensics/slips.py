@@ -19,6 +19,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.special import ndtr, stdtr
 
+from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
@@ -311,7 +312,7 @@ def steps_of_the_time(
     fitted to the raw readings: after the step it changes them as the velocity does. The row where
     the step is most significant counts.
     """
-    interval, floor = np.median(np.diff(samples.time_s)), (samples.step or 0.0) / math.sqrt(12.0)
+    interval, floor = np.median(np.diff(samples.time_s)), quantisation_rms(samples.step)
     side = max(int(_BESIDE * period_s / interval), _FEWEST_BESIDE)
     found: list[float] = []
     for row in np.searchsorted(samples.time_s, when_s).tolist():
@@ -505,7 +506,7 @@ def _phase_errors(data: Data, amplitude: FloatArray, phase: FloatArray) -> Float
     at = amplitude[1:-1]
     usual = 1.4826 * float(np.median(np.abs(second - np.median(second)) * at)) / math.sqrt(6.0)
     readings = len(data) / max(len(phase), 1)
-    floor = data.step / math.sqrt(12.0 * max(0.5 * readings, 1.0))
+    floor = quantisation_rms(data.step) / math.sqrt(max(0.5 * readings, 1.0))
     return np.asarray(max(usual, floor, 1e-9) / amplitude)
 
 
