@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pendpipe.analysis.fit.result import drawer_of
-from pendpipe.diagnosis.found import FittedModel, Outcome
+from pendpipe.diagnosis.found import FittedModel
+from pendpipe.diagnosis.outcome import Outcome
 from pendpipe.diagnosis.summary import Summary, details_of, summarise
 from pendpipe.files import finite, plain
 

@@ -15,7 +15,8 @@ from pendpipe.analysis.fit.printed import short_size
 from pendpipe.analysis.fit.quality import period_of_frequency
 from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.answer import Answer, Table, factor, percent, printed
-from pendpipe.diagnosis.found import CANDIDATE, COLOURED_NOISE, FoundEffect, Outcome
+from pendpipe.diagnosis.found import CANDIDATE, COLOURED_NOISE, FoundEffect
+from pendpipe.diagnosis.outcome import Outcome
 from pendpipe.diagnosis.refine import Remainder
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier, declared
 from pendpipe.effects.curves import CURVES
