@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import binom, chi2, kstest
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis import blocks, weighing
+from pendpipe.diagnosis import projection, weighing
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import (
     Bank,
@@ -234,7 +234,7 @@ def test_of_a_long_record_blocks_of_cycles_tell_all(monkeypatch: pytest.MonkeyPa
     effects = [e for e in applicable(CATALOGUE, record.fit, "eq8", "rad") if not e.spectral]
     found = {}
     for name, most in (("part", 16_000), ("whole", 10**9)):
-        monkeypatch.setattr(blocks, "_MANY", most)
+        monkeypatch.setattr(projection, "_MANY", most)
         bank = build_bank(record.fit, record.noise, effects)
         each = bank.scores(bank.compared(record.fit.residual))
         found[name] = {key: each[rows].max() for key, rows in bank.rows().items()}

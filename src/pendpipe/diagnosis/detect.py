@@ -20,10 +20,9 @@ from scipy.fft import next_fast_len
 from scipy.ndimage import uniform_filter1d
 
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.diagnosis.blocks import blocks_of
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.projection import local_p_values, tangent_basis, whitened
+from pendpipe.diagnosis.projection import blocks_of, local_p_values, tangent_basis, whitened
 from pendpipe.diagnosis.refine import Fit
 from pendpipe.dynamics.eq8 import OMEGA
 from pendpipe.effects import Effect

@@ -15,11 +15,10 @@ from scipy.special import ndtr
 
 from pendpipe.analysis.noise import quantisation_rms
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.blocks import blocks_of
 from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.tails import tail_of_squares
 from pendpipe.diagnosis.found import COLOURED_NOISE, WANDERING_ZERO, Finding, Location
-from pendpipe.diagnosis.projection import tangent_basis
+from pendpipe.diagnosis.projection import blocks_of, tangent_basis
 from pendpipe.diagnosis.refine import CLEAN
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, compact
