@@ -9,7 +9,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.facts import Fact
 from pendpipe.formats.lists import one_way
-from pendpipe.formats.table import Column, periods, swing_of
+from pendpipe.formats.table import ABSURD, FEWEST, Column, periods, swing_of
 from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 
 
@@ -21,7 +21,7 @@ def on_a_circle(x: FloatArray, y: FloatArray, *, named: bool) -> bool:
     """
     good = np.isfinite(x) & np.isfinite(y)
     x, y, sides = x[good], np.abs(y[good]), np.sign(y[good])
-    if len(x) < 8 or max(np.abs(x).max(), y.max()) > 1e100:
+    if len(x) < FEWEST or max(np.abs(x).max(), y.max()) > ABSURD:
         return False
     radius, angle = np.hypot(x, y), np.arctan2(x, y)
     if (
@@ -81,6 +81,8 @@ def seen_from_pivot(x: Column, y: Column, time_s: FloatArray) -> Seen:
     return Seen(np.arctan2(left, down * up), excess, fact)
 
 
+_KNOWN: Final = 0.03
+"""Of the radius, to which a centre is known: angles are then wrong by as much at most."""
 _LENGTHS: Final = (1.0, 0.01, 1e-3, 0.0254)
 """Metres of the units in which positions are given."""
 
@@ -98,7 +100,7 @@ def _better_circle(x: FloatArray, y: FloatArray) -> FloatArray | None:
     about, origin = (np.hypot(*points.T) for points in (arm, arm + centre))
     test = 0.5 * (float(np.var(origin) / np.var(about)) - 1.0) * (len(arm) - 3)
     far = math.hypot(*centre) > 0.1 * float(about.mean())
-    return centre if known < 0.03 and test > 30.0 and far else None
+    return centre if known < _KNOWN and test > 30.0 and far else None
 
 
 def pivot_of(x: FloatArray, y: FloatArray) -> FloatArray | None:
@@ -116,7 +118,7 @@ def pivot_of(x: FloatArray, y: FloatArray) -> FloatArray | None:
     away = math.hypot(*centre) / mean
     # The farther from (0, 0), the less the circle need show.
     clear = np.std(radius) < min(max(0.3, 1.5 * away), 0.5) * np.std(arm[:, 1])
-    return centre if known < 0.03 and hangs and clear and away > 0.1 else None
+    return centre if known < _KNOWN and hangs and clear and away > 0.1 else None
 
 
 def _circle_of(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, float] | None:
@@ -132,7 +134,7 @@ def _circle_of(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, fl
     """
     good = np.isfinite(x) & np.isfinite(y)
     points = np.column_stack([x[good], y[good]])
-    if len(points) < 8 or np.abs(points).max() > 1e100:
+    if len(points) < FEWEST or np.abs(points).max() > ABSURD:
         return None
     one, middle = np.ones((len(points), 1)), points.mean(axis=0)
     inverse = np.linalg.pinv(np.hstack([2.0 * (points - middle), one]))

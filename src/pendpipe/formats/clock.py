@@ -25,6 +25,8 @@ _CLOCK: Final = re.compile(
 )
 
 
+_MONTHS: Final = 12
+"""What is more is a day."""
 _FIRST_DAY: Final = -24107
 """1 January 1904, counted from 1970: earlier days are the zeros of spreadsheets."""
 
@@ -91,6 +93,6 @@ def _days(date: tuple[str | None, ...], slashed: bool) -> int:
     if not any(date):
         return 0
     year, month, day = parts[:3] if date[0] else parts[:2:-1]
-    if not date[0] and (month > 12 or (slashed and day <= 12)):
+    if not date[0] and (month > _MONTHS or (slashed and day <= _MONTHS)):
         day, month = month, day
     return dt.date(year + 2000 * (year < 100), month, day).toordinal() - 719163

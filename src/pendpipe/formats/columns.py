@@ -15,7 +15,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
 from pendpipe.facts import Fact, How
 from pendpipe.formats.circle import on_a_circle, pivot_of
-from pendpipe.formats.lists import Listed, counts_samples, list_in, one_way
+from pendpipe.formats.lists import ONE_WAY, Listed, counts_samples, list_in, one_way
 from pendpipe.formats.table import Column, ReadOptions, Table, derivative_slope, evenness
 from pendpipe.formats.words import Role, Unit, counts_swings, plain, role_of, split_header, unit_of
 from pendpipe.readings import amplitudes_in, sizes_of
@@ -243,7 +243,8 @@ _TURNS: Final = (2.0**16, 2.0**32, *(size * days for size in (86400.0, 864e5) fo
 def _counted_on(column: Column) -> Column:
     """Count on where a clock begins again at 0: of 16 or 32 bits, of the day, of the GPS week."""
     values, steps = column.values, np.diff(column.values)
-    for turn in _TURNS:
+    falls = steps.min(initial=0.0)
+    for turn in (turn for turn in _TURNS if falls < -0.5 * turn):
         over = steps < -0.5 * turn
         across = np.abs(steps[over] + turn).max(initial=0.0)
         on = over.any() and values.max() < turn and steps[~over].min(initial=1.0) >= 0.0
@@ -282,7 +283,7 @@ def _time(table: Table, options: ReadOptions) -> tuple[Column | None, bool]:
         if (
             role in ("none", "signal", "volts", "velocity", "acceleration")
             or taken in (column.name.lower() or "-", str(column.number))
-            or share < (0.5 if named else 0.95)
+            or share < (0.5 if named else ONE_WAY)
             or (len(table.columns) == 1 and not named)
         ):
             continue

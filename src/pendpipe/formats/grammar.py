@@ -24,6 +24,8 @@ from pendpipe.formats.words import unit_of
 COMMENT: Final = ("#", "%", "//", "!")
 MOST_DAMAGED: Final = 0.01
 """Share of the rows that may be garbled or torn."""
+_NEARLY_ALL: Final = 1.0 - 2.0 * MOST_DAMAGED
+"""Share of the cells of one form: a damaged row spoils that below it, too."""
 MOST_COLUMNS: Final = 1024
 """A row of more cells is no sample of an instrument."""
 _LONGEST_CELL: Final = 500
@@ -299,8 +301,8 @@ def joined_commas(
     """
     rows = [row for row in map(layout.split, lines) if len(row) == layout.width]
     columns = [list(column) for column in zip(*rows, strict=True)] if len(rows) > 3 else []
-    whole = [_often(r"[+-]?\d+", column) > 0.98 for column in columns]
-    parts = [_often(r"[0-9]+", column) > 0.98 for column in columns]
+    whole = [_often(r"[+-]?\d+", column) > _NEARLY_ALL for column in columns]
+    parts = [_often(r"[0-9]+", column) > _NEARLY_ALL for column in columns]
     pairs = [a and b for a, b in zip(whole, parts[1:], strict=False)]
     plain = (1,) * layout.width
     said = _DECIMALS.get(decimal or "", decimal)
@@ -313,8 +315,8 @@ def joined_commas(
         ways = [way for way in ways if fits(way, columns)] or ways
     # Whole numbers under no names are whole numbers, unless that leaves no time, or one that never
     # changes stands before others of one length, as the 0 of 0,38 does.
-    fixed = [_often(re.escape(column[0]), column) > 0.98 for column in columns]
-    alike = [_often(rf"\d{{{max(2, len(c[0]))}}}", c) > 0.98 for c in columns]
+    fixed = [_often(re.escape(column[0]), column) > _NEARLY_ALL for column in columns]
+    alike = [_often(rf"\d{{{max(2, len(c[0]))}}}", c) > _NEARLY_ALL for c in columns]
     zeros = {(at, 2) for at, pair in enumerate(pairs) if pair and fixed[at] and alike[at + 1]}
     joined = [way for way in ways if zeros and zeros <= {*_placed(way)}]
     if not names and plain in ways and _evenness(_numbers(columns, plain)):
@@ -384,7 +386,7 @@ def _evenness(numbers: Sequence[FloatArray]) -> int:
         return 0
     steps = np.diff(numbers[0])
     even = np.median(steps) > 0.0 and evenness(numbers[0]) > 0.9
-    return 2 if even else int(np.mean(steps >= 0.0) > 0.98)
+    return 2 if even else int(np.mean(steps >= 0.0) > _NEARLY_ALL)
 
 
 def named(way: Sequence[int], row: str, layout: Layout) -> str:

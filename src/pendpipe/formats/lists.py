@@ -86,6 +86,10 @@ def list_in(
     return None
 
 
+ONE_WAY: Final = 0.95
+"""Share of the steps of a clock that go the way of the whole, however torn it is."""
+
+
 def one_way(values: FloatArray) -> float:
     """Share of the steps that go the way of the whole; 0 where it does not move."""
     finite = values[np.isfinite(values)]

@@ -24,8 +24,10 @@ from pendpipe.recording import is_uniform
 if TYPE_CHECKING:
     from zipfile import ZipFile
 
-_ABSURD: Final = 1e100
+ABSURD: Final = 1e100
 """Beyond this nothing was measured; squares of it are no numbers."""
+FEWEST: Final = 8
+"""Readings that show a swing: of two cycles, four in each."""
 _LOOKED_AT: Final = 1 << 15
 """Samples of a long column that are transformed: means of neighbours."""
 _CLEAR: Final = 0.25
@@ -74,7 +76,7 @@ def swing_of(values: FloatArray) -> Swing:
     finite = values[np.isfinite(values)]
     steps = np.diff(finite)
     # What goes one way only (a clock) turns nowhere, though its roundings do.
-    if len(finite) < 8 or np.abs(finite).max() > _ABSURD or not steps.min() < 0.0 < steps.max():
+    if len(finite) < FEWEST or np.abs(finite).max() > ABSURD or not steps.min() < 0.0 < steps.max():
         return Swing()
     # A torn number that still is one may be a million times as large as the others.
     low, high = np.percentile(finite, (1, 99))
@@ -265,13 +267,13 @@ def periods(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArra
     """
     good, none = np.isfinite(values) & np.isfinite(time), np.empty(0)
     time, values = time[good], values[good]
-    if len(values) < 8 or np.abs(values).max() > _ABSURD:
+    if len(values) < FEWEST or np.abs(values).max() > ABSURD:
         return none, none
     low, middle, high = np.percentile(values, (0.5, 50, 99.5))
     rest = values - middle
     outside = np.flatnonzero(np.abs(rest) > 0.1 * max(high - middle, middle - low))
     turns = np.flatnonzero(np.diff(np.signbit(rest[outside]).astype(np.int8)))
-    if not high > low or len(outside) < 8 or len(turns) < 5:
+    if not high > low or len(outside) < FEWEST or len(turns) < 5:
         return none, none
     before, after = outside[turns], outside[turns + 1]
     part = rest[before] / (rest[before] - rest[after])
@@ -322,7 +324,7 @@ def derivative_slope(time: FloatArray, values: FloatArray, other: FloatArray) ->
     """
     good = np.isfinite(time) & np.isfinite(values) & np.isfinite(other)
     time, values, other = time[good], values[good], other[good]
-    if len(time) < 16 or np.any(np.diff(time) <= 0) or np.abs(values).max() > _ABSURD:
+    if len(time) < 16 or np.any(np.diff(time) <= 0) or np.abs(values).max() > ABSURD:
         return None
     rate = np.gradient(values, time)
     # Twice averaged over neighbours, both alike: differences of a noisy reading are noise.

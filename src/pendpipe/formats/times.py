@@ -12,7 +12,7 @@ from pendpipe.errors import InputError, refuse_if
 from pendpipe.facts import SWINGS, Fact, How
 from pendpipe.formats.columns import Choice
 from pendpipe.formats.grammar import MOST_DAMAGED
-from pendpipe.formats.lists import counts_samples, one_way
+from pendpipe.formats.lists import ONE_WAY, counts_samples, one_way
 from pendpipe.formats.table import Column, ReadOptions, Table, periods
 from pendpipe.formats.words import Unit, counts_swings, plain, unit_of
 from pendpipe.recording import is_uniform
@@ -48,6 +48,8 @@ _OTHER_PERIODS: Final = 0.01
 """How often a swing lies outside: two of 190 files of others do, one a balance of 211 s."""
 
 
+_ROUNDED: Final = 0.02
+"""Share of the rows with the stamp of the row above that tells rounded stamps from copies."""
 _MOST_MISSING: Final = 0.02
 """Of the rows, beyond which missing frames make any interval fit."""
 _TRIES, _ROUNDS = 21, 8
@@ -150,7 +152,7 @@ def _stamped_rate(choice: Choice, given: float) -> float:
     Units of time lie a thousand apart: that one is taken which comes nearest to the `given` rate.
     """
     column = choice.time
-    if column is None or choice.counts or not one_way(column.values) > 0.95:
+    if column is None or choice.counts or not one_way(column.values) > ONE_WAY:
         return np.nan
     values = column.values[np.isfinite(column.values)]
     rate = (len(values) - 1) / abs(float(values[-1] - values[0]))
@@ -265,7 +267,7 @@ def _in_order(
     table: Table, choice: Choice, base: TimeBase, tick: float, options: ReadOptions
 ) -> TimeBase:
     """Turn times that are out of order, or repeat, into times that rise; or refuse them."""
-    if one_way(base.time_s) > 0.95 and base.time_s[-1] < base.time_s[0]:
+    if one_way(base.time_s) > ONE_WAY and base.time_s[-1] < base.time_s[0]:
         base.keep(slice(None, None, -1), "the newest row stands first: rows turned round")
     if len(base.time_s) and abs(base.time_s[0]) > _EPOCH:
         start = float(base.time_s[0])
@@ -288,7 +290,7 @@ def _in_order(
         _through_packets,
     ]
     # Where stamps are rounded, rows of one time are no copies.
-    rounded = len(base.time_s) > 1 and np.mean(np.diff(base.time_s) == 0.0) > 0.02
+    rounded = len(base.time_s) > 1 and np.mean(np.diff(base.time_s) == 0.0) > _ROUNDED
     repairs.insert(0 if rounded else 3, _interpolate_torn)
     for repair in repairs:
         if np.diff(base.time_s).min(initial=1.0) <= 0:
@@ -495,7 +497,7 @@ def _rounded(time: FloatArray, lines: IntArray | None = None) -> FloatArray | No
         even += 0.5 * float(np.max(centre - even) + np.min(centre - even)) * (late == 0.0)
         if np.all(np.abs(centre - even) <= 0.6 * digit) and even[-1] > even[0]:
             return even
-    if np.mean(steps == 0) < 0.02:
+    if np.mean(steps == 0) < _ROUNDED:
         return None
     counted = (_frames(time, digit, place) for place in places)
     return next((even for even in counted if even is not None), None)

@@ -269,13 +269,13 @@ def _printed_digit(finite: FloatArray, scale: float) -> float | None:
     """Find the decimal place of which all readings, times `scale`, are multiples."""
     some = finite[:: max(1, len(finite) // 2000)]
     # Beyond 1e9 a double has no such digits left.
-    if len(some) < 20 or np.abs(some).max() > 1e9:
+    if len(some) < _DIGITS or np.abs(some).max() > 1e9:
         return None
     some = scale * some
     for place in range(7):
         whole = some * 10.0**place
         # Of readings that have no such digit a few in a hundred are this near to one.
-        if np.ptp(whole) > 20.0 and np.all(np.abs(whole - np.rint(whole)) < 0.03):
+        if np.ptp(whole) > 20.0 and np.all(np.abs(whole - np.rint(whole)) < 0.5 * _NEAR):
             return 10.0**-place
     return None
 

@@ -305,6 +305,10 @@ def _decoded(text: bytes) -> str:
     return " ".join(text[:_LONGEST_TEXT].decode("latin-1").split())
 
 
+_NO_TEXT: Final = (*range(1, 9), *range(14, 32), 255)
+"""Bytes that no text holds: controls, but for tab to carriage return, and erased memory."""
+
+
 def repaired(data: bytes, header: WindaqHeader) -> WindaqHeader | None:
     """Find sizes under which a file with damaged ones makes sense from end to end.
 
@@ -313,7 +317,7 @@ def repaired(data: bytes, header: WindaqHeader) -> WindaqHeader | None:
     """
     # From here on there is nothing but printable signs and NULs.
     tail = np.frombuffer(data[-_LONGEST_TAIL:], dtype=np.uint8)
-    odd = np.flatnonzero((tail != 0) & (tail < 32) & ((tail < 9) | (tail > 13)) | (tail == 255))
+    odd = np.flatnonzero(np.isin(tail, _NO_TEXT))
     texts_from = len(data) - len(tail) + (int(odd[-1]) + 1 if len(odd) else 0)
 
     def consistent(size: int) -> tuple[bool, int, WindaqHeader] | None:
