@@ -120,11 +120,12 @@ def table_of_text(place: Path, text: str, options: ReadOptions, form: str) -> Ta
         When a reading does, but rows are damaged; or two readings do that differ.
     """
     lines = text.split("\n")
-    longest = max(range(len(lines)), key=lambda number: len(lines[number]))
+    lengths = list(map(len, lines))
+    longest = max(lengths)
     refuse_if(
-        len(lines[longest]) > _LONGEST_LINE,
-        f"{place}, line {longest + 1}",
-        f"the line is {len(lines[longest])} characters long",
+        longest > _LONGEST_LINE,
+        f"{place}, line {lengths.index(longest) + 1}",
+        f"the line is {longest} characters long",
         "give a table with one row per sample",
     )
     first: Exception | None = None
