@@ -36,8 +36,6 @@ _NARROW: Final = 0.5
 """Part of a half cycle that is fitted where no shape fits the whole of it."""
 _NEIGHBOURS: Final = 10
 """Half cycles on either side over which a harmonic is averaged."""
-_CIRCULAR: Final = 1.0 / 192.0
-"""Third harmonic of a pendulum of 1 rad; it grows with the cube of the amplitude."""
 
 
 def odd_harmonics(
@@ -68,7 +66,7 @@ def odd_harmonics(
     """
     noise = _white(samples, places)
     before, _ = mean_square(measured)
-    if before < (1.0 + _CLEARLY) * noise**2 and not _expected(samples, measured, noise):
+    if before < (1.0 + _CLEARLY) * noise**2:
         return shape, measured, places
     count = float(np.nansum(measured.readings))
     for free in range(1, HARMONICS + 1):
@@ -84,15 +82,6 @@ def odd_harmonics(
         if before < (1.0 + 0.1 * _CLEARLY) * noise**2:
             break
     return _narrowed(samples, places, level, shape, measured, np.hypot(noise, open_error))
-
-
-def _expected(samples: Samples, measured: Measured, noise: float) -> bool:
-    """Whether a pendulum (sin x) of this amplitude would show its third harmonic."""
-    if samples.unit != "rad":
-        return False
-    amplitude = np.nan_to_num(measured.amplitude)
-    effect = _CIRCULAR * amplitude**3 / (noise * np.sqrt(np.nan_to_num(measured.variance, nan=1.0)))
-    return float(np.sum(effect**2)) > 9.0
 
 
 def _narrowed(
