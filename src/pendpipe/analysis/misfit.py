@@ -1,5 +1,7 @@
 """The one error model: what a law's misfit does to errors, by the parts of the motion.
 
+The noise is not here: `analysis.noise` and `diagnosis.noise` have it.
+
 What a wrong law leaves is not noise, which is independent from reading to reading, but an unknown
 function of time, described by a few numbers (its significant Fourier coefficients). In each part
 of the motion (its offset, amplitude, phase, harmonics, and what lies between) it counts as random,

@@ -157,6 +157,8 @@ class StopsError(NoMotionError):
 class Motion:
     """A motion at the nodes of its clock; all arrays of shape (half cycles, order + 1).
 
+    A law is a function of its `angle` x, `velocity` x', `amplitude` r, `direction` and `time_s`.
+
     Parameters
     ----------
     clock
