@@ -14,7 +14,7 @@ from pendpipe.dynamics.eq8 import OFFSET, OMEGA, START, TIME, A, B, C
 from pendpipe.effects import Effect, catalogue
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
-from pendpipe.effects.effect import Span, enters
+from pendpipe.effects.effect import Parameter, Span, enters
 from pendpipe.effects.model import Model, jacobian, pendulum_of, responses
 from pendpipe.errors import InputError
 
@@ -111,6 +111,19 @@ def test_every_declaration_is_whole() -> None:
 def test_the_page_has_every_effect_under_its_name() -> None:
     headings = re.findall(r"^### ([\w-]+)$", manual(), re.MULTILINE)
     assert sorted(headings) == sorted(effect.identifier for effect in CATALOGUE)
+
+
+@pytest.mark.parametrize(
+    ("unit", "power"),
+    [
+        *(("rad", 1), ("rad/s", 1), ("rad^2/s", 2), ("s rad", 1)),
+        *(("1/rad^2", -2), ("1/(rad s)", -1), ("s^3/rad^4", -4), ("kg/rad", -1)),
+        *(("1", 0), ("s", 0), ("grad", 0)),
+    ],
+)
+def test_the_power_of_a_displacement_is_that_of_its_unit(unit: str, power: int) -> None:
+    """A bound of a file in metres is scaled by it."""
+    assert Parameter("size", unit, 0.0, 1.0).power == power
 
 
 def test_units_follow_the_displacements() -> None:

@@ -56,8 +56,8 @@ class Parameter(NamedTuple):
 
     @property
     def power(self) -> int:
-        """The power of the displacement in it: 1 of rad/s, -2 of 1/rad^2."""
-        found = re.match(r"(\w/\(?)?rad(?:\^(\d))?", self.unit)
+        """The power of the displacement in it: 1 of rad/s, -2 of 1/rad^2, -4 of s^3/rad^4."""
+        found = re.search(r"(/.*)?\brad(?:\^(\d))?", self.unit)
         size = int(found[2] or 1) if found else 0
         return -size if found and found[1] else size
 
