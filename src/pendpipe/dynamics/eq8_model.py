@@ -38,7 +38,7 @@ from pendpipe.solve import Priors
 Seen = Literal["angle", "rate", "position"]
 """What of the motion is read: the angle, its rate, or a position L sin x."""
 HYSTERETIC, VISCOUS = "hysteretic", "viscous"
-LOWER: Final = np.array([0.0, 0.0, 0.0, 0.0, 1e-12, -np.inf, -np.inf, -np.inf])
+LOWER: Final = np.array([0.0, 0.0, 0.0, 0.0, 1e-12, -np.inf, -np.inf, -np.inf])  # omega > 0
 UPPER: Final = np.array([np.inf, np.inf, np.inf, 1.0, np.inf, np.inf, np.inf, np.inf])
 """Least and greatest values, in the order of `BASELINE`."""
 SHARES: Final = Priors(np.array([SHARE]), np.array([SHARE_MEAN]), np.array([SHARE_SD]))
@@ -178,12 +178,6 @@ class Eq8Model:
             end[OMEGA] += _BY_SHARE * value[B] ** 2 / value[OMEGA] * step[SHARE] ** 2
         return end
 
-    def parts_of_b(self, share: float) -> tuple[float, float]:
-        """How a change of b goes to its parts: what is held of one leaves it to the other."""
-        if self.parts:
-            share = float(VISCOUS in self.parts)
-        return share, 1.0 - share
-
     def engine_by_values(self, value: FloatArray) -> FloatArray:
         """Derivative of the engine's parameters by ours, and by any behind: square."""
         by_share = 0.0 if self.parts else float(value[B])
@@ -191,6 +185,8 @@ class Eq8Model:
         change[0, A] = change[3, C] = 1.0
         behind = np.arange(OMEGA, len(value))
         change[behind, behind] = 1.0
-        change[1:3, B] = self.parts_of_b(float(value[SHARE]))
+        # What is held of one part leaves a change of b to the other.
+        share = float(VISCOUS in self.parts) if self.parts else float(value[SHARE])
+        change[1:3, B] = share, 1.0 - share
         change[1:3, SHARE] = by_share, -by_share
         return change
