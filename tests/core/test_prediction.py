@@ -38,6 +38,7 @@ def pendulum() -> Any:
     return pp.fit(recorded(PENDULUM, 1.0), restoring="sine")
 
 
+@pytest.mark.slow
 def test_a_spring_is_driven_as_its_transfer_function_says(spring: Any) -> None:
     hertz = np.linspace(0.75, 0.84, 19)
     found = pp.predict(spring, drive=hertz, drive_force=0.1).response
@@ -188,6 +189,7 @@ def test_a_table_that_tells_nothing_is_refused(
         pp.predict(spring, points=tmp_path / "a.csv")
 
 
+@pytest.mark.slow
 def test_the_command_prints_draws_and_writes(tmp_path: Path, capsys: Any) -> None:
     points = table_of(tmp_path / "points.csv", SPRING, 2.0)
     words = [
