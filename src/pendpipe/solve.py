@@ -165,7 +165,9 @@ class Linear(NamedTuple):
                 axes, singular, _ = np.linalg.svd(self.triangle[:, inside], full_matrices=False)
                 seen = singular > _PRECISE * np.max(singular, initial=0.0)
                 pull, squares = (singular * (axes.T @ rest))[seen], singular[seen] ** 2
-                more = max(damping_for(pull, squares, math.sqrt(left)), more)
+                more = max(
+                    damping_for(pull, squares, math.sqrt(left)), (1.0 + _RADIUS_MET) * damping
+                )
             damping = more
 
 
