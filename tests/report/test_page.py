@@ -21,7 +21,16 @@ from pendpipe.files import without_folders
 from pendpipe.physics import sphere_in_tank
 from pendpipe.quantities import with_error
 from pendpipe.recording import Recording
-from pendpipe.report.charts import Axis, Chart, areas, extremes, line, pack, waveform
+from pendpipe.report.charts import (
+    Axis,
+    Chart,
+    areas,
+    extremes,
+    line,
+    pack,
+    quality_by_amplitude,
+    waveform,
+)
 from pendpipe.report.page import BUDGET_BYTES, inline_svg, render
 from pendpipe.report.tables import (
     STATES,
@@ -620,13 +629,23 @@ def test_an_axis_has_round_numbers_where_they_lie(
 
 @pytest.mark.parametrize(("periods", "kind"), [(40, "thin"), (4000, "band")])
 def test_readings_of_many_periods_are_drawn_as_a_band(periods: int, kind: str) -> None:
-    """A line of each reading, or the area between the least and the largest of a period."""
+    """A line of each reading, or the area between the least and the largest of a period.
+
+    It has a point in each pixel of the width, and the axis of Q holds every amplitude.
+    """
     time = np.linspace(0.0, 2.0 * periods, 20 * periods)
     angle = 0.1 * np.exp(-time / time[-1]) * np.cos(np.pi * time)
     recording = Recording(time_s=time, angle_rad=angle)
     points = turning_points(recording)
     decay = Decay("a", points, fit(recording, points=points))
-    assert next(name for name, _ in waveform(recording, decay, np.nan).paths) == kind
+    name, path = waveform(recording, decay, np.nan).paths[0]
+    assert name == kind
+    assert path.count("L") + path.count("M") > 1000
+    quality = quality_by_amplitude(decay)
+    assert quality is not None
+    milliradians = 1e3 * decay.amplitude_rad
+    assert 0.9 * milliradians.min() < quality.x.low < milliradians.min()
+    assert milliradians.max() < quality.x.high < 1.1 * milliradians.max()
 
 
 def test_a_gap_interrupts_the_line() -> None:
