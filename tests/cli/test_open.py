@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -252,6 +253,8 @@ def test_a_signal_ends_it_and_its_copies_and_so_do_two(name: str, tmp_path: Path
         stderr=subprocess.PIPE,
         text=True,
         env={**os.environ, "TMPDIR": str(tmp_path)},
+        # A suite that runs under nohup hands down that a hangup is ignored.
+        preexec_fn=partial(signal.signal, number, signal.SIG_DFL),
     )
     assert process.stderr is not None
     found = re.search(r"http://(127\.0\.0\.1:(\d+))/(\S+)/", process.stderr.readline())
