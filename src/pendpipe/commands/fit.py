@@ -115,14 +115,7 @@ def run(arguments: Arguments) -> int:
     if arguments.record is not None or arguments.refused is not None:
         _stage(arguments)
         return 0
-    figure: Path | None = arguments.figure
-    # A form that nobody can draw is refused before the file is written.
-    refuse_if(
-        figure and figure.suffix not in (".svg", ".png", ".pdf"),
-        f"--figure {figure}",
-        "its format is unknown",
-        "end its name in .svg, .png or .pdf",
-    )
+    figure = figure_of(arguments)
     result = _stored(arguments)
     if result.light == "red":
         why = result.light_reason if arguments.json else "no law is printed"
@@ -136,6 +129,18 @@ def run(arguments: Arguments) -> int:
     if not (arguments.out and is_stream(arguments.out)):
         print_answer(arguments, result.to_dict(), _text(arguments, result))
     return _status(arguments, result)
+
+
+def figure_of(arguments: Arguments) -> Path | None:
+    """The figure that is asked for; a form that nobody can draw is refused before any work."""
+    figure: Path | None = arguments.figure
+    refuse_if(
+        figure and figure.suffix not in (".svg", ".png", ".pdf"),
+        f"--figure {figure}",
+        "its format is unknown",
+        "end its name in .svg, .png or .pdf",
+    )
+    return figure
 
 
 def _stage(arguments: Arguments) -> None:

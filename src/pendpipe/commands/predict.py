@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pendpipe.arguments import FILES, Arguments, command, print_answer
-from pendpipe.commands.fit import OPTIONS, fitted, take_lengths
-from pendpipe.errors import refuse_if
+from pendpipe.commands.fit import OPTIONS, figure_of, fitted, take_lengths
 from pendpipe.files import write_json
 from pendpipe.options import INPUT, OUTPUT, flags, flags_of, given
 from pendpipe.prediction import predict
@@ -42,13 +41,7 @@ PREDICTED: Final = flags_of(predict) | {
 def run(arguments: Arguments) -> None:
     """Fit, predict, print and write."""
     take_lengths(arguments)
-    figure: Path | None = arguments.figure
-    refuse_if(
-        figure and figure.suffix not in (".svg", ".png", ".pdf"),
-        f"--figure {figure}",
-        "its format is unknown",
-        "end its name in .svg, .png or .pdf",
-    )
+    figure = figure_of(arguments)
     fits = list[Any]()
     for file in arguments.files:
         arguments.file = file
