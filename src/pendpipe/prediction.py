@@ -73,7 +73,8 @@ def band(name: str, draws: FloatArray) -> dict[str, FloatArray]:
     NaN where fewer than half of them are numbers.
     """
     few = np.mean(np.isfinite(draws), axis=0) < 0.5
-    limits = np.nanpercentile(np.where(few, 0.0, draws), _PERCENT, axis=0)
+    filled = np.where(few, 0.0, draws)
+    limits = np.nanpercentile(filled, _PERCENT, axis=0) if filled.size else np.empty((3, 0))
     names = f"{name}_low", name, f"{name}_high"
     return dict(zip(names, np.where(few, math.nan, limits), strict=True))
 
@@ -441,7 +442,10 @@ class Prediction:
                     told = [_text(table.iloc[place], each) for each in DECAY]
                     said = "{}{} at {} s, T {} s, Q {}".format(told[0], unit, *told[1:])
                     rows.append((f"turning point {place}", said))
-            if name == "response" and len(table):
+            if name == "response" and table.empty:
+                least = f"{0.1 * low:.2g}{unit}"
+                rows.append(("no state", f"friction holds it, or it swings by less than {least}"))
+            elif name == "response":
                 one = table.iloc[int(table.amplitude.argmax())]
                 where = f"{unit} at {one.frequency_hz:.5g} Hz, phase {_text(one, 'phase_deg')}°"
                 rows.append(("largest state", f"{_text(one, 'amplitude')}{where}"))

@@ -277,6 +277,8 @@ def test_a_class_of_two_is_told_apart_by_another_fluid_and_not_by_repeats() -> N
     again, other = (
         predicted[name] for name in ("the same records once more", "half glycerol, half water")
     )
+    assert again
+    assert other
     for run, values in zip(DESIGN.runs, measured.values, strict=True):
         for number, value in enumerate(values) if run.record in again else ():
             expected = again[run.record][number]

@@ -167,10 +167,16 @@ def test_one_measured_point_tells_the_force_of_all(spring: Any, tmp_path: Path) 
 
 
 def test_a_measured_decay_lies_in_its_band_and_another_pendulum_s_does_not(spring: Any) -> None:
-    for law, most in ((SPRING, 1.0), (Eq8(5.0, viscous=0.06), 0.3)):
+    for law, inside in ((SPRING, True), (Eq8(5.0, viscous=0.06), False)):
         points = pp.turning_points(recorded(law, 0.15, 3))
         held = pp.predict(spring, points=points).compared.groupby("quantity").held.mean()
-        assert (held["amplitude"] > 0.9) == (most == 1.0)
+        assert (held["amplitude"] > 0.9) == inside
+
+
+def test_a_force_that_moves_nothing_is_said_to(spring: Any) -> None:
+    found = pp.predict(spring, drive=[0.5, 0.8], drive_force=1e-9)
+    assert found.response.empty
+    assert "no state" in str(found)
 
 
 @pytest.mark.parametrize(
