@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from pendpipe.prediction import predict
     from pendpipe.reading import inspect, read
     from pendpipe.recording import Recording
+    from pendpipe.reliability import judge
     from pendpipe.simulation.verbs import simulate
 
 __all__ = [
@@ -46,6 +47,7 @@ __all__ = [
     "fit",
     "fit_many",
     "inspect",
+    "judge",
     "physics",
     "predict",
     "read",
@@ -61,6 +63,7 @@ _HOMES = {
     "acquire": "acquisition.verbs",
     "fit_many": "batch",
     "inspect": "reading",
+    "judge": "reliability",
     "predict": "prediction",
     "read": "reading",
     "simulate": "simulation.verbs",
