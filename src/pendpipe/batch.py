@@ -11,6 +11,8 @@ from pendpipe.process import cores, in_order
 from pendpipe.recording import Recording
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from pendpipe.analysis.fit.result import FitResult
     from pendpipe.api import Source
 
@@ -19,6 +21,7 @@ def fit_many(
     recordings: Iterable[Source],
     *,
     processes: int | None = None,
+    executor: Executor | None = None,
     progress: bool | None = None,
     **options: Any,
 ) -> Iterator[FitResult | InputError]:
@@ -33,6 +36,10 @@ def fit_many(
         How many fit at once; by default one for each core that this process may use. 1 starts none.
         A script that runs on Windows or macOS calls `fit_many` below
         ``if __name__ == "__main__":``.
+    executor
+        What runs the fits instead of processes of our own: any executor of `concurrent.futures`'
+        kind, such as a cluster's (Dask's ``client.get_executor()``, mpi4py's ``MPIPoolExecutor``).
+        It is left open. `processes` is then how many fits it runs at once.
     progress
         Whether a bar is drawn; by default where standard error is a terminal.
     **options
@@ -58,19 +65,20 @@ def fit_many(
         processes is not None and processes < 1, "processes", f"{processes} are too few", "give 1"
     )
     work = partial(_fit, options)
-    return _with_bar(work, recordings, processes or cores(), progress)
+    number = processes or cores()
+    total = len(recordings) if isinstance(recordings, Sized) else None
+    fitted = in_order(work, enumerate(recordings, start=1), number, executor)
+    return _with_bar(fitted, total, progress)
 
 
 def _with_bar(
-    work: Any, recordings: Iterable[Source], number: int, progress: bool | None
+    fitted: Iterator[FitResult | InputError], total: int | None, progress: bool | None
 ) -> Iterator[FitResult | InputError]:
     from tqdm import tqdm
 
-    total = len(recordings) if isinstance(recordings, Sized) else None
     silent = None if progress is None else not progress
-    jobs = enumerate(recordings, start=1)
     with tqdm(total=total, unit=" fits", disable=silent) as bar:
-        for result in in_order(work, jobs, number):
+        for result in fitted:
             bar.update()
             yield result
 

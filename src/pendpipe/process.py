@@ -1,16 +1,18 @@
 """Our processes: one thread each, memory that is kept, and how many do something side by side."""
 
+from __future__ import annotations
+
 import os
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import chdir
+from contextlib import chdir, nullcontext
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
+    from concurrent.futures import Executor, Future
 
 ONE_THREAD: Final = {
     "OMP_NUM_THREADS": "1",
@@ -77,18 +79,23 @@ def cores() -> int:
         return os.cpu_count() or 1
 
 
-def in_order(work: Callable[[Any], Any], jobs: Iterable[Any], number: int) -> Iterator[Any]:
+def in_order(
+    work: Callable[[Any], Any],
+    jobs: Iterable[Any],
+    number: int,
+    executor: Executor | None = None,
+) -> Iterator[Any]:
     """Map over `jobs`, `number` of them side by side; as many as can be used are taken ahead.
 
-    1 starts no process.
+    1 starts no process. An `executor` of the caller's takes the jobs instead, and is left open.
     """
-    if number == 1:
+    if number == 1 and executor is None:
         yield from map(work, jobs)
         return
     from concurrent.futures import ProcessPoolExecutor
 
     left = iter(jobs)
-    with ProcessPoolExecutor(number) as pool:
+    with nullcontext(executor) if executor else ProcessPoolExecutor(number) as pool:
         waiting: deque[Future[Any]] = deque()
         try:
             waiting.extend(pool.submit(work, job) for job in islice(left, _AHEAD * number))
@@ -96,4 +103,5 @@ def in_order(work: Callable[[Any], Any], jobs: Iterable[Any], number: int) -> It
                 yield waiting.popleft().result()
                 waiting.extend(pool.submit(work, job) for job in islice(left, 1))
         finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+            for each in waiting:
+                each.cancel()

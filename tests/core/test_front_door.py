@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -58,6 +59,11 @@ def test_the_lines_of_the_readme_answer(capsys: pytest.CaptureFixture[str], tmp_
     assert fit.plot().axes[0].get_xlabel() == "Time (s)"
     with pytest.raises(pp.errors.InputError, match=r"plot: .*take that of pendpipe\.fit"):
         replace(fit, drawn_by=None).plot()
+    fit.save(tmp_path / "data", figures=False)
+    assert {path.name for path in (tmp_path / "data").iterdir()} == {
+        "fit.json",
+        "turning_points.csv",
+    }
     fit.save(tmp_path / "fit")
     pp.diagnose(names["recording"]).save(tmp_path / "fit")
     made = {path.name for path in (tmp_path / "fit").iterdir()}
@@ -174,6 +180,20 @@ def test_recordings_are_read_as_their_fits_are_taken(processes: int) -> None:
         assert read <= taken + _AHEAD * processes
     assert isinstance(fits, Iterator)
     fits.close()  # type: ignore[attr-defined]
+
+
+def test_an_executor_of_the_caller_runs_the_fits_and_is_left_open() -> None:
+    """As a cluster's does: it gets no more than it was told that it runs, and outlives the fits."""
+    with ThreadPoolExecutor(2) as executor:
+        given = [decay(1), "no such file.csv", decay(2)]
+        fits = list(pp.fit_many(given, executor=executor, processes=1))
+        assert [isinstance(each, pp.InputError) for each in fits] == [False, True, False]
+        left = pp.fit_many([decay(1)] * 9, executor=executor, processes=2)
+        next(left)
+        left.close()  # type: ignore[attr-defined]
+        assert executor.submit(int, "3").result() == 3
+    with pytest.raises(RuntimeError, match="shutdown"):
+        list(pp.fit_many([decay(1)], executor=executor))
 
 
 def test_options_are_those_of_a_fit_and_a_bar_counts(capsys: pytest.CaptureFixture[str]) -> None:

@@ -201,18 +201,20 @@ class FitResult(Fitted):
         found |= {name: each for name, each in self.damping().items() if name != "amplitude_rad"}
         return found | {"Q": self["Q"]} | ({} if limit is None else {"Q limit": limit}) | shares
 
-    def save(self, folder: str | Path, *, force: bool = False) -> Path:
+    def save(self, folder: str | Path, *, figures: bool = True, force: bool = False) -> Path:
         """Write ``fit.json`` and, with the readings, ``turning_points.csv`` and ``fit.svg``.
 
         Returns the folder, which is made where it does not exist. Files of these names that
-        pendpipe did not make are replaced only with `force`.
+        pendpipe did not make are replaced only with `force`. A fit takes milliseconds and its
+        figure half a second: ``figures=False`` writes the data alone.
         """
         target = Path(folder)
         with writing(force=force):
             write_json(target / "fit.json", self.to_dict())
             if self.points is not None and self.drawn_by is not None:
                 write_turning_points(target / "turning_points.csv", self.points)
-                self.drawn_by().write(self.plot(), target / "fit")
+                if figures:
+                    self.drawn_by().write(self.plot(), target / "fit")
         return target
 
     def to_dict(self) -> dict[str, Any]:
