@@ -1063,6 +1063,14 @@ def torn(time: FloatArray) -> FloatArray:
     return stamps
 
 
+def set_ahead(time: FloatArray) -> FloatArray:
+    """A clock that is 969.5 s ahead for some rows on end, thrice, until it is set."""
+    stamps = time.copy()
+    for first, rows in ((200, 11), (260, 16), (1500, 40)):
+        stamps[first : first + rows] += 969.5
+    return stamps
+
+
 def slowing(time: FloatArray) -> FloatArray:
     return np.where(time < 100.0, np.floor(10.0 * time + 1e-9) / 10.0, time)
 
@@ -1113,6 +1121,9 @@ FORMS = {
         lambda t: [f"{x:.6f}" for x in arrival(t)], within_s=0.25, said="as of arrival"
     ),
     "one in fifty torn": Form(lambda t: [f"{x:.3f}" for x in torn(t)], said="interpolated"),
+    "ahead until it is set": Form(
+        lambda t: [f"{x:.3f}" for x in set_ahead(t)], said="interpolated"
+    ),
 }  # fmt: skip
 
 
@@ -1130,6 +1141,23 @@ def test_rows_are_read_at_their_times(tmp_path: Path, form: str) -> None:
     np.testing.assert_allclose(time_s, MINUTES_S, atol=within_s)
     np.testing.assert_allclose(recording.values, MINUTES_RAD, atol=1e-5)
     assert said in " ".join((*recording.notes, *recording.weak_guesses))
+
+
+def test_a_wander_is_no_period_and_rows_before_a_clock_is_set_are_left_out(tmp_path: Path) -> None:
+    """An hour with one decay in it: milliseconds since 1970, of which the first 70 are ahead."""
+    time = np.arange(72_000) / 20.0
+    yaw = np.repeat(RANDOM.normal(0.0, 20.0, 720), 100) + 90.0 * np.sin(np.pi * time / 900.0)
+    pitch = np.where(time > 3000.0, np.exp(-(time - 3000.0) / 600.0), 0.0)
+    pitch = 6.0 * pitch * np.sin(2.0 * np.pi * time / 1.8) + RANDOM.normal(0.0, 0.02, len(time))
+    stamps = 1_492_552_800_000 + np.rint(1e3 * (time + 969.512 * (time < 3.5))).astype(np.int64)
+    rows = [f"{t},{a:.2f},{x:.3f}\n" for t, a, x in zip(stamps, yaw, pitch, strict=True)]
+    path = tmp_path / "a.csv"
+    path.write_text("TM,YW,PT\n" + "".join(rows[::-1]))
+    recording = read(path)
+    np.testing.assert_allclose(recording.time_s, time[70:] - 3.5, atol=1e-3)
+    np.testing.assert_allclose(recording.values, pitch[70:], atol=1e-3)
+    assert "70 row(s) at the ends left out" in " ".join(recording.notes)
+    assert recording.metadata["recorded_at"] == "1492552803.500000 s since 1970"
 
 
 def test_true_stamps_of_uneven_rows_stay(tmp_path: Path) -> None:

@@ -385,13 +385,13 @@ def _readings(
 
 def _of_equals(equals: Sequence[tuple[Column, ...]]) -> tuple[tuple[Column, ...], str]:
     """The first of equals, unless another swings far more, or it is a drive."""
-    # Of columns without a name some wander, through a few cycles at most, and one swings.
-    often = [each for each in equals if each[0].swing.clear and _cycles(each[0]) > 8.0] or equals
+    # Some wander, through a few cycles at most, and one swings.
+    often = [each for each in equals if each[0].swing.clear and not each[0].wanders] or equals
     clearest = max(column[0].swing.clarity for column in often)
     clear = [each for each in often if each[0].swing.clarity >= 0.7 * clearest]
     hardly = equals[0][0].swing.clarity < 0.5 * clearest
     wander = len(clear) == 1 < len(equals) or (hardly and len(clear) < len(equals))
-    wander = wander and clear[0][0].swing.clear and not clear[0][0].name
+    wander = wander and clear[0][0].swing.clear
     equals = clear if wander else equals
     first = equals[0]
     if len(equals) == 1 or len(first) > 1:
@@ -416,10 +416,6 @@ def _of_equals(equals: Sequence[tuple[Column, ...]]) -> tuple[tuple[Column, ...]
     largest = max(column[0].swing.amplitude for column in equals)
     wide = next(c for c in equals if c[0].swing.amplitude >= largest / 3)
     return wide, "" if wide is first else ", which swings most"
-
-
-def _cycles(column: Column) -> float:
-    return len(column.values) / max(column.swing.samples_per_cycle, 1.0)
 
 
 def _not_a_derivative(

@@ -28,6 +28,8 @@ ABSURD: Final = 1e100
 """Beyond this nothing was measured; squares of it are no numbers."""
 FEWEST: Final = 8
 """Readings that show a swing: of two cycles, four in each."""
+_WANDER: Final = 8.0
+"""Cycles up to which what moves may as well drift: the lowest of the bins that are looked at."""
 _LOOKED_AT: Final = 1 << 15
 """Samples of a long column that are transformed: means of neighbours."""
 _CLEAR: Final = 0.25
@@ -518,6 +520,11 @@ class Column:
     def swing(self) -> Swing:
         """Its strongest oscillation."""
         return swing_of(self.clean)
+
+    @property
+    def wanders(self) -> bool:
+        """Whether its strongest oscillation is too slow to tell from a drift."""
+        return len(self.values) <= _WANDER * self.swing.samples_per_cycle
 
     @property
     def label(self) -> str:

@@ -1,5 +1,6 @@
 """The times of the rows: in seconds, in order, evened out where their stamps are coarse."""
 
+from bisect import bisect_right
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Final
@@ -52,6 +53,8 @@ _ROUNDED: Final = 0.02
 """Share of the rows with the stamp of the row above that tells rounded stamps from copies."""
 _MOST_MISSING: Final = 0.02
 """Of the rows, beyond which missing frames make any interval fit."""
+_MOST_TORN: Final = 0.05
+"""Share of stamps off the longest rise that are interpolated, since their rows stay."""
 _TRIES, _ROUNDS = 21, 8
 """Numbers of missing frames that are tried, and lines through the stamps of each count."""
 _FEW_TRIES: Final = 3
@@ -226,7 +229,9 @@ def _time_unit(
     period = 0.0 if listed else _period(reading, values)
     for least, factor, name in _EPOCHS:
         ticks = factor < 1.0 and float(np.ptp(values)) > 0.1 * largest
-        if largest > least and not ticks and factor * period < _LONGEST_S:
+        # What wanders shows no period that would be none since 1970.
+        short = reading.wanders or factor * period < _LONGEST_S
+        if largest > least and not ticks and short:
             said = f"'{column.label}' counts {name} since 1970"
             return factor, Fact("unit of time", name, "shown", said, _OTHER_PERIODS)
     return _time_by_size(column, period, values)
@@ -269,12 +274,9 @@ def _in_order(
     """Turn times that are out of order, or repeat, into times that rise; or refuse them."""
     if one_way(base.time_s) > ONE_WAY and base.time_s[-1] < base.time_s[0]:
         base.keep(slice(None, None, -1), "the newest row stands first: rows turned round")
-    if len(base.time_s) and abs(base.time_s[0]) > _EPOCH:
-        start = float(base.time_s[0])
-        base.metadata["recorded_at"] = f"{start:.6f} s since 1970"
-        said = f"times are counted from the first row ({start:.6f} s on its clock)"
-        base.say("clock", f"from {start:.6f} s", said, "stated")
-        base.time_s = base.time_s - start
+    start = float(base.time_s[0]) if len(base.time_s) else 0.0
+    dated = abs(start) > _EPOCH
+    base.time_s = base.time_s - start * dated
     if np.diff(base.time_s).min(initial=1.0) <= 0:
         # What lies before --start, or behind --stop, need not be in order.
         start_s, stop_s = options.start_s, options.stop_s
@@ -299,6 +301,11 @@ def _in_order(
     if steps.min(initial=1.0) > 0:
         _count_late_rows(choice, base)
         _without_lone_ends(base)
+        if dated:
+            start, base.time_s = start + base.time_s[0], base.time_s - base.time_s[0]
+            base.metadata["recorded_at"] = f"{start:.6f} s since 1970"
+            said = f"times are counted from the first row ({start:.6f} s on its clock)"
+            base.say("clock", f"from {start:.6f} s", said, "stated")
         return base
     at = int(np.argmax(steps <= 0))
     verb = "repeats" if steps[at] == 0 else "falls"
@@ -453,22 +460,38 @@ def _through_packets(_choice: Choice, base: TimeBase) -> None:
 
 
 def _interpolate_torn(_choice: Choice, base: TimeBase) -> None:
-    """Interpolate stamps that fall out of a time that rises without them."""
-    padded = np.concatenate(([-np.inf], base.time_s, [np.inf]))
-    at = np.flatnonzero(np.diff(base.time_s) < 0)
-    # Either the stamp before a fall is too late, or the one behind it too early.
-    wrong = np.where(padded[at + 3] >= padded[at + 1], at + 1, at)
-    good = np.delete(np.arange(len(base.time_s)), wrong)
+    """Interpolate stamps off the longest rise of them, and leave out rows that are off its ends.
+
+    So a clock that was set for a while, and torn digits, stand in an otherwise rising time.
+    """
+    good = _longest_rise(base.time_s)
+    torn = len(base.time_s) - len(good)
     rows, steps = np.diff(good), np.diff(base.time_s[good])
     # Behind a clock that was set back the next row comes too soon.
     far = rows > 1
     soon = far.any() and np.any(steps[far] < 0.5 * rows[far] * np.median(steps))
-    inside = not {0, len(base.time_s) - 1} & set(wrong.tolist())
-    few = 0 < len(wrong) <= 0.05 * len(good)
-    if few and inside and not soon and steps.min(initial=0.0) >= 0.0:
-        base.time_s = np.interp(np.arange(len(base.time_s)), good, base.time_s[good])
-        said = f"{len(wrong)} time stamp(s) that fall out of order interpolated"
-        base.say("clock", f"{len(wrong)} interpolated", said)
+    if not 0 < torn <= _MOST_TORN * len(good) or soon:
+        return
+    base.time_s = np.interp(np.arange(len(base.time_s)), good, base.time_s[good])
+    said = f"{torn} time stamp(s) that fall out of order interpolated"
+    base.say("clock", f"{torn} interpolated", said)
+    ends = len(base.time_s) - 1 - int(good[-1] - good[0])
+    if ends:
+        inside = slice(int(good[0]), int(good[-1]) + 1)
+        base.keep(inside, f"{ends} row(s) at the ends left out, whose stamps are out of order")
+
+
+def _longest_rise(time: FloatArray) -> IntArray:
+    """Rows of the longest series of stamps that do not fall (patience sorting), shape (k,)."""
+    least, rows, before = list[float](), list[int](), list[int]()
+    for row, stamp in enumerate(time.tolist()):
+        at = bisect_right(least, stamp)
+        before.append(rows[at - 1] if at else -1)
+        least[at : at + 1], rows[at : at + 1] = [stamp], [row]
+    chain = rows[-1:]
+    while before[chain[-1]] >= 0:
+        chain.append(before[chain[-1]])
+    return np.array(chain[::-1])
 
 
 def _rounded(time: FloatArray, lines: IntArray | None = None) -> FloatArray | None:
