@@ -277,8 +277,8 @@ def judge(
 ) -> dict[str, Any]:
     """What the library answers on the readings."""
     from pendpipe.campaign.design import design_of
-    from pendpipe.campaign.diagnose import search
     from pendpipe.campaign.fit import coefficient, joint_fit, loss_torques, measured, named
+    from pendpipe.campaign.search import search
     from pendpipe.campaign.values import campaign_values
     from pendpipe.configuration.load import load_campaign, read_configuration
 

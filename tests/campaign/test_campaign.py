@@ -12,16 +12,7 @@ from pendpipe import physics
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.arrays import FloatArray
 from pendpipe.campaign.design import height_sd, terms_of
-from pendpipe.campaign.diagnose import (
-    campaign_diagnosis,
-    farthest,
-    global_p_value,
-    held_out,
-    local_scores,
-    next_measurements,
-    quoted_coefficient,
-    search,
-)
+from pendpipe.campaign.diagnose import campaign_diagnosis, quoted_coefficient
 from pendpipe.campaign.effects import CATALOGUE
 from pendpipe.campaign.fit import (
     Candidate,
@@ -36,6 +27,8 @@ from pendpipe.campaign.fit import (
     only,
     predict,
 )
+from pendpipe.campaign.next_runs import next_measurements
+from pendpipe.campaign.search import farthest, global_p_value, held_out, local_scores, search
 from pendpipe.campaign.tank import Surface, by_depth, confined, told
 from pendpipe.configuration.load import load_campaign, read_configuration
 from pendpipe.estimate import Estimate

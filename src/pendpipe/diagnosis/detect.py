@@ -29,6 +29,7 @@ from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import plane_band_hz
 from pendpipe.effects.curves import Curve
 from pendpipe.estimate import Z95
+from pendpipe.score import Trials, trials_of
 
 _OVERSAMPLING: Final = 2
 """Frequencies in an interval of 1/duration."""
@@ -381,18 +382,13 @@ RED_NOISE_SHARE: Final = 0.2
 TESTS_SHARE: Final = 1.0 - CATALOGUE_SHARE - RED_NOISE_SHARE
 """Part of it that the tests of the measurement share."""
 DRAWS: Final = 256
-"""Spectra drawn for the null: a chance of one half is known to 3 %; the tail by `_TAIL_SHARE`."""
+"""Spectra drawn for the null: a chance of one half is known to 3 %; the tail by `TAIL_SHARE`."""
 FEW_DRAWS: Final = 64
 """Draws for a first look: they determine the number of trials to 20 %."""
 _DRAWS_AT_ONCE: Final = 32
 """Draws computed together: few enough for the processor's cache."""
 _DRAWN_AT_ONCE: Final = 1 << 21
 """Numbers of white residuals computed together, for memory's sake."""
-_TAIL_SHARE: Final = 0.4
-"""Part of the draws, those of the smallest p-values, that determines the number of trials."""
-_TRIALS_EXPONENT: Final = 0.5
-"""Exponent of ln p in the number of trials: a scan over one continuous shape has trials
-proportional to the root of the threshold in chi^2 (Rice's formula), about -2 ln p."""
 
 
 _DECAY_TIMES: Final = (0.06, 0.25)
@@ -406,32 +402,6 @@ _FEWEST_CYCLES: Final = 3.0
 """Fewest cycles of a tone in the record; slower ones are drifts."""
 _LOWEST_MODE: Final = 1.3
 """Lowest frequency of a decaying second mode, over the motion's."""
-
-
-@dataclass(frozen=True)
-class Trials:
-    """The effective number of independent trials of a scan.
-
-    P(smallest local p-value < p) = 1 - (1 - p)^m(p), with m = first (ln p/ln usual)^growth
-    for p below usual: the rarer the event, the more trials a scan over continuous shapes has.
-    """
-
-    first: float
-    growth: float
-    usual: float = 0.05
-    """The p-value at which the trials were counted."""
-
-    def number_at(self, log_local: float) -> float:
-        """Return the number of trials at a local p-value of exp(`log_local`)."""
-        rarer = max(log_local / math.log(self.usual), 1.0)
-        return float(max(self.first * rarer**self.growth, 1.0))
-
-    def global_p_value(self, local: float) -> float:
-        """Return the probability that chance gives such a local p-value anywhere in the scan."""
-        if local <= 0.0:
-            return 0.0
-        trials = self.number_at(math.log(local))
-        return float(-math.expm1(trials * math.log1p(-min(local, 1.0 - 1e-15))))
 
 
 @dataclass(frozen=True)
@@ -549,12 +519,12 @@ def draw_chance(scanner: Scanner, seed: int, draws: int = DRAWS) -> Chance:
         for name, parts in zip(rows, zip(*largest, strict=True), strict=True)
     }
     own = {
-        name: Trials(1.0, 0.0) if len(rows[name]) == 1 else _trials(local)
+        name: Trials(1.0, 0.0) if len(rows[name]) == 1 else trials_of(local)
         for name, local in found.items()
     }
     tone = np.exp(-_loudest(scanner.scans, generator.exponential(size=draws)))
     smallest = np.min([tone, *found.values()], axis=0)
-    return Chance(_trials(smallest), own, draws)
+    return Chance(trials_of(smallest), own, draws)
 
 
 def _loudest(scans: Sequence[ToneScan], rare: FloatArray) -> FloatArray:
@@ -629,15 +599,3 @@ def _tone_leads(
                 found.append(Lead(effect, tuple(shape), float(scores[index]), p_value))
         leads += sorted(found, key=lambda lead: (max(lead.p_value, _SURE), -lead.score))[:1]
     return leads
-
-
-def _trials(smallest: FloatArray) -> Trials:
-    """Estimate the number of trials from the smallest p-values of many draws: 1 - F = (1 - p)^m."""
-    ordered = np.sort(smallest)
-    draws = len(ordered)
-    rank = (np.arange(1, draws + 1) - 0.3) / (draws + 0.4)
-    trials = np.log1p(-rank) / np.log1p(-np.minimum(ordered, 1.0 - 1e-12))
-    part = slice(max(2, draws // 50), int(_TAIL_SHARE * draws))
-    middle = float(np.exp(np.mean(np.log(trials[part]))))
-    at = float(np.exp(np.mean(np.log(ordered[part]))))
-    return Trials(max(middle, 1.0), _TRIALS_EXPONENT, min(at, 0.5))

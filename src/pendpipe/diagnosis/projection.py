@@ -31,6 +31,7 @@ from pendpipe.diagnosis.refine import Fit, pulled, span_of
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.effects import Effect
 from pendpipe.effects.model import responses
+from pendpipe.score import unit_rows
 
 _KNOWN: Final = 1e-6
 """Variance of ln S below which it is known."""
@@ -82,12 +83,9 @@ def scores_and_lengths(
         length, and the lengths of that (inf where nothing remains); shape (shapes,). The size is
         score/length, and lowers chi^2 by score^2.
     """
-    columns = whitened(base, noise, effect, shapes)[:: effect.sizes]
-    basis = tangent_basis(base)
-    columns -= (columns @ basis) @ basis.T
-    lengths = np.linalg.norm(columns, axis=1)
-    lengths[lengths == 0.0] = np.inf
-    return columns @ base.residual / lengths, lengths
+    rows = whitened(base, noise, effect, shapes)[:: effect.sizes]
+    units, lengths = unit_rows(rows, tangent_basis(base))
+    return units @ base.residual, lengths
 
 
 def finer_shape(

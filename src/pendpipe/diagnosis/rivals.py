@@ -17,7 +17,6 @@ from pendpipe.diagnosis.detect import (
     Chance,
     Detection,
     Lead,
-    Trials,
 )
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.projection import finer_shape
@@ -38,10 +37,9 @@ from pendpipe.dynamics.eq8 import OMEGA
 from pendpipe.effects import Effect
 from pendpipe.effects.curves import Curve
 from pendpipe.estimate import Estimate
+from pendpipe.score import CLASS, Trials
 from pendpipe.solve import Search
 
-CLASS: Final = 6.0
-"""Twice the log-likelihood ratio within which effects are of one class."""
 _SHAPE_CHARGE: Final = 2.0
 """Charge for a fitted shape (Akaike)."""
 _FORM_SD: Final = 3.0

@@ -22,7 +22,6 @@ from pendpipe.diagnosis.detect import (
     CATALOGUE_SHARE,
     RED_NOISE_SHARE,
     Lead,
-    Trials,
     build_bank,
     detect,
     more_leads,
@@ -72,6 +71,7 @@ from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES
 from pendpipe.quantities import compact
+from pendpipe.score import Trials
 
 
 def with_other_noise(state: Hypothesis, task: Task) -> Hypothesis:

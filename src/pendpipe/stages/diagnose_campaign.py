@@ -53,7 +53,8 @@ def run(arguments: Arguments) -> int:
 
 def diagnose_campaign(campaign: Campaign, folder: Path) -> dict[str, Any]:
     """Return the content of campaign_diagnosis.json, from the records' results in a folder."""
-    from pendpipe.campaign.diagnose import BASELINE, campaign_diagnosis, search
+    from pendpipe.campaign.diagnose import BASELINE, campaign_diagnosis
+    from pendpipe.campaign.search import search
 
     provenance = {"version": __version__, "code": code_version(__name__)}
     results = read_results(campaign, folder)
