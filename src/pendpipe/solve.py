@@ -109,6 +109,11 @@ class Linear(NamedTuple):
         lengths[self.free] = longest = np.maximum(lengths[self.free], self.scale)
         return self._replace(triangle=self.triangle * (self.scale / longest), scale=longest)
 
+    def pulled(self, gradient: FloatArray) -> Self:
+        """The same with another gradient, g of `of_normal`, shape (n,)."""
+        right = np.linalg.solve(self.triangle.T, gradient[self.free] / self.scale)
+        return self._replace(right=np.asarray(right, dtype=np.float64))
+
     def falls(self, step: FloatArray) -> float:
         """By how much chi^2 falls along a step of all values."""
         change = self.triangle @ (self.scale * step[self.free])
@@ -195,7 +200,6 @@ def of_normal(
     """The linear problem of ``d' H d/2 - g' d`` in what is free of d, with a root of H."""
     chosen = np.arange(len(normal)) if free is None else np.asarray(free, dtype=np.int64)
     part, scale = _scaled(normal, chosen)
-    right = gradient[chosen] / scale
     try:
         root = np.asarray(np.linalg.cholesky(part).T)
     except np.linalg.LinAlgError:
@@ -204,8 +208,7 @@ def of_normal(
         # A hair for what the readings do not tell apart.
         squares, axes = np.linalg.eigh(part)
         root = np.sqrt(np.maximum(squares, _HAIR))[:, None] * axes.T
-    turned = np.asarray(np.linalg.solve(root.T, right), dtype=np.float64)
-    return Linear(root, scale, turned, chosen)
+    return Linear(root, scale, np.zeros(0), chosen).pulled(gradient)
 
 
 def bounded_step(
@@ -706,7 +709,9 @@ def covariance(
 
 def _others(size: int, held: Iterable[int]) -> IntArray:
     """Indices of what is not held."""
-    return np.setdiff1d(np.arange(size), np.fromiter(held, dtype=np.int64))
+    free = np.ones(size, dtype=bool)
+    free[list(held)] = False
+    return np.flatnonzero(free)
 
 
 def _scaled(normal: FloatArray, free: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -797,9 +802,10 @@ def _profiled_end(
     if not most > 0.0:
         return float(value[index])
     end, moved = min(abs(half), most), np.zeros(len(value))
+    others = of_normal(normal, gradient, _others(len(value), (*held, index)))
     for _ in range(_NEWTON):
         moved[index] = side * end
-        step = moved + bounded_step(normal, gradient - normal @ moved, room, (*held, index))
+        step = moved + others.pulled(gradient - normal @ moved).step(room)[0]
         pull = normal @ step - gradient
         risen, slope = float(step @ (pull - gradient)), 2.0 * side * float(pull[index])
         before, end = end, most
