@@ -505,6 +505,21 @@ def test_white_noise_is_measured_through_a_motion() -> None:
     assert noise_rms(SMOOTH + noise) == pytest.approx(3e-4, rel=0.05)
 
 
+@pytest.mark.parametrize(("size", "speed", "at_s"), [(0.02, 4.0, 4.0), (0.03, 4.0, 3.1)])
+def test_turning_points_ascend_where_a_blow_makes_a_swing_of_its_own(
+    size: float, speed: float, at_s: float
+) -> None:
+    """As the beam that is bowed again: a fit of what does not ascend ended in an error of ours."""
+    time_s = np.arange(3000) / 50.0
+    late = time_s - at_s
+    blow = size * np.exp(-4.0 * late**2) * np.sin(speed * math.pi * late)
+    values = 0.05 * np.exp(-0.02 * time_s) * np.cos(math.pi * time_s) + blow
+    values += 1e-4 * np.random.default_rng(1).standard_normal(3000)
+    points = find_turning_points(Recording(time_s, values, "angle_rad"))
+    assert np.all(np.diff(points.time_s) > 0.0)
+    assert len(points) > 55
+
+
 def test_a_motion_alone_leaves_next_to_nothing() -> None:
     """52 readings in a half cycle leak by (pi/52)^4/sqrt(70) of the amplitude."""
     assert white_rms(SMOOTH) < (math.pi / 52) ** 4 / math.sqrt(70.0)

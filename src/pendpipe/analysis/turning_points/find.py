@@ -604,7 +604,7 @@ def finished(
     rounding = undithered_rms(clear, samples.step, noise)
     return TurningPoints(
         half_cycle=places.number[keep] - places.number[keep][0],
-        time_s=places.centre_s[keep] + measured.phase(noise)[keep] / rate,
+        time_s=_turning_s(places, measured, noise)[keep],
         time_sd_s=np.hypot(np.minimum(sine_sd / clear, 1.0), phase) / rate,
         angle_rad=side * turned,
         angle_sd_rad=np.sqrt((sd * height) ** 2 + (relative * clear) ** 2 + rounding**2),
@@ -632,7 +632,7 @@ def _late(
 
 
 def kept(samples: Samples, places: Places, measured: Measured) -> BoolArray:
-    """Half cycles that hold enough readings, and whose turning lies among the readings.
+    """Half cycles that hold enough readings, and turn among the readings, one after the other.
 
     A record that ends at rest ends here with the last half cycle that is seen.
     """
@@ -640,7 +640,16 @@ def kept(samples: Samples, places: Places, measured: Measured) -> BoolArray:
     inside = (turning >= samples.time_s[0] - slack) & (turning <= samples.time_s[-1] + slack)
     keep = inside & (measured.coverage > _LEAST_SHARE * _usual(measured.coverage))
     keep[last_seen(measured, samples.noise_rms) + 1 :] = False
+    when = _turning_s(places, measured, samples.noise_rms)[keep]
+    before, after = np.maximum.accumulate(when), np.minimum.accumulate(when[::-1])[::-1]
+    # Where a disturbed motion turns too soon, its phase is no half cycle's.
+    keep[keep] = np.append(True, when[1:] > before[:-1]) & np.append(when[:-1] < after[1:], True)
     return np.asarray(keep)
+
+
+def _turning_s(places: Places, measured: Measured, noise: float) -> FloatArray:
+    """When each half cycle turns, shape (k,)."""
+    return places.centre_s + measured.phase(noise) / places.angular_frequency
 
 
 def last_seen(measured: Measured, noise: float) -> int:
@@ -668,7 +677,7 @@ def _notes(samples: Samples, keep: BoolArray, level: Level) -> tuple[str, ...]:
     inner = keep[int(np.argmax(keep)) : len(keep) - int(np.argmax(keep[::-1]))]
     lost = int(np.count_nonzero(~inner))
     notes = (
-        (lost, f"{lost} half cycle(s) are left out for lack of readings"),
+        (lost, f"{lost} half cycle(s) are left out: too few readings, or out of order"),
         (level.wanders, "the offset wanders; it is followed by local lines"),
         (
             samples.held,
