@@ -24,8 +24,6 @@ STEP: Final = 1e-4
 _APPROACH: Final = (1e-4, 1e-2)
 """Weights of the data on the way to the optimum. Where weights nearly balance, the frequency that
 is configured can be several times the measured one, by a million of its standard deviations."""
-_TOLERANCE: Final = 1e-9
-"""Of chi^2: 3e-5 of a standard deviation."""
 
 
 class Candidate(NamedTuple):
@@ -229,7 +227,7 @@ def joint_fit(
         for weight in (*(_APPROACH if start is None else ()), 1.0):
             weighted = data._replace(whitening=weight * data.whitening)
             problem = Problem(partial(_weighted, design, weighted, added), bounds)
-            found = minimise(problem, first, tolerance=_TOLERANCE)
+            found = minimise(problem, first)
             first = found.value
         return JointFit(design, data, added, first, -found.point.residual, found.point.columns)
 
