@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
@@ -105,7 +106,7 @@ class Reliability:
         if count:
             lines.append(
                 f"95 % intervals hold {held} of {count} numbers ({100 * held / count:.0f} %);"
-                f" pulls of sd {np.sqrt(np.mean(self.sizes['pull'] ** 2)):.2f},"
+                f" the median pull is {np.median(np.abs(self.sizes['pull'])):.2f} (0.67),"
                 f" p = {self.sizes_p_value:.2g}"
             )
         return "\n".join(lines)
@@ -175,7 +176,9 @@ def judge(answers: Iterable[Diagnosis | Mapping[str, Any]], truths: Iterable[Tru
                 value = known[name]["value"]
                 low, high = Estimate.from_json(known[name]).bounds95
                 half = high - value if true > value else value - low
-                pull = (true - value) * Z95 / half
+                off = float(true - value)
+                # An interval may end at its value.
+                pull = Z95 * off / half if half else math.copysign(math.inf, off)
                 sizes.append((number, effect["id"], name, pull, bool(low <= true <= high)))
     return Reliability(
         pd.DataFrame(names, columns=["answer", "id", "probability", "true"]),

@@ -73,6 +73,13 @@ def test_a_skew_interval_is_measured_on_the_side_of_the_truth():
     assert list(pulls) == pytest.approx([1.96, -1.96], abs=1e-3)
 
 
+def test_an_interval_that_ends_at_its_value_is_missed_by_any_error_beyond():
+    ended = answer(0.9, value=1.0)
+    ended["effects"][0]["parameters"][NUMBER]["interval95"] = [0.5, 1.0]
+    sizes = pp.judge([ended], [{IDENTIFIER: {NUMBER: 1.0001}}]).sizes
+    assert sizes[["pull", "held"]].values.tolist() == [[float("inf"), False]]
+
+
 def test_who_claims_what():
     """Presumed effects and curves claim nothing; two names that are both true are one claim."""
     rivals = [("quadratic-stiffness", 0.2), ("unnamed-restoring", 0.1)]

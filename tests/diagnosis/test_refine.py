@@ -499,6 +499,17 @@ def test_a_hard_knock_is_known_to_a_part_of_a_cycle() -> None:
     assert 1.96 * estimates["time"].sd < 0.25 / FREQUENCY_HZ
 
 
+@pytest.mark.parametrize(("identifier", "size"), [("amplitude-step", 0.1), ("impulse", 0.02)])
+def test_a_strong_jump_is_no_surer_than_its_fit(identifier: str, size: float) -> None:
+    """To first order in the size the scan over instants is off by more than its own width."""
+    by_fit, over_cycles, truth = told(identifier, size, 3)
+    assert all(holds(over_cycles, truth))
+    for name, estimate in by_fit.items():
+        low, high = over_cycles[name].bounds95
+        assert low <= estimate.bounds95[0]
+        assert estimate.bounds95[1] <= high
+
+
 def test_an_effect_without_an_instant_is_unchanged() -> None:
     effect = by_identifier("frequency-drift")
     data, noise = prepared(other_engine(TRUTH) + white(2))

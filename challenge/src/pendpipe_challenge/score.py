@@ -365,11 +365,14 @@ OWN_NAMES: Final[dict[str, dict[str, tuple[str, float]]]] = {
     "history-force": {"h": ("basset", 1.0)},
     "release-transient": {"gamma": ("release", 0.5), "tau": ("release_time", 1.0)},
     "equilibrium-step": {"J": ("rest_jump", 1.0), "time": ("rest_jump_at", 1.0)},
-    "amplitude-step": {"s": ("scaling", 1.0), "time": ("scaling_at", 1.0)},
+    "amplitude-step": {"time": ("scaling_at", 1.0)},
     "frequency-step": {"change": ("omega_jump", 1.0), "time": ("omega_jump_at", 1.0)},
     "impulse": {"dv": ("impulse", 1.0), "time": ("impulse_at", 1.0)},
 }
-"""By effect and name in docs/effects.md: the parameter of the motion here, and a factor."""
+"""By effect and name in docs/effects.md: the parameter of the motion here, and a factor.
+
+The jump of an amplitude is not among them: here r grows by a share, there by a power of e.
+"""
 
 
 def covered(items: Sequence[Solved]) -> list[bool]:

@@ -54,10 +54,11 @@ def with_instants(
     Returns
     -------
     dict of str to Estimate
-        With equal-tailed intervals of the posterior over all instants, for a uniform prior and
-        with the size integrated out: p(t) ~ exp(S(t)/2)/|column(t)|, where S is the fall of
-        chi^2 by an effect at t, to first order in its size. If they are wider than those of the
-        curvature, sd is their half width over 1.96.
+        With intervals that hold those of the curvature and the equal-tailed ones of the posterior
+        over all instants, for a uniform prior and with the size integrated out:
+        p(t) ~ exp(S(t)/2)/|column(t)|, where S is the fall of chi^2 by an effect at t, to first
+        order in its size: its centre is off by the second. sd is at least their half width over
+        1.96.
     """
     if not effect.local or len(effect.parameters) != 2 or effect.sizes != 1:
         return estimates
@@ -103,8 +104,9 @@ def _quantiles(values: FloatArray, weights: FloatArray) -> tuple[float, float]:
 
 
 def _widened(estimate: Estimate, interval: tuple[float, float]) -> Estimate:
-    """Return the estimate with this interval, and a larger standard deviation if it is wider."""
-    low, high = min(interval[0], estimate.value), max(interval[1], estimate.value)
+    """Return the estimate with both intervals, and a larger standard deviation if it is wider."""
+    ends = estimate.bounds95
+    low, high = min(interval[0], ends[0]), max(interval[1], ends[1])
     sd = max(estimate.sd, 0.5 * (high - low) / Z95)
     return replace(estimate, sd=sd, interval95=(low, high))
 
