@@ -35,7 +35,7 @@ from pendpipe.levels import REFUTED as LEVEL
 from pendpipe_challenge.motion import Motion
 from pendpipe_challenge.torques import of_rates
 
-CODE: Final = ("pendpipe.api", "benchmarks/consistency.py", "challenge/src/*/motion.py")
+CODE: Final = ("src/pendpipe/**/*.py", "benchmarks/consistency.py", "challenge/src/*/motion.py")
 MOST_READINGS: Final = 300_000
 FEWEST_CYCLES: Final = 5.0
 KINDS: Final = ("a", "b hysteretic", "b viscous", "c", "all")

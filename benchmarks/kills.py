@@ -40,9 +40,8 @@ from pendpipe.files import SET_ASIDE, damage_of, sha256
 from pendpipe.stages.archive import FOLDER, members
 
 SOURCES: Final = (
-    *("pendpipe.stages.archive", "pendpipe.stages.watch", "pendpipe.commands.doctor"),
-    *("pendpipe.stages.refusal", "pendpipe.stages.chunks", "pendpipe.stages.acquire"),
-    "pendpipe.commands.stage",
+    *("src/pendpipe/stages/*.py", "src/pendpipe/commands/stage.py"),
+    *("src/pendpipe/commands/doctor.py", "src/pendpipe/files.py"),
     *("workflow/rules/*.smk", "workflow/Snakefile", "profiles/*/*", "./Snakefile"),
     "benchmarks/kills.py",
 )

@@ -33,7 +33,7 @@ from pendpipe.stages.chunks import STAGES, chunks_of
 FILES: Final = 100
 """Decays that are made; more records are of the same files."""
 SOURCES: Final = (
-    *("pendpipe.stages.archive", "pendpipe.stages.watch", "pendpipe.commands.stage"),
+    *("src/pendpipe/stages/*.py", "src/pendpipe/commands/stage.py"),
     *("workflow/rules/*.smk", "workflow/Snakefile", "benchmarks/scale.py"),
 )
 """What plans and runs: other code has other costs."""

@@ -13,7 +13,7 @@ rule acquire:
         configuration=CONFIGURATION,
     params:
         plan=planned("acquire"),
-        code=code_version("pendpipe.stages.acquire"),
+        code=CODE,
     message:
         "acquire, chunk {wildcards.chunk}"
     shell:

@@ -20,8 +20,7 @@ rule caliper:
         damages=history(
             f"{RESULTS}/calibration/caliper.csv", f"{RESULTS}/calibration/sensor.json"
         ),
-        code=code_version("pendpipe.stages.acquire")
-        + code_version("pendpipe.commands.calibrate"),
+        code=CODE,
     message:
         "the sensor against a caliper"
     shell:
@@ -45,7 +44,7 @@ rule calibrate:
         configuration=CONFIGURATION,
     params:
         plan=planned("calibrate"),
-        code=code_version("pendpipe.commands.calibrate"),
+        code=CODE,
     message:
         "calibrate, chunk {wildcards.chunk}"
     shell:

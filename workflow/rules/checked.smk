@@ -6,6 +6,7 @@ from snakemake.exceptions import WorkflowError
 from pendpipe.configuration import jobs
 from pendpipe.configuration.load import read_configuration
 from pendpipe.errors import InputError
+from pendpipe.provenance import code_version
 
 jobs.prepare_environment()
 
@@ -23,6 +24,7 @@ for path in filter(os.path.isfile, workflow.configfiles):
     checked(read_configuration, path)
 PLACE = ", ".join(map(str, workflow.configfiles)) or "--config"
 OURS = ".snakemake/pendpipe"
+CODE = code_version()
 ENVIRONMENT = checked(
     jobs.environment, OURS, workflow.source_path("../envs/pendpipe.yaml")
 )

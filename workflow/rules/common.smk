@@ -7,7 +7,6 @@ from pathlib import Path
 from pendpipe.configuration import jobs
 from pendpipe.configuration.load import NAME, load_campaign
 from pendpipe.files import check_writable
-from pendpipe.provenance import code_version
 from pendpipe.report.captions import CAPTIONS
 from pendpipe.stages import chunks
 from pendpipe.stages.watch import Watch

@@ -17,7 +17,7 @@ rule compare:
     params:
         depends=jobs.theory(CAMPAIGN),
         damages=history(f"{RESULTS}/comparison.json", f"{RESULTS}/campaign.json"),
-        code=code_version("pendpipe.stages.compare"),
+        code=CODE,
     message:
         "the losses beside Eq. 16"
     shell:

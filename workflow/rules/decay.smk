@@ -13,7 +13,7 @@ rule decay:
         configuration=CONFIGURATION,
     params:
         plan=planned("decay"),
-        code=code_version("pendpipe.commands.decay"),
+        code=CODE,
     message:
         "draw the decays, chunk {wildcards.chunk}"
     shell:

@@ -15,7 +15,7 @@ rule diagnose:
         configuration=CONFIGURATION,
     params:
         plan=planned("diagnose"),
-        code=code_version("pendpipe.commands.diagnose"),
+        code=CODE,
     message:
         "what physics is missing, chunk {wildcards.chunk}"
     shell:

@@ -16,7 +16,7 @@ rule diagnose_campaign:
         depends=jobs.theory(CAMPAIGN),
         level=CAMPAIGN.configuration.diagnose.level,
         damages=history(f"{RESULTS}/campaign_diagnosis.json"),
-        code=code_version("pendpipe.stages.diagnose_campaign"),
+        code=CODE,
     message:
         "what all records together say is missing"
     shell:

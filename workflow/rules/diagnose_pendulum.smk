@@ -18,7 +18,7 @@ rule diagnose_pendulum:
         level=CAMPAIGN.configuration.diagnose.level,
         seed=CAMPAIGN.configuration.seed,
         damages=lambda wildcards: OF_PENDULUMS[wildcards.pendulum],
-        code=code_version("pendpipe.commands.diagnose"),
+        code=CODE,
     message:
         "{wildcards.pendulum}: what its recordings say together"
     shell:

@@ -21,7 +21,7 @@ rule figures:
     params:
         folder=subpath(output.drawn, parent=True),
         damages=history(*figure_files(), f"{RESULTS}/figures/drawn.json"),
-        code=code_version("pendpipe.commands.figures"),
+        code=CODE,
     message:
         "figures 3 to 10"
     shell:

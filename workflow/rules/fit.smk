@@ -13,7 +13,7 @@ rule fit:
         configuration=CONFIGURATION,
     params:
         plan=planned("fit"),
-        code=code_version("pendpipe.commands.fit"),
+        code=CODE,
     message:
         "fit a, b, c, chunk {wildcards.chunk}"
     shell:

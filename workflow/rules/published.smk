@@ -1,6 +1,5 @@
 # A campaign in print: a row of its table has no recording, and so no job of its own.
 from pendpipe.configuration.published import load_published
-from pendpipe.provenance import code_version
 
 PUBLISHED = checked(load_published, PLACE, config)
 RESULTS = PUBLISHED.results
@@ -29,7 +28,7 @@ rule published:
         configuration=checked(jobs.store, PUBLISHED, OURS),
     params:
         depends=jobs.digest(PUBLISHED.model_dump(mode="json")),
-        code=code_version("pendpipe.commands.published"),
+        code=CODE,
     message:
         "theory beside the printed numbers, and what is missing"
     shell:

@@ -15,7 +15,7 @@ rule records:
     params:
         depends=jobs.theory(CAMPAIGN),
         damages=history(f"{RESULTS}/records.parquet", f"{RESULTS}/records.csv"),
-        code=code_version("pendpipe.stages.records"),
+        code=CODE,
     message:
         "a table of the records"
     shell:

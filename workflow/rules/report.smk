@@ -23,7 +23,7 @@ rule report:
         configuration=CONFIGURATION,
     params:
         damages=history(f"{RESULTS}/report.html"),
-        code=code_version("pendpipe.commands.report"),
+        code=CODE,
     message:
         "the page about the campaign"
     shell:

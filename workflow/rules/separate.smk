@@ -16,7 +16,7 @@ rule separate:
         diagnosis=option("diagnosis", next(iter(campaign_diagnosis()), None)),
         depends=jobs.theory(CAMPAIGN),
         damages=history(f"{RESULTS}/separation.json"),
-        code=code_version("pendpipe.stages.separate"),
+        code=CODE,
     message:
         "hysteretic and viscous losses"
     shell:

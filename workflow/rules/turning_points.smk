@@ -13,7 +13,7 @@ rule turning_points:
         configuration=CONFIGURATION,
     params:
         plan=planned("turning-points"),
-        code=code_version("pendpipe.commands.turning_points"),
+        code=CODE,
     message:
         "turning points, chunk {wildcards.chunk}"
     shell:

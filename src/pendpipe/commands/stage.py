@@ -51,8 +51,7 @@ def run(arguments: Arguments) -> int:
         for path in arguments.reading:
             unpack(path, folder, lambda name: "/logs/" not in name)
         given = _files(folder)
-        code = code_version(stage.module)
-        wanted = {each.record: _made(campaign, stage, each, folder, code) for each in records}
+        wanted = {each.record: _made(campaign, stage, each, folder) for each in records}
         own, done = made_in(out), dict[str, Path]()
         if any(own.get(name) != made for name, made in wanted.items()):
             for path in archives(campaign.folder, stage.name):
@@ -80,9 +79,7 @@ def _files(folder: Path) -> set[Path]:
     return {path for path in folder.rglob("*") if path.is_file()}
 
 
-def _made(
-    campaign: Campaign, stage: Stage, record: Record, folder: Path, code: str
-) -> dict[str, Any]:
+def _made(campaign: Campaign, stage: Stage, record: Record, folder: Path) -> dict[str, Any]:
     """All that a record's stage depends on: settings, code, and the hashes of what it reads."""
     home = folder / record.record
     read = {name: home / name for name in (*stage.inputs, "refused.json")}
@@ -90,7 +87,7 @@ def _made(
         read["sensor.json"] = campaign.sensor
     return {
         "settings": settings(campaign, stage, record, _sha256),
-        "code": code,
+        "code": code_version(),
         "read": {name: found for name, path in read.items() if (found := _sha256(path))},
     }
 

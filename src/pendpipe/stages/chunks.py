@@ -52,11 +52,6 @@ class Stage:
     options: Callable[[Configuration, Record], dict[str, Any]] = lambda _settings, _record: {}
 
     @property
-    def module(self) -> str:
-        """The module of its command."""
-        return f"pendpipe.commands.{self.name.replace('-', '_')}"
-
-    @property
     def rule(self) -> str:
         """The name of its rule."""
         return self.name.replace("-", "_")

@@ -97,7 +97,7 @@ def compare_campaign(campaign: Campaign, folder: Path, separated: dict[str, Any]
         "calibration": read_json(campaign.sensor) if campaign.sensor else None,
         "provenance": {
             "version": __version__,
-            "code": code_version("pendpipe.stages.compare"),
+            "code": code_version(),
             "configuration": digest(settings.model_dump(exclude={"results", "records", "batch"})),
             "seed": settings.seed,
             "packages": {name: version(name) for name in PACKAGES},

@@ -56,7 +56,7 @@ def diagnose_campaign(campaign: Campaign, folder: Path) -> dict[str, Any]:
     from pendpipe.campaign.diagnose import BASELINE, campaign_diagnosis
     from pendpipe.campaign.search import search
 
-    provenance = {"version": __version__, "code": code_version(__name__)}
+    provenance = {"version": __version__, "code": code_version()}
     results = read_results(campaign, folder)
     found = campaign_data(campaign, results)
     if found is None or not enough(found[0]):
