@@ -374,9 +374,9 @@ def test_a_record_whose_loss_is_all_viscous_takes_few_looks_at_its_readings(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The search begins half way to hysteretic, far from the truth at so little noise."""
-    looks, evaluate = [], Waveform.evaluate
+    looks, quadratic = [], Waveform.quadratic
     monkeypatch.setattr(
-        Waveform, "evaluate", lambda self, value: looks.append(1) or evaluate(self, value)
+        Waveform, "quadratic", lambda self, value: looks.append(1) or quadratic(self, value)
     )
     law = Eq8(OMEGA, quadratic=0.002, viscous=OMEGA / 400.0, coulomb=1e-5)
     values = noisy(sample(law, Release(-0.3, 0.3), TIME))

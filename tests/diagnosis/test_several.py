@@ -13,7 +13,7 @@ from pendpipe.cli import main
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.dynamics.eq8 import A as QUADRATIC, B as LINEAR, C as FRICTION
 from pendpipe.effects.catalogue import by_identifier
-from pendpipe.effects.model import Model, jacobian
+from pendpipe.effects.model import Model
 from pendpipe.effects.stack import Differs, Stack
 from pendpipe.readings import motion_of
 from pendpipe.recording import Recording
@@ -119,10 +119,12 @@ def test_derivatives_of_two_recordings_are_those_of_each_by_what_it_has() -> Non
     value = np.array([2e-3, 5e-3, 1e-3, 0.5, 5.5, 0.2, -0.1, 0.01, 7e-3, 0.4, 0.2, -0.02])
     value = np.append(value, [0.05, 0.02, -0.03, 2e-4])
     at = stack.evaluate(value)
-    found = jacobian(stack, value, at)
+    found = at.jacobian
     assert len(at.reading) == 180
-    assert at.parts[0].value[[QUADRATIC, LINEAR, FRICTION]] == pytest.approx([2e-3, 5e-3, 1e-3])
-    assert at.parts[1].value[[QUADRATIC, LINEAR, FRICTION]] == pytest.approx([2e-3, 7e-3, 1.2e-3])
+    assert at.parts[0].at.value[[QUADRATIC, LINEAR, FRICTION]] == pytest.approx([2e-3, 5e-3, 1e-3])
+    assert at.parts[1].at.value[[QUADRATIC, LINEAR, FRICTION]] == pytest.approx(
+        [2e-3, 7e-3, 1.2e-3]
+    )
     for index in range(len(value)):
         step = np.zeros_like(value)
         step[index] = 1e-5 * max(abs(value[index]), 1e-2)

@@ -2,7 +2,7 @@
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from pendpipe.effects import Effect, catalogue
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
 from pendpipe.effects.effect import Parameter, Span, enters
-from pendpipe.effects.model import Model, jacobian, pendulum_of, responses
+from pendpipe.effects.model import Model, pendulum_of, responses
 from pendpipe.errors import InputError
 
 from .pendulums import VALUES, baseline, times
@@ -201,7 +201,7 @@ def with_derivatives(identifier: str) -> tuple[Effect, Model, FloatArray, FloatA
     effect = by_identifier(identifier)
     model = Model(RECORD, 0.05).adding(effect)
     value = np.append(BASE, VALUES[identifier])
-    return effect, model, value, jacobian(model, value, model.evaluate(value))
+    return effect, model, value, model.evaluate(value).jacobian
 
 
 @pytest.mark.parametrize("identifier", WITH_SIZE)
@@ -247,7 +247,8 @@ def test_readings_are_linear_in_a_curves_mixtures(kind: type[Curve]) -> None:
     at = model.evaluate(BASE)
     curve = kind(at.span)
     values, change = np.random.default_rng(4).standard_normal((2, curve.count))
-    found = jacobian(model.adding(curve), np.append(BASE, values), at)[:, len(BASE) :]
+    there = replace(at, model=model.adding(curve), value=np.append(BASE, values))
+    found = there.jacobian[:, len(BASE) :]
     moved = responses(curve, [(values, values + change)], at, model.pendulum(BASE))[0]
     assert found @ change == pytest.approx(moved, abs=1e-6 * np.max(np.abs(moved)))
 
@@ -282,7 +283,7 @@ def test_a_scan_keeps_most_of_what_lies_between_its_rows(identifier: str) -> Non
     effect = by_identifier(identifier)
     model = Model(RECORD, 0.05)
     at = model.evaluate(BASE)
-    columns = jacobian(model, BASE, at)
+    columns = at.jacobian
     basis = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)[0]
     rows = [tuple(row) for row in effect.shapes(at.span)]
     assert all(len(row) == len(effect.parameters) - effect.sizes for row in rows)

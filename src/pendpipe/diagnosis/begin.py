@@ -81,7 +81,7 @@ def begin(
     angles, _ = as_angles(points)
     beats = not fixed and bool(points.beats)
     seen: Seen = "rate" if samples.unit == "rad/s" else "angle"
-    law, span = Eq8Model(seen=seen, parts=held.parts), slice(None)
+    law, span = Eq8Model(samples.time_s, seen=seen, parts=held.parts), slice(None)
     starts: tuple[Start, ...] = ()
     if fit is not None and fit.minimum and fit.light != "red":
         (law, value), at_release = fit.minimum, bool(fit.minimum[1][TIME] >= samples.time_s[0])
@@ -116,14 +116,14 @@ def begin(
     data = replace(data, row=row, turn_s=float(angles.time_s[0]))
     data = _far_from_the_stop(data, value)
     is_angle = samples.unit in ("rad", "rad/s")
+    forms = vars(law) | {"time_s": data.time_s}
     model = Model(
-        data.time_s,
-        data.interval_s,
+        interval_s=data.interval_s,
         order=order_for(abs(angle), "rad" if is_angle else samples.unit),
         fold=data.fold,
         first_s=float(data.time_s[0]),
         scale=1.0 if is_angle else abs(angle),
-        **vars(law),
+        **forms,
     )
     data, model, at = _before_the_stop(data, model, value)
     if not np.ptp(at.reading) < _FAR_BEYOND * np.ptp(data.values):

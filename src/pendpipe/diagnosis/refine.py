@@ -26,7 +26,7 @@ from pendpipe.diagnosis.noise import Noise
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.dynamics.eq8 import OMEGA, SHARE, B
 from pendpipe.dynamics.eq8_model import SHARES, known_losses
-from pendpipe.effects.model import Evaluated, Model, jacobian
+from pendpipe.effects.model import Evaluated, Model
 from pendpipe.files import fields_of
 from pendpipe.solve import Bounds, NoStartError, Problem, Search, Squares, covariance
 
@@ -177,7 +177,7 @@ class Evaluation(Squares):
     def columns(self) -> FloatArray:
         """The Jacobian."""
         columns = np.empty((len(self.residual), self.model.size))
-        columns[:-1] = self.noise.whiten(jacobian(self.model, self.value, self.at))
+        columns[:-1] = self.noise.whiten(self.at.jacobian)
         columns[-1:] = SHARES.rows(self.model.size)
         # If one part of b is held, changing b changes the share.
         columns[:, B] += self.model.share_by_b(self.value) * columns[:, SHARE]

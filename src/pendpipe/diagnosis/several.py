@@ -45,7 +45,7 @@ from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.dynamics.eq8 import BASELINE, C, Restoring
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
-from pendpipe.effects.model import Model, jacobian
+from pendpipe.effects.model import Model
 from pendpipe.effects.stack import MAY_DIFFER, Differs, Stack
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.estimate import Z95, Estimate
@@ -539,7 +539,8 @@ class _Together:
             for each in outcome.missing
             if each.kind not in ("unnamed", "parameter")
             and (
-                each.identifier in {one.identifier for one in part.model.effects if happened(one)}
+                each.identifier
+                in {one.identifier for one in part.at.model.effects if happened(one)}
                 or not by_identifier(each.identifier).has_signature
             )
         ]
@@ -583,7 +584,7 @@ class _Together:
             },
             "residual_rms_rad": self._residual_rms(number),
             "chi2_per_dof": _search(self.outcomes[number]).data.chi2_per_dof(
-                float(white @ white), len(part.value)
+                float(white @ white), len(part.at.value)
             ),
             "prediction": self._prediction(number),
         }
@@ -615,7 +616,7 @@ class _Together:
         off = data.residual(there.at.reading) / noise_sd
         others = ~self._of(number) & (data.weight > 0.0)
         sd = max(_rms(off[others]), 1.0) * noise_sd[tail]
-        columns = jacobian(there.model, there.value, there.at)[tail]
+        columns = there.at.jacobian[tail]
         band = np.einsum("ij,jk,ik->i", columns, there.covariance(), columns) + sd**2
         off = (off * noise_sd)[tail]
         return {

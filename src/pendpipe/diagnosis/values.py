@@ -86,7 +86,7 @@ def small_periods(fit: Fit, value: FloatArray) -> FloatArray:
     model, at = fit.model, fit.at
     if at.parts:
         part = max(at.parts, key=lambda each: each.at.span.first_amplitude)
-        model, at, value = part.model, part.at, part.mixing @ value
+        model, at, value = part.at.model, part.at, part.mixing @ value
     motion, omega, pendulum = at.tangent.motion, float(value[OMEGA]), model.pendulum(value)
     begun = motion.time_s[:, 0]
     seen = (at.span.start_s <= begun) & (begun <= at.span.stop_s)

@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import Final, Literal
+from functools import cached_property
+from typing import Final, Literal, Protocol
 
 import numpy as np
 
@@ -37,6 +38,8 @@ from pendpipe.solve import Priors
 
 Seen = Literal["angle", "rate", "position"]
 """What of the motion is read: the angle, its rate, or a position L sin x."""
+DRIFT: Final = len(BASELINE)
+"""Behind the eight values: by how much the zero rises in a second, where that is fitted."""
 HYSTERETIC, VISCOUS = "hysteretic", "viscous"
 LOWER: Final = np.array([0.0, 0.0, 0.0, 0.0, 1e-12, -np.inf, -np.inf, -np.inf])  # omega > 0
 UPPER: Final = np.array([np.inf, np.inf, np.inf, 1.0, np.inf, np.inf, np.inf, np.inf])
@@ -70,7 +73,19 @@ def values_of(law: Eq8, release: Release, offset: float = 0.0) -> FloatArray:
     return np.array([*losses, law.angular_frequency, release.angle_rad, release.time_s, offset])
 
 
-@dataclass(frozen=True, kw_only=True)
+class Evaluates(Protocol):
+    """A model at given values, by whichever engine."""
+
+    @property
+    def reading(self) -> FloatArray:
+        """What the sensor reads, shape (n,)."""
+
+    @property
+    def jacobian(self) -> FloatArray:
+        """Its derivatives by the values, shape (n, size)."""
+
+
+@dataclass(frozen=True)
 class Eq8Model:
     """Eq. 8 in one of its forms, and what of its motion is read.
 
@@ -78,6 +93,8 @@ class Eq8Model:
 
     Parameters
     ----------
+    time_s
+        When it is read, ascending, shape (n,).
     restoring, drag
         The forms of the torque and of the quadratic loss.
     seen
@@ -88,11 +105,12 @@ class Eq8Model:
         The parts of b that are held (``"hysteretic"``, ``"viscous"``), with their rates in 1/s.
     """
 
-    restoring: Restoring = "linear"
-    drag: Drag = "energy"
-    seen: Seen = "angle"
-    length_m: float = 1.0
-    parts: Mapping[str, float] = field(default_factory=dict)
+    time_s: FloatArray
+    restoring: Restoring = field(default="linear", kw_only=True)
+    drag: Drag = field(default="energy", kw_only=True)
+    seen: Seen = field(default="angle", kw_only=True)
+    length_m: float = field(default=1.0, kw_only=True)
+    parts: Mapping[str, float] = field(default_factory=dict, kw_only=True)
 
     @property
     def eq8(self) -> Eq8Model:
@@ -133,27 +151,72 @@ class Eq8Model:
         """Amplitude of the readings over that of a small angle."""
         return {"angle": 1.0, "rate": float(value[OMEGA]), "position": self.length_m}[self.seen]
 
-    def readings(self, value: FloatArray, time_s: FloatArray) -> FloatArray:
-        """What the sensor reads, shape (n,)."""
-        if self.seen == "rate":
-            return self.readings_with_jacobian(value, time_s)[0]
-        law, release = self.motion_of(value)
-        # Before it is let go it is held; a search that got there is no minimum, but has a residual.
-        angle = sample(law, release, np.maximum(time_s, release.time_s))
-        if self.seen == "position":
-            return np.asarray(self.length_m * np.sin(angle) + value[OFFSET])
-        return angle
+    def evaluate(self, value: FloatArray) -> Evaluates:
+        """Return what the sensor reads at the model's times, with its derivatives when asked."""
+        return Followed(self, value, self.time_s)
 
-    def readings_with_jacobian(
-        self, value: FloatArray, time_s: FloatArray, *, more: int = 0
-    ) -> tuple[FloatArray, FloatArray]:
-        """Readings, shape (n,), and their derivatives by the engine's parameters, (n, 8 + more).
+    def curved(self, value: FloatArray, step: FloatArray) -> FloatArray:
+        """Return where a step ends: omega makes up for the square of what b's share changes."""
+        end = value + step
+        if step[OMEGA] != 0.0:  # else it is held
+            end[OMEGA] += _BY_SHARE * value[B] ** 2 / value[OMEGA] * step[SHARE] ** 2
+        return end
+
+    def by_values(self, value: FloatArray, columns: FloatArray) -> FloatArray:
+        """Make the engine's derivatives, shape (..., 8 and any behind), those by the values."""
+        # What is held of one part leaves a change of b to the other.
+        share = float(VISCOUS in self.parts) if self.parts else float(value[SHARE])
+        hysteretic, viscous, coulomb = (columns[..., k].copy() for k in (1, 2, 3))
+        columns[..., B] = share * hysteretic + (1.0 - share) * viscous
+        columns[..., C] = coulomb
+        columns[..., SHARE] = (hysteretic - viscous) * (0.0 if self.parts else float(value[B]))
+        return columns
+
+
+@dataclass(frozen=True)
+class Followed:
+    """Eq. 8 at given values, by the compiled engine.
+
+    Parameters
+    ----------
+    model, value
+        What moves. A ninth value is the rate at which the zero rises.
+    time_s
+        When it is read, ascending, shape (n,).
+    """
+
+    model: Eq8Model
+    value: FloatArray
+    time_s: FloatArray
+
+    @property
+    def reading(self) -> FloatArray:
+        """What the sensor reads, shape (n,)."""
+        model, value = self.model, self.value
+        if model.seen == "rate":
+            return self.with_jacobian[0]
+        law, release = model.motion_of(value)
+        # Before it is let go it is held; a search that got there is no minimum, but has a residual.
+        reading = sample(law, release, np.maximum(self.time_s, release.time_s))
+        if model.seen == "position":
+            reading = model.length_m * np.sin(reading) + value[OFFSET]
+        return self._drifted(reading)
+
+    @property
+    def jacobian(self) -> FloatArray:
+        """Its derivatives by the values, shape (n, size)."""
+        return self.with_jacobian[1]
+
+    @cached_property
+    def with_jacobian(self) -> tuple[FloatArray, FloatArray]:
+        """Both at once.
 
         The motion depends on the time since its release alone, so that its rate is the derivative
         by the release's time, with the other sign.
         """
-        law, release = self.motion_of(value)
-        if self.seen == "rate":
+        model, value, time_s = self.model, self.value, self.time_s
+        (law, release), more = model.motion_of(value), len(value) - len(BASELINE)
+        if model.seen == "rate":
             beside = _BESIDE / law.angular_frequency
             earlier = replace(release, time_s=release.time_s - beside)
             later = replace(release, time_s=release.time_s + beside)
@@ -165,28 +228,21 @@ class Eq8Model:
             reading = 1.5 * (after - before) / (2.0 * beside) - 0.5 * mean
         else:
             reading, jacobian = sample_with_jacobian(law, release, time_s, more=more)
-        if self.seen == "position":
-            jacobian = jacobian * (self.length_m * np.cos(reading))[:, None]
-            reading = self.length_m * np.sin(reading)
+        if model.seen == "position":
+            jacobian = jacobian * (model.length_m * np.cos(reading))[:, None]
+            reading = model.length_m * np.sin(reading)
         jacobian[:, OFFSET] = 1.0
-        return reading if self.seen == "angle" else reading + value[OFFSET], jacobian
+        if more:
+            jacobian[:, DRIFT] = self._late
+        if model.seen != "angle":
+            reading = reading + value[OFFSET]
+        return self._drifted(reading), model.by_values(value, jacobian)
 
-    def curved(self, value: FloatArray, step: FloatArray) -> FloatArray:
-        """Return where a step ends: omega makes up for the square of what b's share changes."""
-        end = value + step
-        if step[OMEGA] != 0.0:  # else it is held
-            end[OMEGA] += _BY_SHARE * value[B] ** 2 / value[OMEGA] * step[SHARE] ** 2
-        return end
+    def _drifted(self, reading: FloatArray) -> FloatArray:
+        drift = self.value[DRIFT:]
+        return reading + drift[0] * self._late if drift.any() else reading
 
-    def engine_by_values(self, value: FloatArray) -> FloatArray:
-        """Derivative of the engine's parameters by ours, and by any behind: square."""
-        by_share = 0.0 if self.parts else float(value[B])
-        change = np.zeros((len(value), len(value)))
-        change[0, A] = change[3, C] = 1.0
-        behind = np.arange(OMEGA, len(value))
-        change[behind, behind] = 1.0
-        # What is held of one part leaves a change of b to the other.
-        share = float(VISCOUS in self.parts) if self.parts else float(value[SHARE])
-        change[1:3, B] = share, 1.0 - share
-        change[1:3, SHARE] = by_share, -by_share
-        return change
+    @property
+    def _late(self) -> FloatArray:
+        """Time since the middle of the model's times: what the drift is multiplied by."""
+        return np.asarray(self.time_s - 0.5 * (self.model.time_s[0] + self.model.time_s[-1]))

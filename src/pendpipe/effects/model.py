@@ -58,8 +58,10 @@ def closed_form(value: FloatArray, clock: Clock) -> Motion:
 
 @dataclass(frozen=True)
 class Evaluated:
-    """A model at given values."""
+    """A model at given values, by the engine of any law."""
 
+    model: Model
+    value: FloatArray
     reading: FloatArray
     sampled: Sampled
     tangent: Tangent
@@ -77,7 +79,15 @@ class Evaluated:
         motion = self.tangent.motion.thinned(every)
         sampled = self.sampled.thinned(motion, rows)
         reading = self.reading[rows]
-        return Evaluated(reading, sampled, Tangent(law, motion), self.span, whole=self)
+        tangent = Tangent(law, motion)
+        return replace(self, reading=reading, sampled=sampled, tangent=tangent, whole=self)
+
+    @property
+    def jacobian(self) -> FloatArray:
+        """Derivatives of the readings by all values, shape (n, size)."""
+        if self.parts:
+            return np.concatenate([part.own @ part.mixing for part in self.parts])
+        return _jacobian(self)
 
     @cached_property
     def start(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -140,28 +150,26 @@ class Part:
     ----------
     number
         Of the recording.
-    model, value, at
+    at
         Its own model, at its values.
     mixing
         Its values by those of all, shape (own values, values of all).
     """
 
     number: int
-    model: Model
-    value: FloatArray
     at: Evaluated
     mixing: FloatArray
 
     @cached_property
     def own(self) -> FloatArray:
         """Derivatives of its readings by its own values."""
-        return jacobian(self.model, self.value, self.at)
+        return self.at.jacobian
 
     def responses(
         self, effect: Effect, changes: Sequence[tuple[FloatArray, FloatArray]]
     ) -> FloatArray:
         """Change of its readings for each pair of values of an effect, shape (changes, n)."""
-        return responses(effect, changes, self.at, self.model.pendulum(self.value))
+        return responses(effect, changes, self.at, self.at.span.pendulum)
 
 
 _MORE: Final = (1.0, 1.02, 1.12, 1.28)
@@ -174,10 +182,8 @@ class Model(Eq8Model):
 
     Parameters
     ----------
-    time_s
-        When the readings were taken, shape (n,).
     interval_s
-        Between them, usually.
+        Between the readings, usually.
     effects
         What is added; their values follow the baseline's in the vector of parameters.
     order
@@ -198,7 +204,6 @@ class Model(Eq8Model):
     An effect may change the forms of Eq. 8 (`Effect.form`), and set a held part of b free.
     """
 
-    time_s: FloatArray
     interval_s: float
     effects: tuple[Effect, ...] = ()
     order: int = 14
@@ -400,7 +405,7 @@ class Model(Eq8Model):
             raise NoMotionError("the readings' clock is out of reach")
         tangent = Tangent(self.law(value), motion)
         span, seen = self.span(value, sampled), self.as_seen(sampled, value)
-        return Evaluated(self.read(seen, value), seen, tangent, span)
+        return Evaluated(self, value, self.read(seen, value), seen, tangent, span)
 
     def as_seen(self, sampled: Sampled, value: FloatArray) -> Sampled:
         """What is read of the sampled motion: the angle, or its rate."""
@@ -498,16 +503,14 @@ def _change(
     return after if before is None else np.asarray(after - before)
 
 
-def jacobian(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
-    """Derivatives of the readings by all values, shape (n, size)."""
-    if at.parts:
-        return np.concatenate([part.own @ part.mixing for part in at.parts])
+def _jacobian(at: Evaluated) -> FloatArray:
+    """Derivatives of one recording's readings, shape (n, size)."""
+    model, value, pendulum = at.model, at.value, at.span.pendulum
     sampled, tangent = at.sampled, at.tangent
-    pendulum = model.pendulum(value)
     columns = np.empty((len(at.reading), model.size))
     for index in (A, B, C, SHARE):
-        columns[:, index] = sampled.change(*tangent.of_force(_by_loss(model, value, at, index)))
-    columns[:, OMEGA] = _by_omega(model, value, at)
+        columns[:, index] = sampled.change(*tangent.of_force(_by_loss(at, index)))
+    columns[:, OMEGA] = _by_omega(at)
     _, _, by_log, by_time = at.start
     columns[:, START] = (sampled.angle * by_log - sampled.velocity * by_time) / value[START]
     columns[:, TIME] = -sampled.velocity
@@ -524,16 +527,17 @@ def jacobian(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
     return columns
 
 
-def _by_loss(model: Model, value: FloatArray, at: Evaluated, index: int) -> FloatArray:
+def _by_loss(at: Evaluated, index: int) -> FloatArray:
     """Derivative of the acceleration by one of the baseline's losses; it is linear in them."""
-    moved = value.copy()
+    model, value, moved = at.model, at.value, at.value.copy()
     moved[index] += max(1e-3 * abs(float(value[index])), 1e-6)
     motion = at.tangent.motion
     change = model.law(moved)(motion) - model.law(value)(motion)
     return np.asarray(change / (moved[index] - value[index]))
 
 
-def _by_omega(model: Model, value: FloatArray, at: Evaluated) -> FloatArray:
+def _by_omega(at: Evaluated) -> FloatArray:
+    model, value = at.model, at.value
     motion, step = at.tangent.motion, 1e-6 * value[OMEGA]
     moved = value.copy()
     moved[OMEGA] += step

@@ -103,7 +103,7 @@ class _OfSeveral(Part):
         self, effect: Effect, changes: Sequence[tuple[FloatArray, FloatArray]]
     ) -> FloatArray:
         """Change of its readings for each pair of values of an effect, shape (changes, n)."""
-        block = _block(effect, self.number, len(self.value))
+        block = _block(effect, self.number, len(self.at.value))
         if isinstance(effect, Differs):
             return np.array([self.own @ (block @ (high - low)) for low, high in changes])
         pairs = [(block @ low, block @ high) for low, high in changes]
@@ -244,7 +244,7 @@ class Stack(Model):
         parts = []
         for number, (member, mixing) in enumerate(zip(self.members, self.mixings(), strict=True)):
             own = np.clip(mixing @ value, *member.bounds())
-            parts.append(_OfSeveral(number, member, own, member.evaluate(own), mixing))
+            parts.append(_OfSeveral(number, member.evaluate(own), mixing))
         spans = [part.at.span for part in parts]
         loudest = max(parts, key=lambda part: part.at.span.first_amplitude).at
         span = Span(
@@ -258,7 +258,7 @@ class Stack(Model):
             loudest.span.fold,
         )
         reading = np.concatenate([part.at.reading for part in parts])
-        return Evaluated(reading, _sampled(parts), loudest.tangent, span, tuple(parts))
+        return Evaluated(self, value, reading, _sampled(parts), loudest.tangent, span, tuple(parts))
 
 
 def _sampled(parts: Sequence[Part]) -> Sampled:

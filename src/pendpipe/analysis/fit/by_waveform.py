@@ -7,7 +7,7 @@ two parts is a parameter with a prior.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, NamedTuple
 
@@ -27,7 +27,16 @@ from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics import turning_points_with_jacobian
 from pendpipe.dynamics.eq8 import BASELINE, OFFSET, OMEGA, SHARE, START, TIME, A, B, C, Restoring
-from pendpipe.dynamics.eq8_model import LOWER, SHARES, UPPER, Eq8Model, Seen, known_losses
+from pendpipe.dynamics.eq8_model import (
+    DRIFT,
+    LOWER,
+    SHARES,
+    UPPER,
+    Eq8Model,
+    Followed,
+    Seen,
+    known_losses,
+)
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import with_error
 from pendpipe.solve import (
@@ -43,8 +52,6 @@ from pendpipe.solve import (
     minimise,
 )
 
-DRIFT: Final = len(BASELINE)
-"""Behind the model's eight values: by how much the zero rises in a second."""
 _PIECE: Final = 1 << 18
 """Readings whose Jacobian is in memory at a time: 16 MB."""
 _DITHERED: Final = 0.4
@@ -73,7 +80,7 @@ class Waveform(Eq8Model):
 
     Parameters
     ----------
-    time_s, values
+    values
         The readings, shape (n,).
     noise_rms
         Standard deviation of one.
@@ -82,7 +89,6 @@ class Waveform(Eq8Model):
         then that before the rounding. Zero: the readings scatter as `noise_rms` says.
     """
 
-    time_s: FloatArray
     values: FloatArray
     noise_rms: float
     step: float = 0.0
@@ -99,13 +105,6 @@ class Waveform(Eq8Model):
             low[START], high[START] = -TOP, TOP
         return Bounds(low, high)
 
-    def _late(self, time_s: FloatArray) -> FloatArray:
-        """Time since the middle of the readings: what the drift is multiplied by."""
-        return np.asarray(time_s - 0.5 * (self.time_s[0] + self.time_s[-1]))
-
-    def _drifted(self, value: FloatArray, time_s: FloatArray) -> FloatArray | float:
-        return value[DRIFT] * self._late(time_s) if value[DRIFT] != 0.0 else 0.0
-
     def residual(self, value: FloatArray) -> FloatArray:
         """Readings less model, shape (n,)."""
         if not (self._residuals and np.array_equal(self._residuals[0][0], value)):
@@ -113,14 +112,15 @@ class Waveform(Eq8Model):
         return self._residuals[0][1]
 
     def _residual(self, value: FloatArray) -> FloatArray:
-        if self.seen != "rate":
-            found = self.readings(value, self.time_s)
-        else:
-            # A rate takes the derivatives, which fill the memory.
-            pieces = range(0, len(self.time_s), _PIECE)
-            times = [self.time_s[first : first + _PIECE] for first in pieces]
-            found = np.concatenate([self.readings(value, each) for each in times])
-        return np.asarray(self.values - found - self._drifted(value, self.time_s))
+        # A rate takes the derivatives, which fill the memory.
+        found = [each.reading for _, each in self._pieces(value)] if self.seen == "rate" else None
+        return self.values - (np.concatenate(found) if found else self.evaluate(value).reading)
+
+    def _pieces(self, value: FloatArray) -> Iterator[tuple[slice, Followed]]:
+        """The model along the record, piece by piece."""
+        for first in range(0, len(self.values), _PIECE):
+            piece = slice(first, first + _PIECE)
+            yield piece, Followed(self, value, self.time_s[piece])
 
     def _has_motion(self, value: FloatArray) -> bool:
         """Whether there is a motion from before the readings on, and one that they can show."""
@@ -145,7 +145,7 @@ class Waveform(Eq8Model):
         except ValueError:
             return None
         count, chi2 = len(self.values), chi2 + float(np.sum(SHARES.residual(value) ** 2))
-        return Summed(value, chi2, self.evaluate, count) if math.isfinite(chi2) else None
+        return Summed(value, chi2, self.quadratic, count) if math.isfinite(chi2) else None
 
     def deviance(self, residual: FloatArray) -> float:
         """Return -2 ln likelihood of some residuals."""
@@ -154,18 +154,11 @@ class Waveform(Eq8Model):
         unused = np.empty_like(residual), np.empty_like(residual)
         return float(rounded(residual, 0.5 * self.step, self.noise_rms, *unused))
 
-    def read(self, value: FloatArray, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Readings, shape (n,), and their derivatives by the engine's parameters and the drift."""
-        reading, jacobian = self.readings_with_jacobian(value, time_s, more=1)
-        jacobian[:, DRIFT] = self._late(time_s)
-        return reading + self._drifted(value, time_s), jacobian
-
-    def evaluate(self, value: FloatArray) -> Quadratic:
+    def quadratic(self, value: FloatArray) -> Quadratic:
         """chi^2, gradient and normal matrix, summed over pieces of the record."""
         chi2, slope, normal = 0.0, np.zeros(len(value)), np.zeros((len(value), len(value)))
-        for first in range(0, len(self.values), _PIECE):
-            piece = slice(first, first + _PIECE)
-            reading, jacobian = self.read(value, self.time_s[piece])
+        for piece, there in self._pieces(value):
+            reading, jacobian = there.with_jacobian
             residual = self.values[piece] - reading
             if self.step == 0.0:
                 part, score, weighted = float(residual @ residual), residual, jacobian
@@ -178,12 +171,7 @@ class Waveform(Eq8Model):
             normal += jacobian.T @ weighted
         unit = self.noise_rms**-2 if self.step == 0.0 else 1.0
         chi2, slope, normal = unit * chi2, unit * slope, unit * normal
-        change, prior, row = (
-            self.engine_by_values(value),
-            SHARES.residual(value),
-            SHARES.rows(len(value)),
-        )
-        slope, normal = change.T @ slope, change.T @ normal @ change
+        prior, row = SHARES.residual(value), SHARES.rows(len(value))
         return Quadratic(chi2 + float(prior @ prior), slope + row.T @ prior, normal + row.T @ row)
 
     def weighed(self, value: FloatArray, at: Quadratic, noise_rms: float) -> Quadratic:
@@ -380,7 +368,7 @@ def _fitted(
             useful=math.inf if bar is None else bar,
         )
     except NoStartError:
-        minimum = Minimum(Summed(value, math.inf, problem.evaluate), converged=False)
+        minimum = Minimum(Summed(value, math.inf, problem.quadratic), converged=False)
     return Fitted(problem, minimum, held, start)
 
 
@@ -512,8 +500,7 @@ def _numbers(
 
 def _beyond_noise(fitted: Fitted, left: Left, noise_rms: float) -> FloatArray:
     """What a misfit adds to the covariance of the gradient, shape (9, 9)."""
-    by_engine = fitted.problem.read(fitted.value, left.time_s)[1]
-    rows = by_engine @ fitted.problem.engine_by_values(fitted.value)
+    rows = Followed(fitted.problem, fitted.value, left.time_s).jacobian
     rows *= np.sqrt(left.readings)[:, None] / noise_rms
     return beyond_noise(rows, left.phase, left.sizes)
 
@@ -532,8 +519,7 @@ def _first_turning_point(fitted: Fitted, start_s: float) -> tuple[tuple[float, f
     model, release = fitted.problem.motion_of(value)
     count = fitted.start.before + 1
     turning, by_time, by_angle = turning_points_with_jacobian(model, release, count)
-    change = fitted.problem.engine_by_values(value)
-    late, high = by_time[-1] @ change[:8, :8], by_angle[-1] @ change[:8, :8]
+    late, high = fitted.problem.by_values(value, np.stack([by_time[-1], by_angle[-1]]))
     time, side = float(turning.time_s[-1]), math.copysign(1.0, release.angle_rad)
     side *= -1.0 if fitted.start.before % 2 else 1.0
     omega = float(value[OMEGA])

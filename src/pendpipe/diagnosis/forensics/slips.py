@@ -26,7 +26,6 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.found import Confirmation, Finding, Location
 from pendpipe.diagnosis.refine import CLEAN, Fit, alignment, span_of
-from pendpipe.effects.model import jacobian
 from pendpipe.estimate import Estimate
 
 _SIGNIFICANT_SD: Final = 7.0
@@ -195,7 +194,7 @@ def _slow(data: Data, fit: Fit) -> FloatArray:
     for harmonic in range(2, _HARMONICS + 1):
         turns = harmonic * sampled.phase[:, None]
         parts += [waves * np.cos(turns), waves * np.sin(turns)]
-    parts.append(jacobian(fit.model, fit.value, fit.at)[:, list(fit.free)])
+    parts.append(fit.at.jacobian[:, list(fit.free)])
     columns = np.concatenate(parts, axis=1) * data.weight[:, None]
     return span_of(columns, 1e-6)
 
