@@ -233,7 +233,9 @@ stage turning-points --campaign config/config.yaml --chunk all \
 stage fit --campaign config/config.yaml --chunk all --out results/chunks/fit-all.zip --reading \
  results/chunks/acquire-all.zip results/chunks/calibrate-all.zip \
  results/chunks/turning-points-all.zip
-separate --campaign config/config.yaml --out results/separation.json
+diagnose-campaign results --campaign config/config.yaml --out results/campaign_diagnosis.json
+separate --campaign config/config.yaml --diagnosis results/campaign_diagnosis.json \
+ --out results/separation.json
 compare --campaign config/config.yaml --separation results/separation.json \
  --out results/comparison.json --summary results/campaign.json
 """

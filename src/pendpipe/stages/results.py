@@ -103,8 +103,8 @@ def left_out(
 
 
 def surprises(diagnosis: Path | None) -> dict[str, float]:
-    """By how many sigma each record is off what all the others predict of it."""
-    rows = read_json(diagnosis)["records"] if diagnosis else []
+    """By how many sigma each record is off what all the others predict of it, if they can."""
+    rows = read_json(diagnosis).get("records", []) if diagnosis else []
     return {row["record"]: row["pull_from_the_others"] for row in rows}
 
 
