@@ -71,11 +71,9 @@ def amplitudes_in(label: str, time: FloatArray | None, values: FloatArray) -> Fa
 
 def _refuse_pull(recording: Recording, place: str | Path) -> None:
     """Refuse an accelerometer's pull along the string."""
-    values = recording.values[recording.usable]
-    if recording.unit != "m/s^2" or not recording.unit_is_stated or not len(values):
-        return
+    known = recording.unit == "m/s^2" and recording.unit_is_stated
     refuse_if(
-        pulls(values),
+        known and pull_along_string(recording.values[recording.usable]),
         place,
         "this is the pull along the string (about 9.8 m/s^2), which swings twice per period",
         "give the axis along the swing, or the gyroscope, with --column (--unit counts takes it"
@@ -133,11 +131,23 @@ _SHORTEST_S, _LONGEST_S = 1e-60, 1e14
 """Of a recording. Beyond three million years the search for the period counts false cycles."""
 
 
-def pulls(values: FloatArray) -> bool:
-    """Whether readings in m/s^2 hang at g, as an accelerometer's axis along the string does."""
+_ALONG: Final = 0.03
+"""Of g, within which an axis along the string hangs. Its share is the cosine of the axis' tilt,
+evenly spread where a device lies as it may: one other axis in 33 hangs as near."""
+
+
+def pull_along_string(values: FloatArray) -> Fact | None:
+    """Say that readings in m/s^2 hang at g, as an accelerometer's axis along the string does."""
     from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 
-    return abs(abs(float(np.nanmedian(values))) / STANDARD_GRAVITY_M_PER_S2 - 1.0) < 0.03
+    level = float(np.nanmedian(values)) if len(values) else 0.0
+    if abs(abs(level) / STANDARD_GRAVITY_M_PER_S2 - 1.0) > _ALONG:
+        return None
+    said = (
+        "the readings hang about 9.8 m/s^2, as a pull along the string does, which swings twice"
+        " in a period of the pendulum"
+    )
+    return Fact("pull", "9.8 m/s^2", "shown", said, _ALONG)
 
 
 _LEVEL: Final = 0.03

@@ -21,9 +21,9 @@ from pendpipe.formats import (
     times,
     units,
 )
+from pendpipe.formats.saturation import clipped_samples
 from pendpipe.formats.table import (
     Column,
-    clipped_samples,
     derivative_slope,
     evenness,
     find_gaps,

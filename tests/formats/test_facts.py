@@ -14,6 +14,20 @@ from pendpipe.formats import ReadOptions, inspect, read
 from .cases import swing
 
 TIME, ANGLE = swing(2000)
+SAMPLES = sorted((Path(__file__).parent / "facts").glob("*/*.json"))
+
+
+@pytest.mark.parametrize("expected", SAMPLES, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_a_sample_shows_its_fact(expected: Path) -> None:
+    """Value, and how it is known; or none, where there is nothing of the kind."""
+    fact = read(expected.with_suffix("")).fact(expected.parent.name.replace("_", " "))
+    found = fact and {"value": fact.value, "how": fact.how, "error_rate": fact.error_rate}
+    assert found == json.loads(expected.read_text())
+
+
+def test_each_kind_of_fact_has_samples() -> None:
+    kinds = {path.parent.name.replace("_", " ") for path in SAMPLES}
+    assert KINDS.keys() - kinds == {"sensor constant"}  # which `fit` asks for, and no reader
 
 
 def written(path: Path, header: str, *columns: Any) -> Path:

@@ -14,7 +14,8 @@ from pendpipe.arrays import FloatArray
 from pendpipe.cli import main
 from pendpipe.errors import InputError
 from pendpipe.formats import ReadOptions, inspect, read
-from pendpipe.formats.table import clipped_samples, swing_of
+from pendpipe.formats.saturation import clipped_samples
+from pendpipe.formats.table import swing_of
 from pendpipe.readings import find_step
 from pendpipe.recording import read_plain
 
@@ -243,8 +244,9 @@ def test_json_has_the_contracts_form(tmp_path: Path, answer_of: Any) -> None:
         "kind": found["kind"],
         "facts": found["facts"],
     }
-    reading = {"kind": "reading", "value": "'channel 1'", "how": "stated"}
-    assert reading.items() <= found["facts"][0].items()
+    told = [tuple(fact[key] for key in ("kind", "value", "how")) for fact in found["facts"]]
+    assert told[0] == ("layout", "windaq-hires", "stated")
+    assert told[1] == ("reading", "'channel 1'", "stated")
     assert found == expected
     assert list(found) == list(expected)
 
@@ -293,7 +295,11 @@ def test_why_prints_a_line_a_decision(tmp_path: Path, answer_of: Any) -> None:
     assert "column 2 'theta': angle, no unit stated" in printed
     facts = [re.split("  +", line) for line in printed if "  " in line]
     shown = [(kind, value, how) for kind, value, how, *_ in facts]
-    assert ("layout", "columns separated by semicolons, decimal commas", "shown") in shown
+    assert (
+        "layout",
+        "columns separated by semicolons, decimal commas",
+        "shown (p = 0.01)",
+    ) in shown
     assert ("unit", "rad", "shown (p = 0.002)") in shown
     assert printed[-1] == "so 2000 readings of theta, in rad"
 

@@ -8,7 +8,7 @@ import pytest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.formats import read
-from pendpipe.formats.table import without_marks, without_spikes
+from pendpipe.formats.lost import without_marks, without_spikes
 
 from .cases import SHARED
 

@@ -10,7 +10,7 @@ import pytest
 
 from pendpipe.arrays import FloatArray
 from pendpipe.formats import ReadOptions, inspect, read
-from pendpipe.formats.table import without_marks
+from pendpipe.formats.lost import without_marks
 
 from .cases import (
     ANGLE,

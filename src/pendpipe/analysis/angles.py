@@ -14,7 +14,7 @@ from pendpipe.analysis.torque import may_be_sine, sine_coefficient, swing_phase
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.estimate import Estimate
-from pendpipe.physics.lengthening import SEEN, TELLS, Coefficient
+from pendpipe.physics.lengthening import ANGLES, SEEN, TELLS, Coefficient, unit_shown
 from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 from pendpipe.quantities import with_error
 from pendpipe.readings import motion_of
@@ -32,8 +32,6 @@ _LIKE_SINE: Final = ("pixels", "m/s^2", "rad/s^2")
 _SCALE_SD: Final = "scale_sd"
 READ_AS: Final = "read_as"
 """Metadata: the relative error of a scale that the period shows, and what it says of the unit."""
-_ANGLES: Final = {"radians": 1.0, "degrees": math.pi / 180.0, "turns": 2.0 * math.pi}
-"""Of an angle, in rad."""
 _LENGTHS: Final = {"metres": 1.0, "centimetres": 0.01, "millimetres": 0.001}
 """Of a position, in m."""
 
@@ -176,7 +174,6 @@ def scale_of(recording: Recording) -> float:
 
 def _scale_of(points: TurningPoints, length_m: float | None, *, named: bool) -> Scale | None:
     """The unit, or else the scale, in which the share of sin x is 1."""
-    units = _ANGLES if length_m is None else _LENGTHS
 
     def shown(factor: float) -> Coefficient | None:
         angles = replace(
@@ -191,13 +188,11 @@ def _scale_of(points: TurningPoints, length_m: float | None, *, named: bool) -> 
             angles = seen_along(angles, length_m)
         return sine_coefficient(angles) if may_be_sine(angles) else None
 
-    agreeing = [
-        Scale(name, factor, 0.0)
-        for name, factor in (units.items() if named else ())
-        if (found := shown(factor)) is not None and found.tells
-    ]
-    if len(agreeing) == 1 or length_m is None:
-        return agreeing[0] if len(agreeing) == 1 else None
+    units = (ANGLES if length_m is None else _LENGTHS) if named else {}
+    if (name := unit_shown(shown, units)) is not None:
+        return Scale(name, units[name], 0.0)
+    if length_m is None:
+        return None
     factor = _TRIAL_RAD * length_m / float(np.max(points.amplitude_rad))
     sd = math.inf
     for _ in range(_ROUNDS):

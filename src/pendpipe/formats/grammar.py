@@ -17,6 +17,7 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
+from pendpipe.facts import Fact
 from pendpipe.formats.clock import is_clock
 from pendpipe.formats.table import ReadOptions, evenness
 from pendpipe.formats.words import unit_of
@@ -43,6 +44,8 @@ _NAMES: Final = {
 }
 _SIGN_WORDS: Final = {"\t": "tabs", ",": "commas", ";": "semicolons", " ": "blanks", "|": "bars"}
 _DECIMALS: Final = {"comma": ",", "point": ".", "dot": "."}
+_WRONG: Final = 0.01
+"""How often a table is read wrong without a word: none of 300 that are drawn, at 95 %."""
 _MOST_WAYS: Final = 5000
 """Ways to read a row of commas that are tried."""
 _BLANK: Final = re.compile(
@@ -161,11 +164,12 @@ class Layout:
         return "n" in kinds and 2 * words <= filled and kinds not in ("tn", "nt", "dn", "nd")
 
     @property
-    def description(self) -> str:
-        """The layout in words, for the notes."""
+    def fact(self) -> Fact:
+        """The layout in words, shown by the rows that it keeps."""
         between = _SIGN_WORDS.get(self.delimiter, repr(self.delimiter))
         cells = f"columns separated by {between}" if self.width > 1 else "one column"
-        return cells + (", decimal commas" if self.decimal == "," or self.joined else "")
+        said = cells + (", decimal commas" if self.decimal == "," or self.joined else "")
+        return Fact("layout", said, "shown", said, _WRONG)
 
 
 def is_blank(cell: str) -> bool:

@@ -21,7 +21,9 @@ from pendpipe.facts import KINDS, Fact, guesses, remarks
 from pendpipe.files import names_in
 from pendpipe.formats.columns import choose
 from pendpipe.formats.lists import SETTINGS, WAVEFORM, holds_settings, steady
+from pendpipe.formats.lost import lost_readings
 from pendpipe.formats.plugin import HEAD
+from pendpipe.formats.saturation import clipped_samples, saturation
 from pendpipe.formats.table import (
     Column,
     Gap,
@@ -29,16 +31,13 @@ from pendpipe.formats.table import (
     NotThisFormatError,
     ReadOptions,
     Table,
-    clipped_samples,
     find_gaps,
     most_unpacked,
-    without_marks,
-    without_spikes,
 )
 from pendpipe.formats.times import TimeBase, refuse_text, time_base
 from pendpipe.formats.units import readings
 from pendpipe.formats.words import role_of, split_header, unit_of
-from pendpipe.readings import find_step, pulls, sizes_of, with_amplitudes
+from pendpipe.readings import find_step, pull_along_string, sizes_of, with_amplitudes
 from pendpipe.recording import (
     GOOD,
     MISSING,
@@ -194,7 +193,9 @@ def table_of(place: Path, data: bytes, options: ReadOptions) -> Table:
     for dialect in mine:
         try:
             table = dialect.read(place, data, options)
-            return replace(table, notes=(*table.notes, *notes))
+            # The layout of a dialect is stated by the mark that it bears.
+            facts = table.facts or (Fact("layout", table.format, "stated"),)
+            return replace(table, notes=(*table.notes, *notes), facts=facts)
         except NotThisFormatError as fault:
             reason = fault
         except InputError:
@@ -237,30 +238,15 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     base = time_base(table, choice, options)
     found = readings(table, choice, options, base)
     facts = [*table.facts, *choice.facts, *base.facts, *found.facts]
-    given = found.values[base.rows]
-    values, column = without_marks(given), choice.readings[0]
-    # A converter of an instrument loses no echo, nor does what is no swing.
-    values = without_spikes(values) if column.time_s is None and column.swing.clear else values
+    column = choice.readings[0]
+    swings = column.time_s is None and column.swing.clear
+    values, lost = lost_readings(found.values[base.rows], swings=swings, factor=found.factor)
+    facts += lost
     _refuse_absurd(table, base, values)
-    missing = np.isnan(values)
-    lost = given[missing & ~np.isnan(given)] / found.factor
-    start = base.time_s[0] if base.time_s.size else 0.0
-    if lost.size:
-        marks = ", ".join(f"{mark:.6g}" for mark in np.unique(lost)[:3])
-        said = f"{lost.size} reading(s) that stand out ({marks}): taken as lost"
-        facts.append(Fact("lost readings", marks, "shown", said))
-    if missing.any():
-        said = f"{missing.sum()} row(s) without a reading, marked missing"
-        facts.append(Fact("lost readings", f"{missing.sum()}", "shown", said))
+    missing, start = np.isnan(values), base.time_s[0] if base.time_s.size else 0.0
     if start < 0:
         said = f"the times begin at {start:.6g} s, before their zero"
         facts.append(Fact("clock", f"from {start:.6g} s", "stated", said))
-    if found.unit == "m/s^2" and not guesses(found.facts) and pulls(values):
-        said = (
-            "the readings hang about 9.8 m/s^2, as a pull along the string does, which swings twice"
-            " in a period of the pendulum"
-        )
-        facts.append(Fact("pull", "9.8 m/s^2", "shown", said))
     quality = np.where(missing, MISSING, GOOD).astype(np.uint8)
     kept = {key: value for key, value in table.metadata.items() if key in _KEPT}
     events = {
@@ -274,13 +260,12 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
         facts.append(Fact("drive", "steady or driven", "shown", said))
     if found.quantity == "reading":
         metadata["unit"] = found.unit
-    own_step = choice.readings[0].resolution
+    own_step, limits = column.resolution, column.limits
     step = own_step * found.factor if own_step is not None else find_step(values)
-    limits = choice.readings[0].limits
     limits = limits and (limits[0] * found.factor, limits[1] * found.factor)
-    if cut := clipped_samples(values, step, limits):
-        said = f"{cut} reading(s) at the end of the sensor's range: its turns are cut off"
-        facts.append(Fact("saturation", f"{cut} readings", "shown", said))
+    known = guesses(found.facts) == ()
+    pull = pull_along_string(values) if found.unit == "m/s^2" and known else None
+    facts += filter(None, (pull, saturation(values, step, limits)))
     recording = Recording(
         time_s=base.time_s,
         values=values,

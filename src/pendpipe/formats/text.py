@@ -10,7 +10,6 @@ import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.errors import InputError, refuse_if
-from pendpipe.facts import Fact
 from pendpipe.formats.clock import column_of_clock_times
 from pendpipe.formats.grammar import (
     MOST_DAMAGED,
@@ -214,7 +213,7 @@ def _table(place: Path, lines: list[str], first: int, layout: Layout, form: str)
         interval_s=header.interval_s,
         metadata=header.metadata,
         notes=(*header.notes, *notes, *cut),
-        facts=(Fact("layout", layout.description, "shown", layout.description),),
+        facts=(layout.fact,),
     )
 
 

@@ -1,7 +1,6 @@
 """The unit of the readings: as the file states it, else as one test of physics shows it."""
 
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -22,15 +21,12 @@ from pendpipe.formats.table import (
 )
 from pendpipe.formats.times import TimeBase
 from pendpipe.formats.words import Unit, unit_of
+from pendpipe.physics.lengthening import ANGLES, unit_shown
 from pendpipe.readings import from_below, jumps_of_a_turn
 from pendpipe.recording import Quantity
 
 _RADIAN = Unit("angle", 1.0, "rad")
 _DEGREE = Unit("angle", np.pi / 180, "rad")
-_TURN = Unit("angle", 2 * np.pi, "rad")
-_ANGLES = {"radians": _RADIAN, "degrees": _DEGREE, "turns": _TURN}
-_TWO = ("radians", "degrees")
-"""Those that a header mixes up."""
 _UNKNOWN = Unit("own", 1.0, "1")
 _QUANTITIES: dict[str, Quantity] = {
     "angle": "angle_rad",
@@ -171,24 +167,25 @@ _UNITS_OF = re.compile(r"(?i)\b(?:vertical|length) units?\W+([a-zµ]+)")
 """What an oscilloscope, or a system of cameras, says above its table."""
 
 
-def _shown(column: Column, time_s: FloatArray, names: Iterable[str]) -> str | None:
-    """The unit of angles, among those named, in which the period lengthens as that of sin x.
-
-    It goes as K(sin(A/2)^2): to second order as 1 + A^2/16, so that of units which differ
-    by a factor of 6 or more at most one fits.
-    """
-    shares = ((name, sine_in(time_s, column.values, _ANGLES[name].factor)) for name in names)
-    return next((name for name, share in shares if share is not None and share.tells), None)
-
-
 def _contradicted(column: Column, written: Unit, time_s: FloatArray) -> _Guess | None:
     """Doubt a header that gives the one unit of angles where the period shows the other."""
-    headed = next((name for name in _TWO if _ANGLES[name] == written), None)
-    name = _shown(column, time_s, [name for name in _TWO if name != headed] if headed else ())
+    headed = next((name for name, size in ANGLES.items() if _angle_in(size) == written), "")
+    other = {"radians": "degrees", "degrees": "radians"}.get(headed, "")
+    name = _by_sine(column, time_s, other) if other else None
     if name is None:
         return None
     why = f"is headed in {headed}, but its period grows as a swing in {name} does: taken as such"
-    return _Guess(_ANGLES[name], why, "guessed")
+    return _Guess(_angle_in(ANGLES[name]), why, "guessed")
+
+
+def _by_sine(column: Column, time_s: FloatArray, *names: str) -> str | None:
+    """The unit of angles, among those named, in which the period lengthens as that of sin x."""
+    units = {name: ANGLES[name] for name in names}
+    return unit_shown(lambda size: sine_in(time_s, column.values, size), units)
+
+
+def _angle_in(size: float) -> Unit:
+    return Unit("angle", size, "rad")
 
 
 def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray) -> _Guess | None:
@@ -239,15 +236,15 @@ def _by_centre(finite: FloatArray) -> _Guess | None:
 def _by_period(column: Column, time_s: FloatArray) -> _Guess | None:
     """Take for radians, degrees or turns what is swung through ever faster, just as they are."""
     # Of what is named a position other units may well be pixels, of any length.
-    name = _shown(column, time_s, _TWO[:1] if column.role == "length" else _ANGLES)
+    name = _by_sine(column, time_s, *(["radians"] if column.role == "length" else ANGLES))
     if name is None:
         return None
     why = f"is in {name}: its period lengthens with the swing as sin x has it"
     # Of a pendulum 1 m long (2 s) metres look the same.
     usual = float(np.median(periods(time_s, column.values)[0]))
-    if name == _TWO[0] and column.role != "angle" and abs(usual - 2.0) < _METRE_S:
+    if name == "radians" and column.role != "angle" and abs(usual - 2.0) < _METRE_S:
         return _Guess(_RADIAN, f"{why}, or in metres, with a string of 1 m", "guessed")
-    return _Guess(_ANGLES[name], why, "shown", _BY_SINE)
+    return _Guess(_angle_in(ANGLES[name]), why, "shown", _BY_SINE)
 
 
 def _by_digits(finite: FloatArray) -> _Guess | None:

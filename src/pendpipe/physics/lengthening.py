@@ -1,6 +1,7 @@
 """How much of a pendulum's sin x periods ask for: the one test of a period that lengthens so."""
 
 import math
+from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -46,6 +47,27 @@ class Coefficient(NamedTuple):
     def tells(self) -> bool:
         """Whether it says of readings in which unit they are angles: in one where it agrees."""
         return self.agrees and self.sd < TELLS
+
+
+ANGLES: Final[Mapping[str, float]] = {
+    "radians": 1.0,
+    "degrees": math.pi / 180.0,
+    "turns": 2.0 * math.pi,
+}
+"""Of an angle, in rad."""
+
+
+def unit_shown(
+    share: Callable[[float], Coefficient | None], units: Mapping[str, float] = ANGLES
+) -> str | None:
+    """The one of `units` in which the `share` of sin x, a function of their size, is 1.
+
+    The period lengthens with the swing as K(sin(A/2)^2), to second order as 1 + A^2/16: of units
+    that differ by a factor of 6 or more at most one fits.
+    """
+    found = {name: share(size) for name, size in units.items()}
+    fitting = [name for name, each in found.items() if each is not None and each.tells]
+    return fitting[0] if len(fitting) == 1 else None
 
 
 def elliptic(m: FloatArray) -> tuple[FloatArray, FloatArray]:
