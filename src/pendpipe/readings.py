@@ -275,7 +275,7 @@ def find_step(values: FloatArray) -> float | None:
     values with one step. Numbers with a fixed number of digits (0.0938, 0.104) have no one step.
     """
     finite = values[np.isfinite(values)]
-    if len(finite) < 2 or np.abs(finite).max() > 1e100:
+    if len(finite) < 2 or np.abs(finite).max() > _LARGEST:
         return None
     jumps = np.abs(np.diff(finite))
     # Values that arithmetic has left a rounding error apart are one value.

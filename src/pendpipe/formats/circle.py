@@ -83,6 +83,11 @@ def seen_from_pivot(x: Column, y: Column, time_s: FloatArray) -> Seen:
 
 _KNOWN: Final = 0.03
 """Of the radius, to which a centre is known: angles are then wrong by as much at most."""
+_AWAY: Final = 0.1
+"""Of the radius, by which a pivot lies off (0, 0): three of `_KNOWN`."""
+_FEWEST: Final = 50
+_BETTER: Final = 30.0
+"""F of two parameters and 47 positions beyond three, which chance exceeds 4 times in 10^9."""
 _LENGTHS: Final = (1.0, 0.01, 1e-3, 0.0254)
 """Metres of the units in which positions are given."""
 
@@ -94,13 +99,13 @@ def _better_circle(x: FloatArray, y: FloatArray) -> FloatArray | None:
     radius, and further than a tenth of it from (0, 0).
     """
     fit = _circle_of(x, y)
-    if fit is None or len(fit[1]) < 50 or not on_a_circle(x, y, named=True):
+    if fit is None or len(fit[1]) < _FEWEST or not on_a_circle(x, y, named=True):
         return None
     centre, arm, known = fit
     about, origin = (np.hypot(*points.T) for points in (arm, arm + centre))
     test = 0.5 * (float(np.var(origin) / np.var(about)) - 1.0) * (len(arm) - 3)
-    far = math.hypot(*centre) > 0.1 * float(about.mean())
-    return centre if known < _KNOWN and test > 30.0 and far else None
+    far = math.hypot(*centre) > _AWAY * float(about.mean())
+    return centre if known < _KNOWN and test > _BETTER and far else None
 
 
 def pivot_of(x: FloatArray, y: FloatArray) -> FloatArray | None:
@@ -118,7 +123,7 @@ def pivot_of(x: FloatArray, y: FloatArray) -> FloatArray | None:
     away = math.hypot(*centre) / mean
     # The farther from (0, 0), the less the circle need show.
     clear = np.std(radius) < min(max(0.3, 1.5 * away), 0.5) * np.std(arm[:, 1])
-    return centre if known < _KNOWN and hangs and clear and away > 0.1 else None
+    return centre if known < _KNOWN and hangs and clear and away > _AWAY else None
 
 
 def _circle_of(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, float] | None:

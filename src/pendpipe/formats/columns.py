@@ -15,6 +15,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
 from pendpipe.facts import Fact, How
 from pendpipe.formats.circle import on_a_circle, pivot_of
+from pendpipe.formats.grammar import MOST_DAMAGED
 from pendpipe.formats.lists import ONE_WAY, Listed, counts_samples, list_in, one_way
 from pendpipe.formats.table import Column, ReadOptions, Table, derivative_slope, evenness
 from pendpipe.formats.words import Role, Unit, counts_swings, plain, role_of, split_header, unit_of
@@ -34,6 +35,8 @@ _WORTH: Final[Mapping[Role, float]] = {
 }
 _PAIR: Final = 5.0
 """A position x, y on a circle about the pivot is worth less than an angle, more than x."""
+_LONGEST_NAME: Final = 60
+"""Letters of a column's name in a message of one line."""
 _STILL: Final = 0.01
 """What a column is worth that does not oscillate, beside one that does."""
 
@@ -68,7 +71,8 @@ class Choice:
 
 def listing(names: Sequence[str], most: int = 12) -> str:
     """Join names for a message of one line: the first dozen, each of a bearable length."""
-    shown = [name if len(name) <= 60 else name[:57] + "..." for name in names[:most]]
+    long = _LONGEST_NAME
+    shown = [name if len(name) <= long else name[: long - 3] + "..." for name in names[:most]]
     return ", ".join(shown) + f" and {len(names) - most} more" * (len(names) > most) or "none"
 
 
@@ -289,7 +293,7 @@ def _time(table: Table, options: ReadOptions) -> tuple[Column | None, bool]:
             continue
         # A drifting reading rises too, but hardly in even steps.
         even = evenness(column.values[np.isfinite(column.values)])
-        first = place <= 0 and role in ("unknown", "index", "length") and share > 0.99
+        first = place <= 0 and role in ("unknown", "index", "length") and share > 1.0 - MOST_DAMAGED
         if not named and even < 0.5 and not first:
             continue
         score = 10.0 * named + 2.0 * (place <= 0) + 3.0 * even + share

@@ -18,6 +18,8 @@ import numpy as np
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.formats.lists import SETTINGS, STATES, WAVEFORM, holds_settings
 from pendpipe.formats.table import (
+    ABSURD,
+    FEWEST_ROWS,
     Column,
     NotThisFormatError,
     ReadOptions,
@@ -270,7 +272,7 @@ def read_project(place: Path, data: bytes, options: ReadOptions) -> Table:  # no
         name, found = "tracker", _of_tracker(place, root)
     else:
         raise NotThisFormatError("the XML is none of CASSY Lab's, Logger Pro's or Tracker's")
-    found = [(title, unit, values) for title, unit, values in found if len(values) > 3]
+    found = [(title, unit, values) for title, unit, values in found if len(values) >= FEWEST_ROWS]
     refuse_if(not found, place, "the project holds no samples", "export the data as CSV")
     # Runs side by side are of unlike length: the shorter end in empty cells.
     values = np.array([*zip_longest(*(each[2] for each in found), fillvalue=np.nan)], np.float64)
@@ -290,7 +292,7 @@ def _number(text: str | None) -> float:
         value = float((text or "").strip().replace(",", "."))
     except ValueError:
         value = np.nan
-    return value if abs(value) < 1e300 else np.nan
+    return value if abs(value) < ABSURD else np.nan
 
 
 _Named = tuple[str, str, Sequence[float]]

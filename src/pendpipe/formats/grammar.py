@@ -19,7 +19,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
 from pendpipe.facts import Fact
 from pendpipe.formats.clock import is_clock
-from pendpipe.formats.table import ReadOptions, evenness
+from pendpipe.formats.table import FEWEST_ROWS, ReadOptions, evenness
 from pendpipe.formats.words import unit_of
 
 COMMENT: Final = ("#", "%", "//", "!")
@@ -278,7 +278,7 @@ def first_row(lines: Sequence[str], layout: Layout) -> int | None:
         first = at if first is None and good else first
         gain = 1 if good else -2 if has_number(line) else -1
         value, start = (value + gain, start) if value > 0 else (gain, at)
-        if value == 4:  # (a few rows of numbers belong to a header)
+        if value == FEWEST_ROWS:
             return start
     return first
 
@@ -304,7 +304,9 @@ def joined_commas(
         these are parts of a decimal. A decimal part changes, and a time rises evenly.
     """
     rows = [row for row in map(layout.split, lines) if len(row) == layout.width]
-    columns = [list(column) for column in zip(*rows, strict=True)] if len(rows) > 3 else []
+    columns = (
+        [list(column) for column in zip(*rows, strict=True)] if len(rows) >= FEWEST_ROWS else []
+    )
     whole = [_often(r"[+-]?\d+", column) > _NEARLY_ALL for column in columns]
     parts = [_often(r"[0-9]+", column) > _NEARLY_ALL for column in columns]
     pairs = [a and b for a, b in zip(whole, parts[1:], strict=False)]

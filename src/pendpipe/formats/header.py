@@ -48,6 +48,8 @@ _SAMPLING: Final = re.compile(
     re.I,
 )
 """``Sampling: 50 Hz``, ``sampling: 20 ms``: the unit alone tells which it is."""
+_LONGEST_KEY: Final = 40
+"""Letters before the colon of a remark; more are a sentence."""
 _VALUE: Final = re.compile(r"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)\s*([a-zµ/]*)", re.I)
 
 
@@ -208,7 +210,7 @@ def interval_of(lines: Sequence[str]) -> float | None:
             inverse = any(sign in unit for sign in ("hz", "s/s", "sps", "fps"))
             number *= inverse or unit in ("s", "ms", "us", "µs")
         known = {"khz": 1e3} if inverse else {"ms": 1e-3, "us": 1e-6, "µs": 1e-6}
-        if 1e-9 < number < 1e12:
+        if number > 0.0:
             number *= next((size for sign, size in known.items() if sign in unit), 1.0)
             return 1.0 / number if inverse else number
     alone = re.findall(r"(?<![\w.,])(\d+(?:\.\d+)?) ?(k?)(?:Hz|sps)\b", " ".join(lines))
@@ -219,5 +221,5 @@ def interval_of(lines: Sequence[str]) -> float | None:
 def _metadata(lines: Sequence[str]) -> dict[str, str]:
     """Keep ``key: value`` lines (with or without a comment sign) as they stand."""
     parts = (line.strip().lstrip("#%/! ").partition(":") for line in lines[:200])
-    told = {k.strip(): v.strip() for k, _, v in parts if v.strip() and 0 < len(k) <= 40}
+    told = {k.strip(): v.strip() for k, _, v in parts if v.strip() and 0 < len(k) <= _LONGEST_KEY}
     return {"header": " ".join(lines)[:4000]} | told

@@ -25,6 +25,7 @@ from pendpipe.formats.lost import lost_readings
 from pendpipe.formats.plugin import HEAD
 from pendpipe.formats.saturation import clipped_samples, saturation
 from pendpipe.formats.table import (
+    ABSURD,
     Column,
     Gap,
     Marker,
@@ -291,7 +292,9 @@ def _refuse_absurd(table: Table, base: TimeBase, values: FloatArray) -> None:
     for name, some in (("times", base.time_s), ("readings", values[~np.isnan(values)])):
         span = np.ptp(some) if some.size else 0.0
         problem = f"the {name} span {span:.3g}, which no pendulum does"
-        refuse_if(span and not 1e-30 < span < 1e30, table.place, problem, "check their unit")
+        refuse_if(
+            span and not 1.0 / ABSURD < span < ABSURD, table.place, problem, "check their unit"
+        )
 
 
 _KEPT: Final = ("volts_per_radian", "bits", "range_volts", "range_low_volts", "recorded_at")

@@ -28,6 +28,8 @@ ABSURD: Final = 1e100
 """Beyond this nothing was measured; squares of it are no numbers."""
 FEWEST: Final = 8
 """Readings that show a swing: of two cycles, four in each."""
+FEWEST_ROWS: Final = 4
+"""Rows of a table, or numbers of an array: fewer belong to a header."""
 _WANDER: Final = 8.0
 """Cycles up to which what moves may as well drift: the lowest of the bins that are looked at."""
 _LOOKED_AT: Final = 1 << 15
@@ -175,7 +177,7 @@ def derivative_slope(time: FloatArray, values: FloatArray, other: FloatArray) ->
     """
     good = np.isfinite(time) & np.isfinite(values) & np.isfinite(other)
     time, values, other = time[good], values[good], other[good]
-    if len(time) < 16 or np.any(np.diff(time) <= 0) or np.abs(values).max() > ABSURD:
+    if len(time) < 2 * FEWEST or np.any(np.diff(time) <= 0) or np.abs(values).max() > ABSURD:
         return None
     rate = np.gradient(values, time)
     # Twice averaged over neighbours, both alike: differences of a noisy reading are noise.

@@ -24,7 +24,14 @@ from pendpipe.formats.grammar import (
     short_of,
 )
 from pendpipe.formats.header import Header, read_header
-from pendpipe.formats.table import Column, NotThisFormatError, ReadOptions, Table, next_reader_if
+from pendpipe.formats.table import (
+    FEWEST,
+    Column,
+    NotThisFormatError,
+    ReadOptions,
+    Table,
+    next_reader_if,
+)
 from pendpipe.formats.undress import UNDRESSED
 from pendpipe.formats.words import role_of, split_header, unit_of
 
@@ -39,6 +46,8 @@ _MOST_ROWS: Final = 5_000_000
 """Rows of any length: they take 0.8 GB."""
 _SHORTEST_ROW: Final = 13
 """Bytes of a row among more: a time of seven digits and its point, and a reading of four."""
+_LOOKED_AT: Final = 1 << 16
+"""Bytes in which an encoding shows: the header, and remarks."""
 _LONGEST_LINE: Final = 1 << 20
 _LONGEST_HEADER: Final = 5000
 _WIDEST: Final = 64
@@ -67,7 +76,7 @@ def decode(data: bytes) -> str:
 
 def _encoding(data: bytes) -> str:
     """Name the encoding of a text."""
-    head = data[:65536]
+    head = data[:_LOOKED_AT]
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16"
     for start, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
@@ -80,7 +89,7 @@ def _encoding(data: bytes) -> str:
         data.decode("utf-8-sig")
     except UnicodeDecodeError as fault:
         # A torn byte or two in a long log leave its other characters what they are.
-        if fault.start > 65536 or data.count(b"\xc3") + data.count(b"\xc2") > 8:
+        if fault.start > _LOOKED_AT or data.count(b"\xc3") + data.count(b"\xc2") > 8:
             return "utf-8-sig"
         eastern = ("gb18030", "big5", "cp932", "cp949", "cp1251")
         likely = (e for e in eastern if _EASTERN.search(head.decode(e, errors="replace")))
@@ -478,7 +487,7 @@ def _by_key(
         (c for c in columns if role_of(c.name) == "time" and len(c.values) == len(which)), None
     )
     rows = [np.flatnonzero(which == key) for key in dict.fromkeys(keys) if key != ""]
-    some_keys, rows = len(rows), [each for each in rows if len(each) >= 8]
+    some_keys, rows = len(rows), [each for each in rows if len(each) >= FEWEST]
     if clock is None or not rows or not 1 < some_keys <= _MOST_KEYS:
         return columns, numbers
     if np.all(np.diff(clock.values) > 0) or any(

@@ -14,7 +14,7 @@ from pendpipe.facts import SWINGS, Fact, How
 from pendpipe.formats.columns import Choice
 from pendpipe.formats.grammar import MOST_DAMAGED
 from pendpipe.formats.lists import ONE_WAY, counts_samples, one_way
-from pendpipe.formats.table import Column, ReadOptions, Table, periods
+from pendpipe.formats.table import FEWEST, Column, ReadOptions, Table, periods
 from pendpipe.formats.words import Unit, counts_swings, plain, unit_of
 from pendpipe.recording import is_uniform
 
@@ -55,6 +55,16 @@ _MOST_MISSING: Final = 0.02
 """Of the rows, beyond which missing frames make any interval fit."""
 _MOST_TORN: Final = 0.05
 """Share of stamps off the longest rise that are interpolated, since their rows stay."""
+_BESIDE: Final = 4
+"""Stamps to each side of one, by whose median the step there is known."""
+_WITHIN: Final = 0.6
+"""Of its last digit, within which a stamp lies: half of it by rounding, and a tenth of jitter."""
+_RUNS: Final = 50
+"""Runs below one another at most, and rows of each at least."""
+_BETTER: Final = 1000.0
+"""Times by which periods agree better, beyond which only the digits of the stamps show."""
+_DAYS: Final = (2e4, 1e6)
+"""Days since 1900 by which spreadsheets count, from 1954 on."""
 _TRIES, _ROUNDS = 21, 8
 """Numbers of missing frames that are tried, and lines through the stamps of each count."""
 _FEW_TRIES: Final = 3
@@ -256,7 +266,8 @@ def _time_by_size(column: Column, period: float, values: FloatArray) -> tuple[fl
         said = f"'{column.label}' has no unit: taken to be {name} by a period of {period:.4g}"
         return factor, Fact(kind, name, "guessed", said)
     if 0.0 < period < _SHORTEST_S < 86400.0 * period < _LONGEST_S * 1e3:
-        dated = 2e4 < float(np.abs(values).max(initial=0.0)) < 1e6
+        first, last = _DAYS
+        dated = first < float(np.abs(values).max(initial=0.0)) < last
         said = f"'{column.label}' is taken to be in days, as spreadsheets count"
         return 86400.0, Fact(
             kind, "days", "shown" if dated else "guessed", said, _OTHER_PERIODS if dated else None
@@ -353,7 +364,7 @@ def _count_rows(_choice: Choice, base: TimeBase) -> None:
 def _count_late_rows(choice: Choice, base: TimeBase) -> None:
     """Count rows that were stamped as they arrived: by rows the periods agree far better."""
     values = _values(choice, base)
-    if len(values) < 9:
+    if len(values) <= FEWEST:
         return
     # Rows that arrive in bursts are even within these, which take up little of the time.
     steps = np.diff(base.time_s)
@@ -362,19 +373,19 @@ def _count_late_rows(choice: Choice, base: TimeBase) -> None:
     index = np.arange(len(values))
     even: FloatArray = np.polynomial.Polynomial.fit(index, base.time_s, 1)(index)
     stamped, counted = (periods(time, values)[0] for time in (base.time_s, even))
-    if min(len(stamped), len(counted)) < 8:
+    if min(len(stamped), len(counted)) < FEWEST:
         return
     scatter = [np.median(np.abs(np.diff(found))) / np.median(found) for found in (stamped, counted)]
     if scatter[1] < min(0.1 * scatter[0], 0.03):
         late = float(np.std(base.time_s - even))
         # Of exact times the periods agree to the last digit.
-        better = float(min(scatter[0] / max(scatter[1], 1e-300), 1000.0))
+        better = float(min(scatter[0] / max(scatter[1], 1e-300), _BETTER))
         rate = 1.0 / (even[1] - even[0])
         base.say(
             *("clock", f"{rate:.6g} Hz"),
             f"time stamps scatter by {late:.2g} s, as of arrival: rows are counted at"
             f" {rate:.6g} Hz, by which the periods agree"
-            f" {better:.0f} times better{' or more' * (better == 1000.0)}; the rate is known"
+            f" {better:.0f} times better{' or more' * (better == _BETTER)}; the rate is known"
             f" to {100.0 * late / np.ptp(even):.1g} %",
             "guessed",
         )
@@ -384,7 +395,11 @@ def _count_late_rows(choice: Choice, base: TimeBase) -> None:
 def _without_lone_ends(base: TimeBase) -> None:
     """Leave out a first or last row that a torn stamp has put a long way from the others."""
     steps = np.diff(base.time_s)
-    usual = float(np.median(steps)) if len(steps) > 99 and is_uniform(base.time_s) else np.inf
+    usual = (
+        float(np.median(steps))
+        if len(steps) * MOST_DAMAGED > 1 and is_uniform(base.time_s)
+        else np.inf
+    )
     first, last = (bool(np.any(end > 50.0 * usual)) for end in (steps[:1], steps[-1:]))
     if first or last:
         note = f"{first + last} lone row(s) left out, with a stamp far from the others'"
@@ -421,7 +436,7 @@ def _first_of_stacked(_choice: Choice, base: TimeBase) -> None:
     starts = np.flatnonzero(np.diff(base.time_s) < 0) + 1
     lengths = np.diff(np.concatenate(([0], starts, [len(base.time_s)])))
     again = np.abs(base.time_s[starts] - base.time_s[0]) < 0.05 * np.ptp(base.time_s)
-    if not 0 < len(starts) <= 50 or lengths.min() < 50 or not again.all():
+    if not 0 < len(starts) <= _RUNS or lengths.min() < _RUNS or not again.all():
         return
     base.say(
         *("rows", f"the first {lengths[0]}"),
@@ -518,7 +533,7 @@ def _rounded(time: FloatArray, lines: IntArray | None = None) -> FloatArray | No
         even: FloatArray = np.polynomial.Polynomial.fit(place, centre, 1, w=1.0 / digit)(place)
         # Of two rows in three the rounding errors have a mean: the line lies midway.
         even += 0.5 * float(np.max(centre - even) + np.min(centre - even)) * (late == 0.0)
-        if np.all(np.abs(centre - even) <= 0.6 * digit) and even[-1] > even[0]:
+        if np.all(np.abs(centre - even) <= _WITHIN * digit) and even[-1] > even[0]:
             return even
     if np.mean(steps == 0) < _ROUNDED:
         return None
@@ -533,13 +548,15 @@ def _coarseness(time: FloatArray) -> FloatArray:
     """
     digit = _last_digit(time)
     starts = np.flatnonzero(np.diff(time, prepend=-np.inf) > 0.0)
-    if len(starts) < 9:
+    if len(starts) <= 2 * _BESIDE:
         return digit
+    window = 2 * _BESIDE + 1
     rows = np.diff(np.append(starts, len(time)))
     step = np.diff(time[starts])
-    around = sliding_window_view(np.pad(np.append(step, step[-1:]), 4, mode="edge"), 9)
+    around = sliding_window_view(np.pad(np.append(step, step[-1:]), _BESIDE, mode="edge"), window)
     usual = np.median(around, axis=1)
-    crowded = np.mean(sliding_window_view(np.pad(rows, 4, mode="reflect"), 9), axis=1) > 1.3
+    padded = np.pad(rows, _BESIDE, mode="reflect")
+    crowded = np.mean(sliding_window_view(padded, window), axis=1) > 1.3
     blocks: FloatArray = np.repeat(np.where(crowded, usual, 0.0), rows)
     return np.maximum(digit, blocks)
 
@@ -571,7 +588,7 @@ def _frames(time: FloatArray, digit: FloatArray, index: FloatArray) -> FloatArra
         ``None`` where some stamp contradicts each count, or more than 2 % are missing: of
         so many any interval would do.
     """
-    slack, rows = 0.6 * digit, float(index[-1])
+    slack, rows = _WITHIN * digit, float(index[-1])
     most = _MOST_MISSING * len(time) + 3.0
     tries = _TRIES if len(time) < _LONG else _FEW_TRIES
     missing = np.unique(np.rint(np.linspace(0.0, most, tries))).tolist()
@@ -586,7 +603,7 @@ def _frames(time: FloatArray, digit: FloatArray, index: FloatArray) -> FloatArra
             even: FloatArray = start + interval * count
             off = (time - even) / digit
             score = 6.0 * float(off @ off) + float(count[-1] - rows) * np.log(len(time))
-            if score < least and np.all(np.abs(off) <= 0.6):
+            if score < least and np.all(np.abs(off) <= _WITHIN):
                 least, found = score, even
             line = np.polynomial.Polynomial.fit(count, time, 1, w=1.0 / digit).convert()
             start, interval = line.coef.tolist()

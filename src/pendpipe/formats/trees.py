@@ -19,6 +19,7 @@ from pendpipe.formats.grammar import MOST_COLUMNS
 from pendpipe.formats.header import interval_of
 from pendpipe.formats.lists import SETTINGS, WAVEFORM
 from pendpipe.formats.table import (
+    FEWEST_ROWS,
     Column,
     NotThisFormatError,
     ReadOptions,
@@ -36,6 +37,8 @@ MOST: Final = 1 << 27
 _LARGEST_JSON: Final = 48 << 20
 _MOST_CELLS: Final = 1_500_000
 """Of records with texts: half a gigabyte."""
+_DEEPEST, _WIDEST = 12, 64
+"""Structures in one another; columns of a matrix, and entries of a list of structures."""
 _OUTSIDE: Final = "data sets of other files belong to it: copy them into it (h5repack)"
 _MOST_LISTS: Final = 2_000_000
 """Lists and records of a JSON document: each takes a hundred bytes or more."""
@@ -64,7 +67,7 @@ def table_of_tree(
         What the file says of an array's unit, by the array's name.
     """
     arrays = dict(_numbers(tree))
-    columns = {name: values for name, values in arrays.items() if values.size > 3}
+    columns = {name: values for name, values in arrays.items() if values.size >= FEWEST_ROWS}
     damaged_if(len(columns) > MOST_COLUMNS, f"it holds more than {MOST_COLUMNS} arrays")
     refuse_if(
         not columns,
@@ -89,7 +92,7 @@ def table_of_tree(
 
 def _numbers(tree: Any, path: str = "", depth: int = 0) -> Iterator[tuple[str, FloatArray]]:
     """Walk through dictionaries, lists and structures; give every real array as columns."""
-    if depth > 12 or tree is None:
+    if depth > _DEEPEST or tree is None:
         return
     if isinstance(tree, dict) and _is_list(tree):
         tree = list(tree.values())
@@ -105,7 +108,7 @@ def _numbers(tree: Any, path: str = "", depth: int = 0) -> Iterator[tuple[str, F
     named = tree if isinstance(tree, dict) else records
     inside = {f"{path}.{name}" if path else str(name): value for name, value in named.items()}
     if array.dtype == object and not isinstance(tree, dict):
-        entries = enumerate(array.reshape(-1)[:64], start=1)
+        entries = enumerate(array.reshape(-1)[:_WIDEST], start=1)
         inside = {path if array.size == 1 else f"{path}({n})": entry for n, entry in entries}
     for name, value in inside.items():
         yield from _numbers(value, name, depth + 1)
@@ -117,7 +120,7 @@ def _numbers(tree: Any, path: str = "", depth: int = 0) -> Iterator[tuple[str, F
     tall = flat.T if flat.ndim > 1 and flat.shape[0] < flat.shape[1] else flat
     if tall.ndim < 2:
         yield path, tall
-    elif tall.shape[1] <= 64:
+    elif tall.shape[1] <= _WIDEST:
         for number, column in enumerate(tall.T, start=1):
             yield f"{path}({number})", np.ascontiguousarray(column)
 
@@ -126,7 +129,7 @@ def _is_list(tree: dict[Any, Any]) -> bool:
     """Say whether keys only number the entries, as pandas', or name records of numbers."""
     records = [each.values() for each in tree.values() if isinstance(each, dict)]
     simple = all(isinstance(cell, int | float | str) for record in records for cell in record)
-    named = len(records) == len(tree) > 3 and simple and len({*map(len, records)}) == 1
+    named = len(records) == len(tree) >= FEWEST_ROWS and simple and len({*map(len, records)}) == 1
     return named or (len(tree) > 0 and all(str(key).isdigit() for key in tree))
 
 

@@ -1,6 +1,7 @@
 """The unit of the readings: as the file states it, else as one test of physics shows it."""
 
 import re
+import sys
 from dataclasses import dataclass
 from typing import Final
 
@@ -159,6 +160,8 @@ _NEAR: Final = 0.06
 """Chance that a number lies within 0.03 of a whole one."""
 _DIGITS: Final = 20
 """Readings of which `_printed_digit` looks at as many at least."""
+_PLACES: Final = 6
+"""Decimals that are looked for."""
 _VOLTS: Final = re.compile(r"(?i)volt|spannung|tensi|напряж|电压|電圧|^(u|ch(annel)? ?\d|ampl)$")
 """Names of voltages, and of the channels of an oscilloscope."""
 
@@ -226,9 +229,10 @@ def _by_centre(finite: FloatArray) -> _Guess | None:
     lie 14 turns off or more.
     """
     low, high = np.percentile(finite, (1, 99)).tolist()
-    centre, quarter = 0.5 * (low + high), 90.0
-    aside = abs(centre - quarter * round(centre / quarter))
-    if not (0.5 < abs(centre) / quarter < 3.5 and aside < _ASIDE and high - low < 2.0 * quarter):
+    centre, turn = 0.5 * (low + high), 360.0
+    nearest = 0.25 * turn * round(centre / (0.25 * turn))
+    aside = abs(centre - nearest)
+    if not (0.0 < abs(nearest) < turn and aside < _ASIDE and high - low < 0.5 * turn):
         return None
     return _Guess(_DEGREE, f"swings about {centre:.4g}: taken to be in degrees", "guessed")
 
@@ -265,11 +269,11 @@ def _by_digits(finite: FloatArray) -> _Guess | None:
 def _printed_digit(finite: FloatArray, scale: float) -> float | None:
     """Find the decimal place of which all readings, times `scale`, are multiples."""
     some = finite[:: max(1, len(finite) // 2000)]
-    # Beyond 1e9 a double has no such digits left.
-    if len(some) < _DIGITS or np.abs(some).max() > 1e9:
+    # Beyond it a double has no such digits left.
+    if len(some) < _DIGITS or np.abs(some).max() > 10.0 ** (sys.float_info.dig - _PLACES):
         return None
     some = scale * some
-    for place in range(7):
+    for place in range(_PLACES + 1):
         whole = some * 10.0**place
         # Of readings that have no such digit a few in a hundred are this near to one.
         if np.ptp(whole) > 20.0 and np.all(np.abs(whole - np.rint(whole)) < 0.5 * _NEAR):
@@ -291,12 +295,16 @@ def _by_rate(choice: Choice, column: Column, time_s: FloatArray) -> _Guess | Non
     return None
 
 
+_LEAST_TURN: Final = 256.0
+"""Counts of the coarsest absolute encoder, of 8 bits."""
+
+
 def _over_the_turn(values: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     """Undo the jumps of an absolute encoder of 2^k counts that hangs near its zero."""
     finite = np.isfinite(values)
     low, high = np.min(values[finite], initial=0.0), np.max(values[finite], initial=0.0)
     turn = 2.0 ** np.ceil(np.log2(high + 1.0)) if high > 0.0 else 1.0
-    if low < 0.0 or turn < 256.0 or not np.any(np.abs(np.diff(values[finite])) > 0.8 * turn):
+    if low < 0.0 or turn < _LEAST_TURN or not np.any(np.abs(np.diff(values[finite])) > 0.8 * turn):
         return values, ()
     values[finite] = np.unwrap(values[finite], period=turn)
     return values, (f"the counts jump by a turn of {turn:g}: unwrapped",)

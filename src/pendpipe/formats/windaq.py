@@ -165,7 +165,7 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
         f"open and save it in WinDaq, or {_ANOTHER_COPY}",
     )
     told = np.frombuffer(data, _HEADER, 1)[0]
-    count = int(told["channels"]) & (0x1F if size <= 1536 else 0xFF)
+    count = int(told["channels"]) & (0x1F if size <= _SIZES[1] else 0xFF)
     table, entry = int(told["table"]), int(told["entry"])
     refuse_if(
         not count or table + count * entry > size - 2 or entry < _ENTRY,
@@ -214,7 +214,7 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
         1.0 / options.sample_rate if false and options.sample_rate else interval,
         hires,
         packed,
-        circular=size == 1536 or suffix in (".wdc", ".whc"),
+        circular=size == _SIZES[1] or suffix in (".wdc", ".whc"),
         notes=tuple(notes),
     )
 

@@ -3,6 +3,7 @@
 import re
 
 from pendpipe.formats.plugin import text_dialect
+from pendpipe.formats.table import FEWEST_ROWS
 
 
 def _lines(lines: list[str]) -> list[str]:
@@ -13,7 +14,9 @@ def _lines(lines: list[str]) -> list[str]:
     columns = [[b[0], *cells] for b, some in zip(blocks, across, strict=True) for cells in some]
     longest = max(map(len, columns), default=0)
     columns = [column for column in columns if len(column) == longest]
-    return ["\t".join(row) for row in zip(*columns, strict=True)] if longest > 4 else lines
+    return (
+        ["\t".join(row) for row in zip(*columns, strict=True)] if longest > FEWEST_ROWS else lines
+    )
 
 
 OCTAVE = text_dialect("file of Octave", re.compile("# Created by Octave").match, _lines)
