@@ -10,6 +10,10 @@ import pytest
 
 from pendpipe.facts import KINDS, Fact
 from pendpipe.formats import ReadOptions, inspect, read
+from pendpipe.formats.lost import lost_readings
+from pendpipe.formats.saturation import saturation
+from pendpipe.formats.table import swing_of
+from pendpipe.readings import find_step
 
 from .cases import swing
 
@@ -28,6 +32,30 @@ def test_a_sample_shows_its_fact(expected: Path) -> None:
 def test_each_kind_of_fact_has_samples() -> None:
     kinds = {path.parent.name.replace("_", " ") for path in SAMPLES}
     assert KINDS.keys() - kinds == {"sensor constant"}  # which `fit` asks for, and no reader
+
+
+def drawn(rng: np.random.Generator) -> Any:
+    """A sound swing: 5 to 400 readings a cycle, Q of 10 to 1000, noise, and mostly a step."""
+
+    def between(low: float, high: float) -> float:
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+    cycle, quality = between(5.0, 400.0), between(10.0, 1000.0)
+    turns = np.arange(min(int(cycle * between(8.0, 200.0)), 20_000)) / cycle
+    swing = np.exp(-np.pi * turns / quality) * np.cos(2.0 * np.pi * turns + rng.uniform(0.0, 6.3))
+    swing += between(1e-5, 0.1) * rng.standard_normal(len(turns))
+    step = between(1e-4, 0.05) if rng.integers(3) else 1e-9
+    return step * np.rint(swing / step)
+
+
+@pytest.mark.slow
+def test_of_sound_swings_one_in_250_loses_readings_and_none_is_cut_off() -> None:
+    """So the facts say; of 1000 more than eleven lose some less than one time in 1000."""
+    rng = np.random.default_rng(660)
+    swings = [drawn(rng) for _ in range(1000)]
+    found = [lost_readings(each, swings=swing_of(each).clear)[1] for each in swings]
+    assert sum(map(bool, found)) <= 11
+    assert not any(saturation(each, find_step(each)) for each in swings)
 
 
 def written(path: Path, header: str, *columns: Any) -> Path:
