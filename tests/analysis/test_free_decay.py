@@ -810,14 +810,15 @@ def test_of_three_half_cycles_the_first_and_the_last_tell_the_fall(
     assert _falls(SimpleNamespace(swing=swing), 0.5) is falls  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("lost", [0.0, 1.3, 3.0])
 @pytest.mark.parametrize("seed", range(4))
-def test_few_readings_clicked_by_hand_show_period_and_loss(seed: int) -> None:
-    """At uneven times, 4.5 to 9 in a cycle: no reading lies at a turning point."""
+def test_few_readings_clicked_by_hand_show_period_and_loss(seed: int, lost: float) -> None:
+    """At uneven times, 4.5 to 9 in a cycle, some cycles lost: none lies at a turning point."""
     rng = np.random.default_rng(seed)
     period, quality, count = rng.uniform(0.8, 2.5), rng.uniform(20.0, 150.0), 150
     time = np.cumsum(period / rng.uniform(4.5, 9.0) * rng.choice([0.7, 0.9, 1.0, 1.4], count))
     values = 0.3 * np.exp(-np.pi * time / (period * quality)) * np.cos(2.0 * np.pi * time / period)
-    recording = Recording(time_s=time, angle_rad=values + 3e-3 * rng.standard_normal(count))
-    found = fit(recording, restoring="linear")
+    values, kept = values + 3e-3 * rng.standard_normal(count), abs(time / period - 7.0) >= lost / 2
+    found = fit(Recording(time_s=time[kept], angle_rad=values[kept]), restoring="linear")
     assert abs(found["period"].value - period) < 4.0 * found["period"].sd
     assert found["Q"].value == pytest.approx(quality, rel=0.15)

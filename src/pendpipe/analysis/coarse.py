@@ -105,6 +105,10 @@ _MOST_UNEVEN: Final = 1 << 12
 """Readings at uneven times, as people click them in a video: their spectrum takes n^2."""
 
 
+_MOSTLY: Final = 0.8
+"""Share of the readings in stretches as long as a window: of fewer some of the swing is lost."""
+
+
 def _between_uneven(
     time_s: FloatArray, values: FloatArray, step: float | None, dense: float
 ) -> Between | None:
@@ -117,19 +121,25 @@ def _between_uneven(
     power = lombscargle(time_s - time_s[0], rest, omegas)
     omega = float(omegas[np.argmax(power)])
     per_cycle = 2.0 * math.pi * count / (omega * span)
-    most = omega * float(np.max(np.diff(time_s))) / math.pi
-    if not _SPARSE < per_cycle < dense or most > 1.0:  # a half cycle is in a gap
-        return None
+    # Nobody knows the swing in a gap of half a cycle: it is read to each side of it.
+    parted = np.split(np.arange(count), np.flatnonzero(omega * np.diff(time_s) > math.pi) + 1)
     window = min(max(round(_WINDOW * per_cycle), 8), count)
-    place = np.linspace(time_s[0], time_s[-1], math.ceil(_WANTED * count / per_cycle))
-    first = np.clip(np.searchsorted(time_s, place) - window // 2, 0, count - window)
-    rows = first[:, None] + np.arange(window)
-    design = _wave(time_s[rows] - place[:, None], omega)
-    sizes = np.einsum("npw,nw->np", np.linalg.pinv(design, rcond=1e-6), values[rows])
-    left = values[rows] - np.einsum("nwp,np->nw", design, sizes)
-    square = float(np.sum(left**2)) / len(left)
-    noise = scatter(square, window - design.shape[2], step)
-    return Between(place, sizes[:, 0] + sizes[:, 1], noise, window)
+    read = [part for part in parted if len(part) >= window]
+    if not _SPARSE < per_cycle < dense or sum(map(len, read)) < _MOSTLY * count:
+        return None
+    places, found, squares = list[FloatArray](), list[FloatArray](), list[float]()
+    for part in read:
+        points = math.ceil(_WANTED * len(part) / per_cycle)
+        place = np.linspace(time_s[part[0]], time_s[part[-1]], points)
+        first = np.searchsorted(time_s[part], place) - window // 2
+        rows = part[np.clip(first, 0, len(part) - window)][:, None] + np.arange(window)
+        design = _wave(time_s[rows] - place[:, None], omega)
+        sizes = np.einsum("npw,nw->np", np.linalg.pinv(design, rcond=1e-6), values[rows])
+        left = values[rows] - np.einsum("nwp,np->nw", design, sizes)
+        places, found = [*places, place], [*found, sizes[:, 0] + sizes[:, 1]]
+        squares += np.sum(left**2, axis=1).tolist()
+    noise = scatter(float(np.mean(squares)), window - design.shape[2], step)
+    return Between(np.concatenate(places), np.concatenate(found), noise, window)
 
 
 def _wave(at: FloatArray, omega: float) -> FloatArray:
