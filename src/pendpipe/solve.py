@@ -50,7 +50,7 @@ _LAST_STEPS: Final = 3
 """Last steps from which the gain of further ones is extrapolated."""
 _TRIES: Final = 6
 """Lengths of one step that are tried: from a tenth each, six reach 1e-6 of it."""
-_POOR: Final = 0.25
+_POOR: Final = 0.25  # as More (1978) has it
 _GOOD: Final = 0.75
 """Parts of the expected gain below (above) which a step was too long (may be longer)."""
 _SHORTER: Final = (0.1, 0.5)
@@ -59,7 +59,7 @@ _LONGER: Final = 2.0
 """Radius of the next step over the length of the last; with the two above as More (1978) has."""
 _CLOSE: Final = 0.1
 """Of what a law is worse by than its rival."""
-_ROUNDING: Final = 1e-12
+_ROUNDING: Final = 1e-12  # of 10^6 squares, each right to 1e-16, with room
 _BY_ROUNDING: Final = 1e-6
 """Parts of chi^2 that are gained, and promised, by rounding errors alone."""
 
@@ -286,6 +286,7 @@ class Priors(NamedTuple):
 
 
 NO_PRIORS: Final = Priors(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+"""Of a problem of which nothing is known beforehand."""
 
 
 @dataclass(frozen=True)
@@ -729,6 +730,9 @@ CHI2_95: Final = 3.841458820694124
 _FAR: Final = 8.0
 """Standard deviations from which a bound is out of sight."""
 _CLOSE_TO: Final = 1e-10
+"""Of an interval's half length, which is printed with two digits: Newton's steps end there."""
+_AT_REST: Final = 1e-2
+"""Standard deviations that a gradient may pull: less than what ends a search."""
 _NEWTON: Final = 50
 """Steps to the end of an interval, at most."""
 
@@ -768,7 +772,7 @@ def intervals95(
     deviations = np.sqrt(np.maximum(matrix.diagonal(), 0.0))
     pull = np.abs(gradient * deviations)
     fitted = [j for j in range(len(value)) if j not in held]
-    at_rest = bool((pull if len(held) == 0 else pull[fitted]).max(initial=0.0) < 1e-2)
+    at_rest = bool((pull if len(held) == 0 else pull[fitted]).max(initial=0.0) < _AT_REST)
     half = math.sqrt(CHI2_95) * deviations
     room = bounds.about(value)
     if at_rest and bool(((room.lower <= -half) & (half <= room.upper)).all()):

@@ -23,6 +23,8 @@ from pendpipe.levels import FALSE_ALARM
 from pendpipe.readings import decimal_step
 
 ANGLES: Final = ("angle_rad", "angle_deg", "displacement_m")
+_OF_A_CUBIC: Final = 4
+"""Angles, which tell what is bent about a line by a square and a cube."""
 _LARGEST: Final = 1e6
 """No angle, displacement or voltage of a sensor is as large: what claims to be is a slip."""
 
@@ -281,7 +283,7 @@ def calibrate(
         linearity=_linearity(
             placed, residual, weights, slope, quantisation_rms(decimal_step(volts)), known=known
         )
-        if count >= (5 if known else 6) and len(np.unique(angle_rad)) >= 4
+        if count >= (5 if known else 6) and len(np.unique(angle_rad)) >= _OF_A_CUBIC
         else None,
     )
 

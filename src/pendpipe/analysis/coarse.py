@@ -18,6 +18,8 @@ DENSE: Final = 16.0
 """Readings in a cycle from which half cycles are followed as they are."""
 HARDLY: Final = 7.0
 """Readings in a cycle below which extremes are not even told from other motion."""
+_FEWEST: Final = 16
+"""Readings in which anything is sought, as in `turning_points.measure`."""
 _SPARSE: Final = 3.6
 """Readings in a cycle below which a second harmonic can't be told from a wander."""
 _WANTED: Final = 32.0
@@ -60,7 +62,7 @@ def between(
     count = len(values)
     above = values > float(np.mean(values))
     passages = np.count_nonzero(above[1:] != above[:-1])
-    if count < 16 or 2.0 * count > 1.2 * dense * passages:
+    if count < _FEWEST or 2.0 * count > 1.2 * dense * passages:
         return None
     intervals = np.diff(time_s)
     interval = float(np.mean(intervals))

@@ -109,6 +109,8 @@ SEEN: Final = deviations(1e8)
 """Standard deviations of the noise from which a swing is seen: the largest of 10^8 readings."""
 _STEPS: Final = 1.6
 """Steps of the readings from which a swing is seen: at rest between two they swing by one."""
+_OF_THREE: Final = 4
+"""Turning points of a swing and its two neighbours."""
 _SMALL: Final = 0.15
 """Of both neighbours: a swing below is a ripple."""
 
@@ -130,8 +132,8 @@ def without_ripples(values: FloatArray, turns: IntArray) -> IntArray:
     kept: list[int] = []
     for turn in turns.tolist():
         kept.append(turn)
-        while len(kept) >= 4:
-            a, b, c, d = (float(values[at]) for at in kept[-4:])
+        while len(kept) >= _OF_THREE:
+            a, b, c, d = (float(values[at]) for at in kept[-_OF_THREE:])
             if abs(c - b) >= _SMALL * min(abs(b - a), abs(d - c)):
                 break
             del kept[-3:-1]
@@ -145,7 +147,7 @@ def usual_half_period(time_s: FloatArray, values: FloatArray) -> float | None:
     span = float(high - low) or float(np.ptp(values))
     for share in (0.2, 0.05, 0.02):
         turns = without_ripples(values, find_extremes(values, share * span))
-        if len(turns) >= 4:
+        if len(turns) > LEAST_HALF_CYCLES:
             return float(np.median(np.diff(time_s[turns])))
     return None
 

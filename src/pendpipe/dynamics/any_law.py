@@ -137,6 +137,8 @@ _ROUNDS: Final = 25
 """Picard's iterations at most."""
 _STEP: Final = 1e-6
 """Of ln r in a numerical derivative: its error is 1e-6 of it, that of the rounding 1e-10."""
+_LOST: Final = 1e3
+"""Of ln r, or rad: an iteration that goes so far does not come back; nor does one that is NaN."""
 _STRIDE: Final = 0.7
 """Longest step in ln r."""
 _STEEPEST: Final = 0.97
@@ -342,7 +344,7 @@ def _solved(
             if largest == _LARGEST:
                 raise StopsError("the pendulum stops")
             return motion, np.full_like(now.pull, np.inf)
-        if not error < 1e3:
+        if not error < _LOST:
             break
         if error > 0.5 * before:
             motion = replace(motion, slopes=None)

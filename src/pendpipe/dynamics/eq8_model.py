@@ -163,14 +163,14 @@ class Eq8Model:
         return end
 
     def by_values(self, value: FloatArray, columns: FloatArray) -> FloatArray:
-        """Make the engine's derivatives, shape (..., 8 and any behind), those by the values."""
+        """Derivatives by the values from those by the engine's parameters, along the last axis."""
         # What is held of one part leaves a change of b to the other.
         share = float(VISCOUS in self.parts) if self.parts else float(value[SHARE])
-        hysteretic, viscous, coulomb = (columns[..., k].copy() for k in (1, 2, 3))
-        columns[..., B] = share * hysteretic + (1.0 - share) * viscous
-        columns[..., C] = coulomb
-        columns[..., SHARE] = (hysteretic - viscous) * (0.0 if self.parts else float(value[B]))
-        return columns
+        hysteretic, viscous, found = columns[..., 1], columns[..., 2], columns.copy()
+        found[..., B] = share * hysteretic + (1.0 - share) * viscous
+        found[..., C] = columns[..., 3]
+        found[..., SHARE] = (hysteretic - viscous) * (0.0 if self.parts else float(value[B]))
+        return found
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,7 @@ class Followed:
         """What the sensor reads, shape (n,)."""
         model, value = self.model, self.value
         if model.seen == "rate":
-            return self.with_jacobian[0]
+            return self.by_engine[0]
         law, release = model.motion_of(value)
         # Before it is let go it is held; a search that got there is no minimum, but has a residual.
         reading = sample(law, release, np.maximum(self.time_s, release.time_s))
@@ -205,11 +205,11 @@ class Followed:
     @property
     def jacobian(self) -> FloatArray:
         """Its derivatives by the values, shape (n, size)."""
-        return self.with_jacobian[1]
+        return self.model.by_values(self.value, self.by_engine[1])
 
     @cached_property
-    def with_jacobian(self) -> tuple[FloatArray, FloatArray]:
-        """Both at once.
+    def by_engine(self) -> tuple[FloatArray, FloatArray]:
+        """The reading, and its derivatives by the engine's parameters and what stands behind them.
 
         The motion depends on the time since its release alone, so that its rate is the derivative
         by the release's time, with the other sign.
@@ -236,7 +236,7 @@ class Followed:
             jacobian[:, DRIFT] = self._late
         if model.seen != "angle":
             reading = reading + value[OFFSET]
-        return self._drifted(reading), model.by_values(value, jacobian)
+        return self._drifted(reading), jacobian
 
     def _drifted(self, reading: FloatArray) -> FloatArray:
         drift = self.value[DRIFT:]

@@ -55,7 +55,7 @@ MOST_PANELS: Final = 8
 THETA: Final = 512
 """Places within a panel whose waves are computed together: 4 kB stay in the nearest cache."""
 
-TABLE: Final = MOST_POINTS + 1
+TABLE: Final = MOST_POINTS + 1  # behind the row of scratch
 ROW: Final = TABLE + MOST_POINTS
 """Half cycles are rows of one matrix (see `half_cycle.py`): those that a table is made of and one
 of scratch, from `TABLE` on the table, and in the row `ROW`, the last, the half cycle in hand."""
@@ -70,6 +70,7 @@ _S: Final = _RATES + 1
 """Sensitivities: to the amplitude, and to the rates."""
 Work = Any
 """A record of `WORK`."""
+# The arrays of the engine, one behind the other.
 WORK: Final = np.dtype(
     [
         ("shape", "f8", 6),  # m, h, q, g, k, f of `panel.py`

@@ -178,12 +178,16 @@ def _complex(value: FloatArray, count: int) -> tuple[AnyArray, AnyArray]:
     return grown + 1j * turned, cosine - 1j * sine
 
 
+_READINGS: Final = 6
+"""Twice the numbers of a level and a wave, which are told from as many readings."""
+
+
 def slow_amplitude(phase: FloatArray, values: FloatArray, edges: list[int]) -> AnyArray:
     """Complex amplitude between neighbouring edges, each about its own level."""
     found = []
     for first, last in pairwise(edges):
         wave = np.exp(-1j * phase[first:last])
-        if last - first < 6:
+        if last - first < _READINGS:
             break
         design = np.stack([np.ones(len(wave)), wave.real, wave.imag], axis=1)
         _, cosine, sine = np.linalg.lstsq(design, values[first:last], rcond=None)[0]

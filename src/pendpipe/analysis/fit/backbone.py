@@ -14,6 +14,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.fit.decrement import SIDES, standing_out
 from pendpipe.analysis.torque import period_excess, phases, swing_phase
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
@@ -27,8 +28,6 @@ _LENGTHS: Final = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Over which it may change, in the range of its argument; all are as likely beforehand."""
 _WIDTHS: Final = 10.0 ** np.arange(-8.0, 0.6, 0.5)
 """By what part of the guess it may differ from it: likewise, from nothing to everything."""
-_CLEAR: Final = 8.0
-"""Standard deviations that a turning point must stand out: ln y is then right to a percent."""
 _ROWS: Final = 33
 """Of the curves: 32 steps in ln y, of 7 % each over a fall to a tenth."""
 _BEYOND: Final = 0.3
@@ -174,9 +173,8 @@ def backbone_of(points: TurningPoints, law: Eq8, bent: FloatArray | None = None)
     the points give it. Where they scatter by more than their errors about every one of them, the
     errors are enlarged, and more if neighbours scatter alike.
     """
-    least = np.maximum(_CLEAR * points.angle_sd_rad, 4.0 * points.step_rad)
-    clear = points.chosen(points.amplitude_rad > least)
-    if len(clear) < 4:
+    clear = standing_out(points)
+    if len(clear) < SIDES:
         return None
     y = clear.amplitude_rad
     largest, smallest = float(np.max(y)), float(np.min(y))
@@ -249,7 +247,7 @@ def _loss(points: TurningPoints, rows: FloatArray) -> tuple[_Shape, FloatArray]:
     middle = np.sqrt(y[1:] * y[:-1])
     steps = lasts * (rate(y[1:]) + 4.0 * rate(middle) + rate(y[:-1])) / 6.0
     beside = [np.ones_like(y)]
-    if np.ptp(points.side) and len(y) > 4:
+    if np.ptp(points.side) and len(y) > SIDES:
         beside.append(points.side / y)
     logs, asked = np.log(middle), np.log(rows)
     low, high = float(asked[-1]), float(np.log(y.max()))
@@ -283,7 +281,7 @@ def _period(points: TurningPoints, law: Eq8, rows: FloatArray) -> _Shape:
     turned = phases(points, y, _losses(law), law.angular_frequency, law.restoring)
     steps = np.diff(turned) / law.angular_frequency
     beside = [np.ones_like(y)]
-    if np.ptp(points.side) and len(y) > 4:
+    if np.ptp(points.side) and len(y) > SIDES:
         beside.append(points.side)
     largest = float(np.max(y))
     middle = np.sqrt(y[1:] * y[:-1]) / largest

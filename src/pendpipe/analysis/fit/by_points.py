@@ -56,8 +56,8 @@ class EnvelopeFit:
     @property
     def chi2_per_dof(self) -> float:
         """chi^2 over points less parameters (the level brings its own datum)."""
-        freedom = len(self.residual) - (4 - len([j for j in self.held if j < 4]))
-        return self.quadratic.chi2 / max(freedom, 1)
+        fitted = {*range(len(ENVELOPE) - 1)} - {*self.held}
+        return self.quadratic.chi2 / max(len(self.residual) - len(fitted), 1)
 
 
 def fit_envelope(

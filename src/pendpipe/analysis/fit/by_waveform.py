@@ -158,7 +158,7 @@ class Waveform(Eq8Model):
         """chi^2, gradient and normal matrix, summed over pieces of the record."""
         chi2, slope, normal = 0.0, np.zeros(len(value)), np.zeros((len(value), len(value)))
         for piece, there in self._pieces(value):
-            reading, jacobian = there.with_jacobian
+            reading, jacobian = there.by_engine
             residual = self.values[piece] - reading
             if self.step == 0.0:
                 part, score, weighted = float(residual @ residual), residual, jacobian
@@ -172,19 +172,9 @@ class Waveform(Eq8Model):
         unit = self.noise_rms**-2 if self.step == 0.0 else 1.0
         chi2, slope, normal = unit * chi2, unit * slope, unit * normal
         prior, row = SHARES.residual(value), SHARES.rows(len(value))
+        slope = self.by_values(value, slope)
+        normal = self.by_values(value, self.by_values(value, normal).T)
         return Quadratic(chi2 + float(prior @ prior), slope + row.T @ prior, normal + row.T @ row)
-
-    def weighed(self, value: FloatArray, at: Quadratic, noise_rms: float) -> Quadratic:
-        """The same chi^2 with another noise.
-
-        Of rounded readings the likelihood has its own noise. What is known of the share beforehand
-        is as it was, and that no loss is more than the whole.
-        """
-        scale = 1.0 if self.step else (self.noise_rms / noise_rms) ** 2
-        of_share = SHARES.rows(len(value))
-        known = of_share.T @ of_share
-        normal = scale * (at.normal - known) + known + known_losses(value)
-        return Quadratic(scale * at.chi2, scale * at.gradient, normal)
 
 
 @dataclass(frozen=True)
@@ -243,9 +233,18 @@ class Fitted:
         return _fitted(replace(self.problem, **law), value, self.held, self.start, self.chi2)
 
     def quadratic(self, goodness: Goodness | None = None) -> Quadratic:
-        """Chi^2 there, for the noise that a test of fit found."""
+        """Chi^2 there, for the noise that a test of fit found.
+
+        Of rounded readings the likelihood has its own noise. What is known of the share beforehand
+        is as it was, and that no loss is more than the whole.
+        """
         noise = goodness.noise_rms if goodness else self.noise_rms
-        return self.problem.weighed(self.value, self.minimum.point.quadratic, noise)
+        scale = 1.0 if self.problem.step else (self.problem.noise_rms / noise) ** 2
+        chi2, gradient, normal = self.minimum.point.quadratic
+        of_share = SHARES.rows(len(self.value))
+        known = of_share.T @ of_share
+        normal = scale * (normal - known) + known + known_losses(self.value)
+        return Quadratic(scale * chi2, scale * gradient, normal)
 
     def chi2_between(self, first_s: float, last_s: float) -> float:
         """Chi^2 of the readings of a span."""

@@ -27,10 +27,12 @@ _CERTAIN: Final = deviations(12, REFUTED)
 among the dozen that share one level."""
 _FEWEST: Final = 5
 """Turning points of a window: a parabola, the level's error, and one to judge the scatter."""
-_SIDES: Final = 4
+SIDES: Final = 4
 """Turning points, two of each side, of which the level's error is told apart."""
 _FALL: Final = 0.4
 """Of ln amplitude in a window; beyond, a parabola does not follow Coulomb's straight line."""
+_OF_A_CYCLE: Final = 3
+"""Turning points, its beginning and its end among them."""
 _STEEP: Final = 0.5
 """The same over the fewest turning points: of Coulomb's straight line they show 2 % too little, and
 ever less nearer to the stop."""
@@ -95,6 +97,12 @@ class Check(NamedTuple):
         )
 
 
+def standing_out(points: TurningPoints) -> TurningPoints:
+    """The turning points that stand out of their errors, and of the step of the readings."""
+    least = np.maximum(CLEAR * points.angle_sd_rad, _STEPS * points.step_rad)
+    return points.chosen(points.amplitude_rad > least)
+
+
 def check_decrement(points: TurningPoints, law: Eq8) -> tuple[Check, ...]:
     """Compare a law's loss with the decrement at a large, a middle and a small amplitude.
 
@@ -110,14 +118,13 @@ def check_decrement(points: TurningPoints, law: Eq8) -> tuple[Check, ...]:
     tuple of Check
         The large amplitude first; empty where there are too few turning points.
     """
-    least = np.maximum(CLEAR * points.angle_sd_rad, _STEPS * points.step_rad)
-    clear = points.chosen(points.amplitude_rad > least)
+    clear = standing_out(points)
     while (
         len(clear) > 3 * _FEWEST
         and math.log(clear.amplitude_rad[-_FEWEST] / clear.amplitude_rad[-1]) > _STEEP
     ):
         clear = clear.first(len(clear) - 1)
-    if len(clear) < _SIDES:
+    if len(clear) < SIDES:
         return ()
     found = _seen(clear)
     part = clear
@@ -166,9 +173,9 @@ def seen_loss(points: TurningPoints) -> tuple[float, float, float, float]:
     span = float(np.ptp(points.time_s))
     z = (points.time_s - centre) / span
     columns = [np.ones_like(z), z]
-    if len(points) > _SIDES and np.ptp(points.side):
+    if len(points) > SIDES and np.ptp(points.side):
         columns.append(points.side * float(np.mean(amplitude)) / amplitude)
-    if len(points) > _SIDES + 1:
+    if len(points) > SIDES + 1:
         columns.append(z**2)
     weight = amplitude / points.angle_sd_rad
     design = np.stack(columns, axis=1) * weight[:, None]
@@ -217,11 +224,11 @@ def _cycle(law: Eq8, amplitude: float) -> tuple[float, float] | None:
     start = amplitude
     for _ in range(4):
         try:
-            cycle = turning_points(law, Release(0.0, start), count=3)
+            cycle = turning_points(law, Release(0.0, start), count=_OF_A_CYCLE)
         except ValueError:
             # Overdamped.
             return None
-        if len(cycle.time_s) < 3 or not abs(cycle.angle_rad[2]) > 0.0:
+        if len(cycle.time_s) < _OF_A_CYCLE or not abs(cycle.angle_rad[2]) > 0.0:
             # It stops within the cycle.
             return None
         found = start, math.log(start / abs(float(cycle.angle_rad[2]))) / float(cycle.time_s[2])

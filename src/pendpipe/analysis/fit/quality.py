@@ -292,16 +292,17 @@ def pendulum_of(result: Fitted) -> dict[str, Estimate]:
     With the torque of sin x the fitted omega is omega_0, that of small swings. Otherwise
     omega_0 = omega 2 K(sin(y/2))/pi at the root-mean-square angle y, where that is known.
     """
+    if result.length is None and result.gravity is None:
+        return {}
     linear = result.restoring == "linear"
     period = period_of_frequency(result.parameters["frequency"]) if linear else small_period(result)
     omega = math.tau / period.value * (swings_longer(result) or 1.0)
     relative = 2.0 * period.sd / period.value
     if result.length is not None:
         value, given, name, unit = omega**2 * result.length.value, result.length, "g", "m/s^2"
-    elif result.gravity is not None:
-        value, given, name, unit = result.gravity.value / omega**2, result.gravity, "length", "m"
     else:
-        return {}
+        assert result.gravity is not None
+        value, given, name, unit = result.gravity.value / omega**2, result.gravity, "length", "m"
     return {name: Estimate(value, math.hypot(relative, given.sd / given.value) * value, unit)}
 
 

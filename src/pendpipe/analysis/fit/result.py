@@ -369,15 +369,16 @@ def _warnings(result: FitResult, misfit: float) -> list[str]:
     unit = result.parameters["amplitude"].unit
     warnings = (
         *(
-            (bool(check.overruled), f"{check.sentence(unit)}: overruled, since {check.overruled}")
+            (True, f"{check.sentence(unit)}: overruled, since {check.overruled}")
             for check in result.decrement_check
+            if check.overruled
         ),
         *(
             (estimate.at_bound, f"{name} lies at its bound 0; its interval is one-sided")
             for name, estimate in result.parameters.items()
         ),
         (
-            result.quality_factor_limit is None,
+            not b.value > 0.0,
             "quality_factor_limit has no finite value, since b = 0",
         ),
         (

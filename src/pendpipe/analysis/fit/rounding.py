@@ -13,8 +13,8 @@ import math
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.kernel import kernel
 
-ROOT_HALF = math.sqrt(0.5)
-DENSITY = 1.0 / math.sqrt(2.0 * math.pi)
+ROOT_HALF = math.sqrt(0.5)  # erfc(x ROOT_HALF)/2 is the tail of a normal number
+DENSITY = 1.0 / math.sqrt(2.0 * math.pi)  # of a normal number, at its mean
 _FAR = 25.0
 """Standard deviations beyond which the tail's probability is taken from its series."""
 

@@ -18,6 +18,9 @@ from pendpipe.physics.decay import amplitude, time_at
 
 _SLIP: Final = 0.7
 """Phase in rad by which the law's turning points may part from the measured ones."""
+_SHOWN: Final = 3.5
+"""Standard deviations of a turning point's phase, 0.2 rad, by which a slip is no error of it: that
+of one of 2,000."""
 _SLIPPED: Final = (
     "the period changes with the amplitude or the time as Eq. 8's does not:"
     " {:.2g} rad of phase along the record"
@@ -53,8 +56,7 @@ def start_values(
     points = points if restoring == "linear" else clear(points)
     envelope, period = envelope_and_period(points, held, restoring, start=True)
     a, b, c, y0, level = envelope.value.tolist()
-    # Times uncertain by more than 0.2 rad show no slip.
-    late = period.late_rad[period.angular_frequency * points.time_sd_s < 0.2]
+    late = period.late_rad[period.angular_frequency * points.time_sd_s < _SLIP / _SHOWN]
     slipped = held.angular_frequency is None and np.max(np.abs(late), initial=0.0) > _SLIP
     at_first, losses = "amplitude" in held.fixed, (a, b, c, held.likely_share(b))
     angle, time, before = _release(points, y0, losses, period, restoring, at_first=at_first)

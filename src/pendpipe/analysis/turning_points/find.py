@@ -129,6 +129,10 @@ def _level(value: FloatArray) -> float:
     return float(np.median(0.25 * (value[:-2] + 2.0 * value[1:-1] + value[2:])))
 
 
+_OF_A_PARABOLA: Final = 5
+"""Times: its three numbers, and two that tell how well it fits; through fewer goes a line."""
+
+
 def smooth_times(
     number: IntArray, time_s: FloatArray, weight: FloatArray, wanted: float, at: IntArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -162,11 +166,11 @@ def smooth_times(
     inside, near = near <= high[:, None], np.minimum(near, last)
     u, since = (number[near] - at[:, None]).astype(np.float64), time_s[low]
     columns = np.stack([np.ones_like(u), u, u * u])
-    columns[2, high - low < 4] = 0.0
+    few = high - low + 1 < _OF_A_PARABOLA
+    columns[2, few] = 0.0
     weighted = columns * (weight[near] * inside)
     normal = np.einsum("pkn,qkn->kpq", weighted, columns)
-    # Of fewer than five a line.
-    normal[:, 2, 2] += high - low < 4
+    normal[:, 2, 2] += few
     right = np.einsum("pkn,kn->kp", weighted, time_s[near] - since[:, None])
     found = np.linalg.solve(normal, right[..., None])[..., 0]
     return since + found[:, 0], found[:, 1]
@@ -664,13 +668,18 @@ def last_seen(measured: Measured, noise: float) -> int:
     return int(np.max(np.flatnonzero(seen), initial=-1))
 
 
+_NEAR: Final = 5
+"""Neighbours to each side that tell what is usual: their median bears a gap of five."""
+
+
 def _usual(coverage: FloatArray) -> FloatArray:
-    """What is usual among the five neighbours to each side."""
+    """What is usual among the neighbours."""
     middle = float(np.median(coverage[coverage > 0.0])) if coverage.any() else 0.0
-    if len(coverage) < 12 or np.max(np.abs(coverage[1:-1] - middle)) < 0.3 * middle:
+    if len(coverage) < 2 * _NEAR + 2 or np.max(np.abs(coverage[1:-1] - middle)) < 0.3 * middle:
         return np.full(len(coverage), middle)
-    padded = np.pad(coverage, 5, mode="reflect")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 11), axis=1))
+    padded = np.pad(coverage, _NEAR, mode="reflect")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEAR + 1)
+    return np.asarray(np.median(windows, axis=1))
 
 
 def _notes(samples: Samples, keep: BoolArray, level: Level) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.analysis.noise import white_rms
+from pendpipe.analysis.noise import TOLD, white_rms
 from pendpipe.analysis.turning_points.measure import (
     FITTED,
     HARMONICS,
@@ -140,7 +140,8 @@ def _level_of_peaks(
     seen = np.isfinite(middle.peak[:, 0]) & (middle.readings > JUDGED)
     peak = np.where(seen, middle.peak[:, 0], 0.0) * places.side
     level = np.convolve(peak, [0.25, 0.5, 0.25], "same")
-    between = np.convolve(seen.astype(np.float64), np.ones(3), "same") > 2.5
+    beside = np.pad(seen, 1)
+    between = beside[:-2] & seen & beside[2:]
     # A hundredth: whole half cycles, where there are any, know better.
     information = 0.01 / np.nan_to_num(middle.peak[:, 1] * enlarged, nan=np.inf)
     information = np.where(between, information, 1e-9 * information)
@@ -190,7 +191,7 @@ def _white(samples: Samples, places: Places) -> float:
     where = edges(samples, places)
     start = where[3 * len(where) // 4, 0]
     part = samples.values[start : where[-1, 1]][: 1 << 20]
-    return max(white_rms(part) if len(part) > 16 else 0.0, samples.noise_rms)
+    return max(white_rms(part) if len(part) > 2 * TOLD else 0.0, samples.noise_rms)
 
 
 def mean_square(measured: Measured, least: int = JUDGED) -> tuple[float, float]:
@@ -209,7 +210,7 @@ def _shares(places: Places, measured: Measured, free: int) -> FloatArray:
     known = np.isfinite(amplitude) & (amplitude > 0.0)
     square = (np.nan_to_num(amplitude) / float(np.nanmax(amplitude))) ** 2
     shares = np.zeros((len(places.number), free))
-    terms = 1 if known.sum() < 12 else 3
+    terms = 3 if known.sum() >= 3 * FITTED else 1  # four half cycles tell one
     columns = np.stack([square**power for power in range(1, terms + 1)], axis=1)
     weight = np.where(known, np.nan_to_num(amplitude) ** 2, 0.0)
     for m in range(free):

@@ -110,7 +110,7 @@ def loss_rates(time_s: FloatArray, amplitude: FloatArray, sd: FloatArray) -> Flo
         Of the turning points, shape (k,).
     """
     t = time_s - time_s[0]
-    if len(t) < 4:
+    if len(t) < len(_LOSSES.lower):
         fall = np.log(max(amplitude[0], 1e-300) / max(amplitude[-1], 1e-300))
         return np.array([0.0, max(float(fall / t[-1]), 0.0), 0.0])
     y = np.maximum(amplitude, 0.0)
@@ -515,6 +515,8 @@ _EVEN: Final = 1e-6
 """Of an interval, by which even times differ at most."""
 _ROUNDED: Final = 0.6
 """Of the last digit, by which rounded or cut stamps may lie off the line through them."""
+_COUNTS: Final = 50
+"""Counts of which one may be lost, and the rows still come one by one."""
 _SEVERAL: Final = 3.0
 """Steps from row to row in fast motion."""
 
@@ -656,7 +658,7 @@ def _refuse_saturated(values: FloatArray, low: float, high: float, place: str | 
         step = abs(float(levels[1 if extreme == low else -2]) - extreme) if len(levels) > 1 else 0.0
         expected = math.sqrt(max(step, 1e-12) / (high - low))
         refuse_if(
-            len(levels) > 16 and share > 2.0 * expected and count > 8 * runs,
+            len(levels) > _FEWEST and share > 2.0 * expected and count > 8 * runs,
             place,
             f"the channel is saturated: {100.0 * share:.0f} % of the readings are {extreme:.6g}",
             "lower the gain or the starting amplitude, or cut with --start",
@@ -671,7 +673,7 @@ def _one_row_a_count(time: FloatArray, values: FloatArray, step: float) -> bool:
     intervals = np.diff(when)
     single = float(np.mean(np.abs(change - step) < 0.1 * step))
     uneven = float(np.percentile(intervals, 90)) > 1.5 * float(np.percentile(intervals, 10))
-    return len(piece) > 50 and single > 0.98 and uneven
+    return len(piece) > _COUNTS and single > 1.0 - 1.0 / _COUNTS and uneven
 
 
 def _new_readings(values: FloatArray, step: float | None) -> BoolArray | None:
