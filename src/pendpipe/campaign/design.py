@@ -29,11 +29,15 @@ _FILM_SD: Final = 0.5
 
 
 class Nuisance(NamedTuple):
-    """An uncertain input; `sd` is infinite where nothing is known beforehand."""
+    """An uncertain input; `sd` is infinite where nothing is known beforehand.
+
+    One that was `measured` may have been measured wrong; a cause of the catalogue frees the others.
+    """
 
     name: str
     unit: str
     sd: float
+    measured: bool = False
 
 
 @dataclass(frozen=True)
@@ -160,30 +164,37 @@ class Design:
         tank = self.tank if fitted and any(run.tank for run in self.runs) else None
         told = tank if self.walls else None
         drags_in_air = self.air is not None and self.air.boundary_layer
+        radius_sd = 0.5 * fitted.diameter_sd_m if fitted else 0.0
         found = (
             Nuisance("hysteretic coefficient", "", math.inf),
             *(
-                Nuisance(f"distance of {name} at {place:g} m", "m", own.position_sd_m)
+                Nuisance(
+                    f"distance of {name} at {place:g} m",
+                    "m",
+                    own.position_sd_m,
+                    # A clamp of one record alone is that record.
+                    sum(run.weights_m.get(name) == place for run in self.runs) > 1,
+                )
                 for name, place in self.clamps
             ),
-            Nuisance("zero of the scale", "m", own.scale_zero_sd_m),
+            Nuisance("zero of the scale", "m", own.scale_zero_sd_m, True),
             *(
-                Nuisance(f"mass of {name}", "kg", own.weights[name].mass_sd_kg)
+                Nuisance(f"mass of {name}", "kg", own.weights[name].mass_sd_kg, True)
                 for name in self.weights
             ),
-            Nuisance("mass of the rod", "kg", own.rod.mass_sd_kg),
-            Nuisance("length of the rod", "m", own.rod.length_sd_m),
+            Nuisance("mass of the rod", "kg", own.rod.mass_sd_kg, True),
+            Nuisance("length of the rod", "m", own.rod.length_sd_m, True),
             Nuisance("exponent of the loss torque", "", law.inertia_exponent_sd),
-            Nuisance("mass of the sphere", "kg", fitted.mass_sd_kg if fitted else 0.0),
-            Nuisance("radius of the sphere", "m", fitted.diameter_sd_m / 2 if fitted else 0.0),
-            Nuisance("lever of the sphere", "m", fitted.distance_sd_m if fitted else 0.0),
+            Nuisance("mass of the sphere", "kg", fitted.mass_sd_kg if fitted else 0.0, True),
+            Nuisance("radius of the sphere", "m", radius_sd, True),
+            Nuisance("lever of the sphere", "m", fitted.distance_sd_m if fitted else 0.0, True),
             Nuisance("height in the tank", "depths", height_sd(tank) if tank else 0.0),
             Nuisance("depth of the fluid", "m", told.depth_sd_m if told else 0.0),
             Nuisance("film on the surface", "", _FILM_SD if told else 0.0),
             Nuisance("thermometer", "K", max((f.temperature_sd_k for f in fluids), default=0.0)),
             Nuisance("immersed screw", "m", sphere.screw_length_sd_m if fluids and sphere else 0.0),
-            Nuisance("gravity", "m/s^2", own.gravity_sd_m_per_s2),
-            Nuisance("clock", "", own.clock_relative_sd),
+            Nuisance("gravity", "m/s^2", own.gravity_sd_m_per_s2, True),
+            Nuisance("clock", "", own.clock_relative_sd, True),
             Nuisance("air drag", "", AIR_DRAG_RELATIVE_SD if drags_in_air else 0.0),
             *(
                 Nuisance(f"loss torque in {name}", "", law.assembly_relative_sd)

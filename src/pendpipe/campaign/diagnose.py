@@ -6,7 +6,7 @@ With what is found goes what each cause alone would do to the records.
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -20,12 +20,27 @@ from pendpipe.campaign.fit import (
     candidates,
     coefficient,
     joint_fit,
+    loss_torques,
     named,
     predict,
 )
 from pendpipe.campaign.next_runs import NextRun, next_measurements
-from pendpipe.campaign.search import NOTHING_MISSING, CampaignSearch, Far, Found, held_out, off
-from pendpipe.estimate import LISTED, Estimate, averaged, chi_square_p_value
+from pendpipe.campaign.search import NOTHING_MISSING, CampaignSearch, Found
+from pendpipe.campaign.seen import (
+    PULLED,
+    Far,
+    Groups,
+    bump,
+    groups,
+    held_out,
+    is_orderly,
+    off,
+    pulls_of_inputs,
+    scatter,
+    told_and_measured,
+    told_by_frequency,
+)
+from pendpipe.estimate import LISTED, Estimate, averaged
 from pendpipe.levels import FALSE_ALARM
 
 BASELINE = "eq16"
@@ -59,10 +74,11 @@ def campaign_diagnosis(
         next_measurements(found.leader, [rival for rival, _ in found.rivals])
         for found in search.found
     ]
-    left = chi_square_p_value(search.improved.chi2, search.improved.degrees_of_freedom)
     effects = [
         _effect(search, found, runs) for found, runs in zip(search.found, ranked, strict=True)
     ]
+    if search.scatter:
+        effects.append(_errors(search))
     if search.missing and not effects:
         effects = [_unnamed(search)]
     return {
@@ -74,12 +90,20 @@ def campaign_diagnosis(
         "effects": effects,
         "improved": _fit(search.improved),
         **_predicted(search),
-        "unexplained": {"residual_rms_rad": None, "p_value": left},
-        "excluded": search.excluded,
+        "unexplained": {"residual_rms_rad": None, "p_value": search.unexplained},
+        "described": search.described,
+        "scatter": search.scatter and search.scatter.as_json(),
+        "seen": seen_in(search),
+        "excluded": search.found[0].excluded if search.found else {},
         "patterns": causes(search),
         "left_out": [far._asdict() for far in search.left_out],
         "numbers": {name: _shown(fit) for name, fit in _with_and_without(search).items()},
-        "quoted": {"hysteretic_coefficient": quoted_coefficient(search).as_json()},
+        "quoted": {
+            "hysteretic_coefficient": quoted_coefficient(search).as_json(),
+            "loss_torque": {
+                name: each and each.as_json() for name, each in quoted_torques(search).items()
+            },
+        },
         "priors": {
             "nothing_missing": NOTHING_MISSING,
             "expected_size": {name: each.expected for name, each in CATALOGUE.items()},
@@ -149,6 +173,30 @@ def quoted_coefficient(search: CampaignSearch) -> Estimate:
     return averaged([each for _, each in counted], [probability for probability, _ in counted])
 
 
+def changes_drag_law(search: CampaignSearch) -> bool:
+    """Whether the fluid's drag may follow another law of the frequency than the theory's."""
+    likely = [
+        fit.last.drag_law
+        for one in search.found
+        for fit, share in ((one.leader, one.probability), *one.rivals)
+        if share >= LISTED
+    ]
+    return any(likely) or not search.described
+
+
+def quoted_torques(search: CampaignSearch) -> dict[str, Estimate | None]:
+    """Return kappa'' of each assembly; None in the fluid beside another law of its drag.
+
+    There it is what the law leaves over at low frequencies, where it is most of b.
+    """
+    design, unsure = search.improved.design, changes_drag_law(search)
+    wet = {run.assembly for run in design.runs if run.fluid is not None}
+    return {
+        name: None if unsure and name in wet else each
+        for name, each in loss_torques(search.improved).items()
+    }
+
+
 def _shown(fit: JointFit) -> dict[str, Any]:
     return {
         "drag_factor": fit.size(0, about=1.0).as_json(),
@@ -171,6 +219,7 @@ def _fit(fit: JointFit) -> dict[str, Any]:
     off = (fit.prediction / fit.data.values - 1.0)[:, 1]
     return {
         "parameters": parameters,
+        "pulls_of_inputs": pulls_of_inputs(fit),
         "residual_rms_rad": None,
         "residual_rms_of_b": float(np.sqrt(np.mean(off**2))),
         "chi2": fit.chi2,
@@ -224,8 +273,33 @@ def _effect(search: CampaignSearch, found: Found, runs: Sequence[NextRun]) -> di
 def _parameters(fit: JointFit) -> dict[str, Any]:
     size, shape = fit.size().as_json(), fit.added[-1].shape
     if shape is not None:
-        size["of"] = " ".join(shape) if isinstance(shape, tuple) else shape
+        size["of"] = _of(shape)
     return {fit.last.parameter.name: size}
+
+
+def _errors(search: CampaignSearch) -> dict[str, Any]:
+    """The records' own errors as a cause: they are larger than is stated."""
+    assert search.scatter is not None
+    return {
+        "id": "record-errors",
+        "name": "larger errors of the records than are stated",
+        "kind": "campaign",
+        "equation": r"\sigma \to s\, \sigma",
+        "parameters": {"factor": search.scatter.as_json()},
+        "delta_chi2": search.baseline.chi2 - search.improved.chi2,
+        "p_value_global": search.p_value,
+        "probability": search.scattered,
+        "indistinguishable_from": [],
+        "deciding_measurement": "some records once more: their scatter is their error",
+        "location": _location(search),
+    }
+
+
+def _of(shape: Any) -> str | float:
+    """Print a shape: what it is of, or the frequency and damping ratio of a mode."""
+    if isinstance(shape, tuple) and isinstance(shape[0], float):
+        return f"{shape[0]:.3g} Hz, damping ratio {shape[1]:.2g}"
+    return " ".join(shape) if isinstance(shape, tuple) else shape
 
 
 def _unnamed(search: CampaignSearch) -> dict[str, Any]:
@@ -288,23 +362,30 @@ def answer_of(
         f"do not agree with {theory}" if search.missing else f"agree with {theory}, the loss torque"
     )
     head = f"the {count} records {agree} and the stated errors of the apparatus"
-    rows = [*(_rows(search, ranked) if search.missing else ()), ("counted once", "; ".join(copies))]
+    if not search.described:
+        head = f"the model does not describe this campaign: {head}"
+    rows = [
+        *(_rows(search, ranked) if search.missing else ()),
+        ("inputs moved", _pulled(search)),
+        ("counted once", "; ".join(copies)),
+    ]
     kept = tuple(row for row in rows if row[1])
     return Answer((f"{head} (global {printed(search.p_value)})",), kept)
 
 
 def _rows(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> list[tuple[str, str]]:
     """Return what disagrees, what may explain it, how sure that is, and what would decide."""
-    left = chi_square_p_value(search.improved.chi2, search.improved.degrees_of_freedom)
     known = {
         each.last.identifier: each.last
         for one in search.found
         for each in (one.leader, *(rival for rival, _ in one.rivals))
     }
     sizes = (f"{each.expected:g} ({_words(each.parameter.name)})" for each in known.values())
-    silent = not search.found and not search.left_out
-    beforehand = f"beforehand nothing is as likely as all {len(CATALOGUE)} causes together"
+    beforehand = "beforehand nothing is as likely as all causes together"
+    torques = quoted_torques(search)
+    unsure = ", ".join(name for name, each in torques.items() if each is None)
     return [
+        *(("seen", each["text"]) for each in seen_in(search)),
         ("off the others", ", ".join(map(off, search.left_out))),
         *(
             (
@@ -313,7 +394,7 @@ def _rows(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> list[t
             )
             for name, fit in (_with_and_without(search) if search.whole else {}).items()
         ),
-        ("causes", "no effect of the catalogue stands out, nor any record" if silent else ""),
+        ("scatter", _scatter(search)),
         ("most probable", ", beside ".join(map(_likely, search.found))),
         ("or", f"{off(search.suspect)}: take it anew first" if search.suspect else ""),
         *(("beside it", _others(one)) for one in search.found),
@@ -323,8 +404,76 @@ def _rows(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> list[t
         ),
         ("shares", f"{beforehand}; sd expected: {', '.join(sizes)}" if known else ""),
         ("quote", f"k is {quoted_coefficient(search)}, averaged over causes" if known else ""),
-        ("left", f"more than these explain ({printed(left)})" if left < FALSE_ALARM else ""),
+        ("not to quote", f"kappa'' in {unsure}: what the drag's law leaves over" if unsure else ""),
     ]
+
+
+def _scatter(search: CampaignSearch) -> str:
+    factor, share = search.scatter, percent(search.scattered)
+    return (factor and f"{factor} times what the records' errors say ({share})") or ""
+
+
+def _pulled(search: CampaignSearch) -> str:
+    """Print the inputs that the records move by more than twice their stated errors."""
+    pulls = pulls_of_inputs(search.improved)
+    far = sorted(
+        (name for name in pulls if abs(pulls[name]) > PULLED), key=lambda n: -abs(pulls[n])
+    )
+    said = ", ".join(f"{name} {pulls[name]:+.1f}" for name in far[:_MOST_PULLED])
+    more = f" and {len(far) - _MOST_PULLED} more" if len(far) > _MOST_PULLED else ""
+    shown = said and search.described
+    return f"{said}{more}, in their stated errors, of {len(pulls)}" if shown else ""
+
+
+_MOST_PULLED: Final = 5
+"""Inputs on one line."""
+
+
+def seen_in(search: CampaignSearch) -> list[dict[str, Any]]:
+    """Return what the records show, where the model does not describe them."""
+    if search.described:
+        return []
+    fit = search.baseline
+    found: list[dict[str, Any]] = []
+    if kinds := groups(fit):
+        found.append({"kind": "two groups", **kinds._asdict(), "text": _kinds(fit, kinds)})
+    if peak := bump(fit):
+        text = (
+            f"a bump in the loss near {peak.frequency_hz:.2g} Hz, {percent(peak.excess)} above what"
+            f" is told ({peak.beside[0]:.2g} to {peak.beside[1]:.2g} Hz)"
+        )
+        found.append({"kind": "bump", **peak._asdict(), "text": text})
+    if not found:
+        found.append(_where(search))
+    return found
+
+
+def _kinds(fit: JointFit, kinds: Groups) -> str:
+    first, second = (", ".join(names) for names in kinds[:2])
+    dry = all(run.fluid is None for run in fit.design.runs if run.record in kinds.first)
+    if dry:  # there b is the loss torque, as 1/k
+        low, high = (
+            fit.design.coefficient_s2 * math.exp(fit.unknowns[0]) / (1 + e) for e in kinds.excess
+        )
+        return f"two groups: k is about {low:.4g} s² in {first}, and {high:.4g} s² in {second}"
+    apart = percent(kinds.excess[1] - kinds.excess[0])
+    return f"two groups: the loss in {second} is {apart} larger than in {first}"
+
+
+def _where(search: CampaignSearch) -> dict[str, Any]:
+    """Return the extent of what is left: the loss in the fluid against frequency, or a scatter."""
+    if is_orderly(search.improved):
+        told = told_by_frequency(search.baseline)
+        _, frequency, excess, _ = told_and_measured(told, wet=True)
+        low, high = int(np.argmin(excess)), int(np.argmax(excess))
+        least, most = (
+            f"{100.0 * excess[at]:+.1f} % at {frequency[at]:.2g} Hz" for at in (low, high)
+        )
+        text = f"the loss in the fluid differs from what is told by {least}, {most}"
+        return {"kind": "order", "excess": [excess[low], excess[high]], "text": text}
+    factor, _ = scatter(search.improved)
+    text = f"the records scatter {factor.value:.2g} times more than their errors say"
+    return {"kind": "scatter", "factor": factor.as_json(), "text": text}
 
 
 def _theory(design: Design) -> str:
@@ -337,8 +486,9 @@ def _words(name: str) -> str:
 
 def _likely(one: Found) -> str:
     """Print a cause with its size, its probability and what it explains."""
-    last = one.leader.last
+    last, shape = one.leader.last, one.leader.added[-1].shape
     size = f"{_words(last.parameter.name)} {one.leader.size()}"
+    size += f" at {_of(shape)}" if last.finer else ""
     return f"{last.name} ({size}) {percent(one.probability)}, chi^2 falls by {one.delta_chi2:.0f}"
 
 
@@ -382,7 +532,8 @@ def causes(search: CampaignSearch) -> dict[str, Any]:
         for rival in (found.leader, *(rival for rival, _ in found.rivals))
     ]
     best = min((rival.chi2 for rival in members), default=0.0)
-    above = search.excluded | {rival.last.identifier: rival.chi2 - best for rival in members}
+    excluded = search.found[0].excluded if search.found else {}
+    above = excluded | {rival.last.identifier: rival.chi2 - best for rival in members}
     patterns = [
         (one, (predict(design, (one,), np.append(free, _STEP)) - plain)[wet, 1] / viscous / _STEP)
         for one in candidates(design)
@@ -406,7 +557,7 @@ def causes(search: CampaignSearch) -> dict[str, Any]:
             row
             | {
                 "chi2_above_best": above.get(name),
-                "in_class": name in above and name not in search.excluded,
+                "in_class": name in above and name not in excluded,
             }
             for name, row in sorted(by_name.items(), key=lambda item: item[1]["rms_left"])
         ],

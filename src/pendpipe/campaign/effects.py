@@ -9,6 +9,7 @@ Patterns, fits and the statement follow from it.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from inspect import signature
+from itertools import product
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -39,6 +40,11 @@ class CampaignEffect:
         The function.
     shapes
         The discrete shapes that are tried, or how they follow from a design.
+    drag_law
+        Whether the fluid's drag follows another law of the frequency with it: what such a law has
+        left over in the fluid is no measure of the loss torque.
+    finer
+        Whether a shape is of positive numbers, to be sought between those that are tried.
     """
 
     identifier: str
@@ -46,9 +52,11 @@ class CampaignEffect:
     equation: str
     parameter: Parameter
     expected: float
-    on: Literal["inputs", "terms"]
+    on: Literal["nuisances", "inputs", "terms"]
     acts: Acts
     shapes: Shapes = (None,)
+    drag_law: bool = False
+    finer: bool = False
 
     def shapes_in(self, design: Any) -> Sequence[Any]:
         """Return the shapes that are tried in a design."""
@@ -73,12 +81,14 @@ def campaign_effect(
     parameter: Parameter,
     expected: float,
     shapes: Shapes = (None,),
+    drag_law: bool = False,
+    finer: bool = False,
 ) -> Callable[[Acts], CampaignEffect]:
     """Declare a campaign effect by the function through which it enters."""
 
     def declare(function: Acts) -> CampaignEffect:
         CATALOGUE[identifier] = CampaignEffect(
-            identifier, name, equation, parameter, expected, on, function, shapes
+            identifier, name, equation, parameter, expected, on, function, shapes, drag_law, finer
         )
         return CATALOGUE[identifier]
 
@@ -110,6 +120,7 @@ def uniform(terms: Terms, size: FloatArray) -> Terms:
     r"a/\delta \to C_H\, a/\delta",
     Parameter("C_H - 1", "", -0.5, 1.0),
     0.1,
+    drag_law=True,
 )
 def history(terms: Terms, size: FloatArray) -> Terms:
     """Only the part of Eq. 2 that grows as the square root of the frequency."""
@@ -155,6 +166,7 @@ def trend(inputs: Inputs, size: FloatArray, design: Design) -> Inputs:
     r"D \mathrel{+}= 4 \pi \eta\, \ell\, z^2 (r/\delta + 1/2)",
     Parameter("length", "m", 0.0, 0.1),
     0.006,
+    drag_law=True,
 )
 def stem(inputs: Inputs, size: FloatArray) -> Inputs:
     """The drag of a longer immersed part of the screw, a cylinder."""
@@ -169,6 +181,7 @@ def stem(inputs: Inputs, size: FloatArray) -> Inputs:
     Parameter("closeness", "", -0.5, 0.5),
     0.1,
     lambda design: (None,) if design.tank is not None else (),
+    drag_law=True,
 )
 def walls(inputs: Inputs, size: FloatArray) -> Inputs:
     """Walls, floor and surface that are nearer or farther than those of the told tank.
@@ -191,6 +204,7 @@ _ADDED_PER_DRAG = 0.6
     Parameter("excess", "", -1.0, 2.0),
     0.3,
     (1.15, 1.28, 1.42),
+    drag_law=True,
 )
 def free_surface(terms: Terms, size: FloatArray, design: Design, shape: float) -> Terms:
     """The response of the tank's first sloshing mode, which lies above the records.
@@ -210,11 +224,52 @@ def free_surface(terms: Terms, size: FloatArray, design: Design, shape: float) -
 
 @campaign_effect(
     "terms",
+    "sloshing-mode",
+    "a mode of the water's surface",
+    r"C_m \mathrel{-}= \kappa s^2/(s^2 + 2 \zeta \omega_s s + \omega_s^2)",
+    Parameter("coupling", "", 0.0, 2.0),
+    0.05,
+    tuple(product(np.geomspace(0.35, 1.5, 26).tolist(), (0.02, 0.06))),
+    drag_law=True,
+    finer=True,
+)
+def sloshing_mode(
+    terms: Terms, size: FloatArray, design: Design, shape: tuple[float, float]
+) -> Terms:
+    """A mode of frequency and damping ratio that the sphere drives, among the records or beside.
+
+    The water that moves in it takes energy near its frequency, and carries the sphere along below,
+    against it above. What it adds to the inertia and to the drag is taken at the complex rate s of
+    the decay, which it shifts.
+    """
+    open_surface = np.array([float(run.tank and run.open_surface) for run in design.runs])
+    coupled = size * open_surface * terms.displaced
+    own, ratio = 2.0 * np.pi * shape[0], shape[1]
+    inertia, drag = np.zeros_like(terms.inertia), np.zeros_like(terms.inertia)
+    for _ in range(_SHIFTS):
+        moved = replace(terms, inertia=terms.inertia + inertia, steady=terms.steady + drag)
+        omega = moved.angular_frequency
+        memory = (terms.history + terms.screw_history) * np.sqrt(omega / 2.0)
+        rate = 0.5 * (moved.steady + terms.screw + memory) / moved.inertia
+        s = -rate + 1j * omega
+        per_rate = -coupled * s**3 / (s**2 + 2.0 * ratio * own * s + own**2)
+        inertia = per_rate.imag / omega
+        drag = per_rate.real + inertia * rate
+    return replace(terms, inertia=terms.inertia + inertia, steady=terms.steady + drag)
+
+
+_SHIFTS: Final = 3
+"""Rounds in which a mode shifts the rate at which it acts: a fourth changes b by 1e-4 at most."""
+
+
+@campaign_effect(
+    "terms",
     "drag-law-transition",
     "a drag between linear and quadratic",
     r"b \mathrel{+}= \phi\, a\, y_0",
     Parameter("share", "", -1.0, 1.0),
     0.2,
+    drag_law=True,
 )
 def transition(terms: Terms, size: FloatArray, design: Design) -> Terms:
     """A share of the quadratic drag at the release that a y^2 + b y puts into b.
@@ -357,6 +412,33 @@ def moment_of_inertia(
         run.branch == name if what == "branch" else name in run.weights_m for run in design.runs
     ]
     return replace(terms, inertia=terms.inertia + size * np.array(there, dtype=np.float64))
+
+
+WRONG: Final = 10.0
+"""Stated errors by which a wrong input is off, or factor of errors that are stated: a digit."""
+
+
+def _offset(moved: FloatArray, size: FloatArray, design: Any, shape: str) -> FloatArray:
+    there = np.array([each.name == shape for each in design.nuisances], dtype=np.float64)
+    return np.asarray(moved + size * there / design.sds)
+
+
+def wrong_inputs(design: Design) -> list[CampaignEffect]:
+    """Every input that was measured, freed of its prior."""
+    return [
+        CampaignEffect(
+            "input-" + each.name.replace(" ", "-"),
+            f"another {each.name} than was measured",
+            r"x \to x + \Delta x",
+            Parameter("error", each.unit, -np.inf, np.inf),
+            WRONG * each.sd,
+            "nuisances",
+            _offset,
+            (each.name,),
+        )
+        for each in design.nuisances
+        if each.measured
+    ]
 
 
 def _drag_of_one(terms: Terms, size: FloatArray, design: Design, shape: str) -> Any:

@@ -13,7 +13,7 @@ import numpy as np
 
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.campaign.design import Design, Terms, solve, terms_of
-from pendpipe.campaign.effects import CATALOGUE, CampaignEffect
+from pendpipe.campaign.effects import CATALOGUE, CampaignEffect, wrong_inputs
 from pendpipe.estimate import Estimate, chi_square_p_value
 from pendpipe.physics import POTENTIAL_FLOW_ADDED_MASS
 from pendpipe.solve import Bounds, Problem, Weighted, minimise
@@ -41,10 +41,9 @@ class Candidate(NamedTuple):
 
 @singledispatch
 def candidates(design: Any) -> list[Candidate]:
-    """The whole catalogue with its shapes; a table of published numbers has its own."""
-    return [
-        Candidate(each, shape) for each in CATALOGUE.values() for shape in each.shapes_in(design)
-    ]
+    """The whole catalogue with its shapes, and every input; a table of numbers has its own."""
+    known = (*CATALOGUE.values(), *wrong_inputs(design))
+    return [Candidate(each, shape) for each in known for shape in each.shapes_in(design)]
 
 
 def named(*identifiers: str) -> tuple[Candidate, ...]:
@@ -80,11 +79,15 @@ def terms_with(design: Design, added: Sequence[Candidate], unknowns: FloatArray)
     in those expected of them.
     """
     count = len(design.nuisances)
-    inputs = design.inputs(unknowns[..., :count])
+    moved = unknowns[..., :count]
     sizes = [
         unknowns[..., count + number, None] * one.effect.expected
         for number, one in enumerate(added)
     ]
+    for one, size in zip(added, sizes, strict=True):
+        if one.effect.on == "nuisances":
+            moved = one.effect.put(moved, size, design, one.shape)
+    inputs = design.inputs(moved)
     for one, size in zip(added, sizes, strict=True):
         if one.effect.on == "inputs":
             inputs = one.effect.put(inputs, size, design, one.shape)

@@ -18,7 +18,8 @@ from scipy.special import chdtri, fdtrc, ndtri, stdtr
 from pendpipe.answer import Answer, percent, printed
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.campaign.fit import JointFit, Measured, candidates, chi2_near, joint_fit, predict
-from pendpipe.campaign.search import MOST_LEFT_OUT, CampaignSearch, Found, local_scores, off, search
+from pendpipe.campaign.search import MOST_LEFT_OUT, CampaignSearch, Found, local_scores, search
+from pendpipe.campaign.seen import off
 from pendpipe.campaign.table import QUANTITIES, Row, Table, read_table
 from pendpipe.configuration.published import CONFIGURATION, Case, Published, load_published
 from pendpipe.errors import refuse_if

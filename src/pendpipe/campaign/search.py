@@ -6,11 +6,23 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from scipy.special import ndtr, ndtri_exp
+from scipy.special import ndtr
 
 from pendpipe.arrays import BoolArray, FloatArray
-from pendpipe.campaign.fit import Candidate, JointFit, Measured, candidates, joint_fit, only
-from pendpipe.estimate import chi_square_p_value
+from pendpipe.campaign.design import Design
+from pendpipe.campaign.effects import WRONG
+from pendpipe.campaign.fit import Candidate, JointFit, Measured, candidates, chi2_near, joint_fit
+from pendpipe.campaign.seen import (
+    FAR_SIGMA,
+    Far,
+    farthest,
+    has_shape,
+    is_orderly,
+    scatter,
+    wider,
+    without,
+)
+from pendpipe.estimate import Estimate, chi_square_p_value
 from pendpipe.levels import FALSE_ALARM
 from pendpipe.score import CLASS, trials_of, unit_rows
 
@@ -18,8 +30,6 @@ MOST_EFFECTS: Final = 3
 """Effects that are added: of three dozen records more are not told apart."""
 MOST_LEFT_OUT: Final = 3
 """Records that are left out: of three dozen more are no exceptions."""
-FAR_SIGMA: Final = 4.0
-"""A record that lies farther from what all others predict is named."""
 NOTHING_MISSING: Final = 0.5
 """Probability beforehand that nothing is missing; the effects share the rest alike."""
 _DRAWS: Final = 10_000
@@ -46,18 +56,10 @@ class Found:
     """Probability that no effect is missing."""
     p_value: float
     delta_chi2: float
-
-
-class Far(NamedTuple):
-    """A record that disagrees with the others, by how many sigma."""
-
-    record: str
-    sigma: float
-
-
-def off(far: Far) -> str:
-    """Say how far a record lies from what all others predict."""
-    return f"{far.record} {far.sigma:+.1f} sigma"
+    excluded: dict[str, float]
+    """Rise of chi^2 above the best rival, by identifier, of those outside the class."""
+    price: float
+    """What -2 ln L must fall by for it: for its size, and for being one of many."""
 
 
 @dataclass(frozen=True)
@@ -74,14 +76,17 @@ class CampaignSearch:
         In the order in which they were added; empty also where nothing named explains a misfit.
     missing
         Whether something is missing.
-    excluded
-        Rise of chi^2 above the best rival, by identifier, of those outside the first class.
     left_out
         Records that disagree with all others, and explain a misfit better than any effect.
     suspect
         A record that would explain it about as well as what was found.
     whole
         The answer with all records, where some were left out.
+    scattered
+        Probability of that, beside what else explains the misfit.
+    scatter
+        By what factor the records scatter beyond the stated errors, where that explains a misfit:
+        `improved`, and what was found, then have errors as large.
     """
 
     baseline: JointFit
@@ -89,10 +94,27 @@ class CampaignSearch:
     p_value: float
     found: tuple[Found, ...]
     missing: bool
-    excluded: dict[str, float]
     left_out: tuple[Far, ...] = ()
     suspect: Far | None = None
     whole: "CampaignSearch | None" = None
+    scatter: Estimate | None = None
+    scattered: float = 0.0
+
+    @property
+    def unexplained(self) -> float:
+        """Probability that chance leaves as much as what was found leaves."""
+        return chi_square_p_value(self.improved.chi2, self.improved.degrees_of_freedom)
+
+    @property
+    def described(self) -> bool:
+        """Whether the model, with all that was found, leaves no more than noise."""
+        return not (self.missing and self.unexplained < FALSE_ALARM)
+
+    @property
+    def price(self) -> float:
+        """-2 ln L, with what causes and records that are left out must lower it by."""
+        far = len(self.left_out) * FAR_SIGMA**2
+        return self.improved.chi2 + sum(one.price for one in self.found) + far
 
 
 def local_scores(fit: JointFit, tried: Sequence[Candidate]) -> tuple[FloatArray, FloatArray]:
@@ -142,8 +164,9 @@ def search(
 ) -> CampaignSearch:
     """Look for what the model lacks, and for records that disagree with all others.
 
-    A record that lies beyond `FAR_SIGMA` whatever was found, or explains the misfit better than
-    what was found, is left out, and the search is made again.
+    Where records are left out, or more is left than noise, larger errors of all records are a
+    rival, at the scatter that they have (`scatter`): a number for all in the place of causes
+    (`_price`) and records (`FAR_SIGMA`). What leaves more than noise names nothing.
 
     Parameters
     ----------
@@ -155,16 +178,44 @@ def search(
     base
         The fit without effects, where it is there already.
     """
-    whole = answer = _search(base or joint_fit(design, data), level)
+    base = base or joint_fit(design, data)
+    answer = _among_records(base, level)
+    # The errors of a table of numbers are their scatter.
+    if (answer.described and not answer.left_out) or not isinstance(base.design, Design):
+        return answer
+    best, price = answer, answer.price
+    for kept in (base, answer.baseline)[: 1 + bool(answer.left_out)]:
+        lost = kept is not base
+        other, other_price = _scattered(kept, level)
+        other_price += lost * len(answer.left_out) * FAR_SIGMA**2
+        if other and other_price < price:
+            best, price = other, other_price
+            if lost:
+                best = replace(other, left_out=answer.left_out, whole=answer.whole)
+    if best is not answer:
+        share = 1.0 / (1.0 + math.exp(0.5 * (price - answer.price)))
+        best = replace(best, p_value=answer.p_value, scattered=share)
+    return best if best.described else _undescribed(base, answer)
+
+
+def _among_records(base: JointFit, level: float) -> CampaignSearch:
+    """Search, and leave out the records that disagree.
+
+    A record that lies beyond `FAR_SIGMA` whatever was found, or explains the misfit better than
+    what was found, is left out, and the search is made again.
+    """
+    whole = answer = _search(base, level)
     left_out: list[Far] = []
     while answer.missing and len(answer.baseline.design.runs) > MOST_LEFT_OUT:
         unexplained = farthest(answer.improved)
         suspect = unexplained or farthest(answer.baseline)
         if suspect is None:
             break
-        fewer = _without(answer.baseline, suspect.record)
+        fewer = without(answer.baseline, suspect.record)
         better = answer.improved.chi2 - fewer.chi2
-        if unexplained is None and better < CLASS:
+        # A mode that one record sees is that record.
+        needed = -CLASS if answer.found and answer.found[-1].leader.last.finer else CLASS
+        if unexplained is None and better < needed:
             answer = replace(answer, suspect=suspect if better > -CLASS else None)
             break
         if len(left_out) == MOST_LEFT_OUT:
@@ -178,83 +229,176 @@ def search(
     )
 
 
-def farthest(fit: JointFit) -> Far | None:
-    """The record that differs most from what all others predict, if it is far.
+def _scattered(base: JointFit, level: float) -> tuple[CampaignSearch | None, float]:
+    """Search with errors as large as the records scatter, unless what is left has an order.
 
-    The model without it is fitted, so that by its sigma chi^2 does fall: the linear model of
-    `held_out` says the same but where a pendulum is near its balance.
+    Causes make records scatter too, so that the scatter is taken anew beside them.
+
+    Returns
+    -------
+    answer, price
+        And -2 ln L over that of the stated errors, with what it must be lowered by.
     """
-    _, pulls = held_out(fit)
-    for number in np.argsort(-np.abs(pulls)):
-        if abs(pulls[number]) <= FAR_SIGMA:
+    fit, found = base, list[CampaignSearch]()
+    if has_shape(base):
+        return None, math.inf
+    for _ in range(MOST_EFFECTS):
+        factor, fall = scatter(fit)
+        if factor.value > WRONG:
+            return None, math.inf
+        wide = wider(base.data, factor.value)
+        answer = _among_records(joint_fit(base.design, wide, (), base.unknowns), level)
+        now = answer.improved
+        stated = wider(now.data, 1.0 / factor.value)
+        fit = joint_fit(now.design, stated, now.added, now.unknowns)
+        before = [(each.improved.added, each.left_out) for each in found[-1:]]
+        found.append(answer)
+        if before == [(now.added, answer.left_out)]:
             break
-        record = fit.design.runs[number].record
-        fall = fit.chi2 - _without(fit, record, fit.added).chi2
-        sigma = float(_sigma(fall, fit.data.values.shape[-1]))
-        if sigma > FAR_SIGMA:
-            return Far(record, math.copysign(sigma, pulls[number]))
-    return None
+    price = answer.price - now.chi2 + fit.chi2 - fall + CLASS
+    if answer.left_out or len(answer.found) > 1 or is_orderly(now) or not answer.described:
+        return None, price
+    return replace(answer, missing=True, scatter=factor), price
 
 
-def _without(fit: JointFit, record: str, added: Sequence[Candidate] = ()) -> JointFit:
-    """The model fitted to all records but one."""
-    keep = np.array([run.record != record for run in fit.design.runs])
-    return joint_fit(*only(fit.design, fit.data, keep), added)
-
-
-def _sigma(fall: FloatArray | float, readings: int) -> FloatArray:
-    """The sigma of a fall of chi^2 by frequency and b, two degrees of freedom, or by n, one."""
-    if readings == 1:
-        return np.sqrt(np.maximum(fall, 0.0))
-    return np.asarray(-ndtri_exp(-0.5 * np.maximum(fall, 0.0) - math.log(2.0)))
+def _undescribed(base: JointFit, answer: CampaignSearch) -> CampaignSearch:
+    """Name nothing; records are left out still if they explain more than what is left."""
+    left = answer.improved.chi2 - answer.improved.degrees_of_freedom
+    if answer.left_out and not has_shape(base) and base.chi2 - answer.baseline.chi2 > left:
+        return replace(answer, improved=answer.baseline, found=(), suspect=None)
+    return CampaignSearch(base, base, answer.p_value, (), True)
 
 
 def _search(baseline: JointFit, level: float) -> CampaignSearch:
     """Add effects as long as the scan of the catalogue alarms."""
     everything = candidates(baseline.design)
-    fit, found, first = baseline, [], 1.0
-    excluded: dict[str, float] = {}
+    fit, found, first = baseline, list[Found](), 1.0
     for number in range(MOST_EFFECTS):
-        taken = {one.effect.identifier for one in fit.added}
-        tried = [one for one in everything if one.effect.identifier not in taken]
-        scores, correlations = local_scores(fit, tried)
-        scan = global_p_value(scores, correlations, tried)
+        scan = _scan(fit, everything)
         if not number:
             whole = chi_square_p_value(fit.chi2, fit.degrees_of_freedom)
-            first = min(1.0, 2.0 * min(scan, whole))
-        if scan >= 0.5 * level:
+            first = min(1.0, 2.0 * min(scan.p_value, whole))
+        if scan.p_value >= 0.5 * level or (one := _found(fit, scan)) is None:
             break
-        rivals = refit(fit, tried, scores)
-        members, nothing = class_of(rivals, fit, len({one.effect.identifier for one in tried}))
-        if members[0][0].chi2 > fit.chi2 - 1.0:
-            break
-        leader, probability = members[0]
-        best = min(rival.chi2 for rival in rivals)
-        if not number:
-            inside = {rival.last.identifier for rival, _ in members}
-            above = [
-                (one.effect.identifier, float(fit.chi2 - score**2 - best))
-                for one, score in zip(tried, scores, strict=True)
-            ]
-            above += [(rival.last.identifier, rival.chi2 - best) for rival in rivals]
-            excluded = {name: rise for name, rise in above if name not in inside}
-        gain = fit.chi2 - leader.chi2
-        chance = min(1.0, 2.0 * scan)
-        found.append(Found(leader, tuple(members[1:]), probability, nothing, chance, gain))
-        fit = leader
-    return CampaignSearch(baseline, fit, first, tuple(found), first < level, excluded)
+        found.append(one)
+        fit = one.leader
+    found = _beside_each_other(found, everything, level) if len(found) > 1 else found
+    fit = found[-1].leader if found else baseline
+    return CampaignSearch(baseline, fit, first, tuple(found), first < level)
+
+
+class _Scan(NamedTuple):
+    """The candidates that a fit does not have, their scores, and the chance of the largest."""
+
+    tried: list[Candidate]
+    scores: FloatArray
+    p_value: float
+
+
+def _scan(fit: JointFit, everything: Sequence[Candidate]) -> _Scan:
+    taken = {one.effect.identifier for one in fit.added}
+    tried = [one for one in everything if one.effect.identifier not in taken]
+    scores, correlations = local_scores(fit, tried)
+    return _Scan(tried, scores, global_p_value(scores, correlations, tried))
+
+
+def _found(fit: JointFit, scan: _Scan) -> Found | None:
+    """Return the effect that explains most of what a fit leaves, with its class."""
+    rivals = refit(fit, scan.tried, scan.scores)
+    effects = len({one.effect.identifier for one in scan.tried})
+    members, nothing = class_of(rivals, fit, effects)
+    leader, probability = members[0]
+    gain = fit.chi2 - leader.chi2
+    if gain < 1.0 or nothing > sum(share for _, share in members):
+        return None
+    best, inside = (
+        min(rival.chi2 for rival in rivals),
+        {each.last.identifier for each, _ in members},
+    )
+    above = [
+        (one.effect.identifier, float(fit.chi2 - score**2 - best))
+        for one, score in zip(scan.tried, scan.scores, strict=True)
+    ]
+    above += [(rival.last.identifier, rival.chi2 - best) for rival in rivals]
+    excluded = {name: rise for name, rise in above if name not in inside}
+    chance = min(1.0, 2.0 * scan.p_value)
+    price = 2.0 * math.log(effects / (1.0 - NOTHING_MISSING))
+    price -= leader.chi2 + 2.0 * leader.log_evidence
+    return Found(leader, tuple(members[1:]), probability, nothing, chance, gain, excluded, price)
+
+
+def _beside_each_other(
+    found: list[Found], everything: Sequence[Candidate], level: float
+) -> list[Found]:
+    """Weigh each effect beside all others; one that they make needless, or a better one, goes in.
+
+    The order in which effects were added is none of nature's.
+    """
+    last = found[-1].leader
+    added, start = list(last.added), last.unknowns[: len(last.design.nuisances)]
+    for _ in range(2 * MOST_EFFECTS):
+        again = list[Found]()
+        for number, own in enumerate(added):
+            others = added[:number] + added[number + 1 :]
+            fit = joint_fit(last.design, last.data, others, start)
+            scan = _scan(fit, everything)
+            one = _found(fit, scan) if scan.p_value < 0.5 * level else None
+            if one is None or one.leader.added[-1] != own:
+                added[number : number + 1] = [] if one is None else [one.leader.added[-1]]
+                break
+            again.append(one)
+        else:
+            return again
+    return found
 
 
 def refit(fit: JointFit, tried: Sequence[Candidate], scores: FloatArray) -> list[JointFit]:
     """Refit with each candidate whose linear gain is within reach of the best one's."""
     gains = np.where(_one_sided(tried), np.maximum(scores, 0.0), scores) ** 2
     reach = max(_REACH, 0.25 * float(gains.max()))
-    near = [one for one, gain in zip(tried, gains, strict=True) if gain >= gains.max() - reach]
-    return [joint_fit(fit.design, fit.data, (*fit.added, one), fit.unknowns) for one in near]
+    near = [
+        number
+        for number, one in enumerate(tried)
+        if gains[number] >= max(gains.max() - reach, _best_shape(tried, gains, one))
+    ]
+    found = [
+        joint_fit(fit.design, fit.data, (*fit.added, tried[number]), fit.unknowns)
+        for number in near
+    ]
+    least = fit.chi2 - 0.5 * max((fit.chi2 - each.chi2 for each in found), default=0.0)
+    return [_finer(each) if each.last.finer and each.chi2 <= least else each for each in found]
+
+
+def _best_shape(tried: Sequence[Candidate], gains: FloatArray, one: Candidate) -> float:
+    """The gain that a shape of an effect must have: that of the best, where it is made finer."""
+    alike = [each.effect is one.effect for each in tried]
+    return float(gains[alike].max()) if one.effect.finer else 0.0
+
+
+def _finer(fit: JointFit) -> JointFit:
+    """Seek the best shape of the last effect about its own, by ever smaller steps."""
+    step, (*others, last), chi2 = _FIRST_STEP, fit.added, fit.chi2
+    for _ in range(_MOST_STEPS):
+        shape = np.array(last.shape)
+        moves = step * np.concatenate([np.eye(len(shape)), -np.eye(len(shape))])
+        near = [last._replace(shape=tuple(row)) for row in (shape * np.exp(moves)).tolist()]
+        found = [chi2_near(fit.design, fit.data, (*others, one), fit.unknowns) for one in near]
+        if min(found) < chi2 - 1e-3:
+            last, chi2 = near[int(np.argmin(found))], min(found)
+        elif (step := 0.5 * step) < _LAST_STEP:
+            break
+    return joint_fit(fit.design, fit.data, (*others, last), fit.unknowns)
+
+
+_FIRST_STEP: Final = 0.03
+"""Of the logarithm of a shape: half of what lies between those that are tried."""
+_LAST_STEP: Final = 1e-3
+_MOST_STEPS: Final = 20
+"""Of them: from one end of what is tried to the other it would be fifty."""
 
 
 def class_of(
-    rivals: Sequence[JointFit], without: JointFit, effects: int
+    rivals: Sequence[JointFit], before: JointFit, effects: int
 ) -> tuple[list[tuple[JointFit, float]], float]:
     """The rivals that the data cannot tell apart, and the probability that nothing is missing.
 
@@ -271,36 +415,8 @@ def class_of(
     members = sorted(inside.values(), key=lambda rival: -rival.log_evidence)
     each = math.log((1.0 - NOTHING_MISSING) / effects)
     logs = [rival.log_evidence + each for rival in members]
-    logs.append(math.log(NOTHING_MISSING) - 0.5 * without.chi2)
+    logs.append(math.log(NOTHING_MISSING) - 0.5 * before.chi2)
     weights = np.exp(np.array(logs) - max(logs))
     left = chi_square_p_value(best, members[0].degrees_of_freedom)
     *named_ones, nothing = (left / (left + FALSE_ALARM) * weights / weights.sum()).tolist()
     return list(zip(members, named_ones, strict=True)), nothing
-
-
-def held_out(fit: JointFit) -> tuple[FloatArray, FloatArray]:
-    """Each record predicted from all the others: log densities and pulls, shape (records,).
-
-    A pull is the sigma of frequency and b together, with the sign of b's excess.
-
-    For a model that is linear about its optimum the fit without a record follows from the fit
-    with it. Let the orthonormal columns of N span the residuals that no free unknown can follow,
-    and ``z = N^T r`` be the part of the whitened residuals r that lies there. With the record's
-    rows ``N_i = U S V^T`` the prediction has the covariance ``(U S^2 U^T)^-1``, and without the
-    record chi^2 falls by ``|V^T z|^2``, which is the square that the pull is made of: no rounding
-    and no unfinished fit makes it larger than chi^2.
-    """
-    whitening = fit.data.whitening
-    records, rows, _ = whitening.shape
-    basis, sizes, _ = np.linalg.svd(fit.jacobian[:, fit.free])
-    rounding = np.finfo(np.float64).eps * float(sizes.max())
-    unfollowed = basis[:, np.count_nonzero(sizes > rounding) :]
-    own = unfollowed[: records * rows].reshape(records, rows, -1)
-    rest = unfollowed.T @ fit.residuals
-    _, left, directions = np.linalg.svd(own, full_matrices=False)
-    predicted = left > rounding  # nothing is said of what no other record knows
-    fall = np.sum((predicted * (directions @ rest)) ** 2, axis=-1)
-    volume = 2.0 * np.sum(np.log(left, where=predicted, out=np.zeros_like(left)), axis=-1)
-    volume += np.linalg.slogdet(whitening @ whitening.mT)[1]
-    densities = 0.5 * (volume - fall - rows * math.log(2.0 * math.pi))
-    return densities, -np.copysign(_sigma(fall, rows), (own @ rest)[:, -1])

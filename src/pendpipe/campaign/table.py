@@ -318,7 +318,7 @@ def _predict(design: Table, added: Sequence[Candidate], unknowns: FloatArray) ->
     count = len(design.nuisances)
     none = np.zeros((*unknowns.shape[:-1], len(design.runs)))
     moved, constant = none + 1.0, none
-    for at, (name, _, sd) in enumerate(design.nuisances):
+    for at, (name, _, sd, _) in enumerate(design.nuisances):
         what, _, whose = name.partition(" of ")
         size = unknowns[..., at, None]
         if what == "viscosity":

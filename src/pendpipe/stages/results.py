@@ -89,7 +89,8 @@ def left_out(
 
     Where there is none they are searched for. The campaign's numbers are those without them.
     """
-    from pendpipe.campaign.search import Far, off, search
+    from pendpipe.campaign.search import search
+    from pendpipe.campaign.seen import Far, off
 
     together = campaign_data(campaign, results)
     if together is None or not enough(together[0]):
