@@ -20,7 +20,7 @@ from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import Fit, Remainder, refine, remainder_of, with_errors
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.rivals import near_harmonic_by_chance
-from pendpipe.diagnosis.summary import Change, Summary, numbers_of
+from pendpipe.diagnosis.summary import Change, Summary, numbers_of, test_of as measurement_of
 from pendpipe.diagnosis.values import constants_of, curve_values
 from pendpipe.diagnosis.weighing import curve_of
 from pendpipe.dynamics.eq8 import OMEGA, TIME, A, B, C
@@ -129,8 +129,9 @@ def test_a_class_is_listed_with_the_likeliest_first() -> None:
 @pytest.mark.parametrize(
     ("own", "rival", "p", "says"),
     [
-        ("clock-drift", "frequency-drift", 0.67, "frequency-drift"),
-        ("clock-drift", "frequency-drift", 0.1, "clock-drift"),
+        ("equilibrium-step", "amplitude-step", 0.67, "amplitude-step"),
+        ("clock-drift", "frequency-drift", 0.04, "clock-drift"),
+        ("clock-drift", "frequency-drift", 0.95, "frequency-drift"),
         ("presliding-friction", "unnamed-damping", 0.55, "unnamed-damping"),
     ],
 )
@@ -146,26 +147,82 @@ def test_the_likeliest_of_a_class_says_what_decides(
 
 
 @pytest.mark.parametrize(
-    ("rival", "p", "missing", "candidates"),
+    ("own", "rival", "says", "measure"),
     [
-        ("frequency-drift", 0.1, ("drifting clock (rate 1.66(11) × 10⁻⁴ s⁻¹)",), ""),
-        ("frequency-drift", 0.6, ("drifting frequency",), ""),
-        ("frequency-drift", 0.5, ("drifting clock (rate 1.66(11) × 10⁻⁴ s⁻¹)",), ""),
-        ("unnamed-restoring", 0.6, (), "described by a restoring torque of unknown form"),
+        ("clock-drift", "frequency-drift", "in the motion or in the sensor", "second sensor"),
+        ("cubic-stiffness", "frequency-drift", "with time or with the amplitude", "half the ampl"),
+        ("periodic-drive", "parametric-drive", "something periodic", "record the pendulum"),
+        ("damping-drift", "frequency-drift", "a force that changes with time", "release it"),
+    ],
+)
+@pytest.mark.structure
+def test_what_has_no_name_is_told_by_what_its_candidates_share_and_a_test_of_it(
+    own: str, rival: str, says: str, measure: str
+) -> None:
+    fitted = replace(named(own), probability=0.25, indistinguishable=(Mate(rival, 0.2),))
+    summary = diagnosis(replace(fitted, discriminating_test=measurement_of(fitted))).summary
+    assert summary.missing == ()
+    for text in (summary.headline, summary.sentence):
+        assert says in text
+        assert rival not in text
+    assert measure in summary.decide_by
+
+
+@pytest.mark.parametrize(
+    ("own", "rival", "p", "missing"),
+    [
+        (0.8, "frequency-drift", 0.1, ("drifting clock (rate 1.66(11) × 10⁻⁴ s⁻¹; 80 %)",)),
+        (0.1, "frequency-drift", 0.85, ("drifting frequency (85 %)",)),
+        (0.5, "frequency-drift", 0.4, ("drifting clock or drifting frequency (90 % together)",)),
+        (0.1, "unnamed-restoring", 0.8, ("a restoring torque of unknown form (80 %)",)),
+        (
+            0.6,
+            "frequency-drift",
+            0.04,
+            ("probably drifting clock (rate 1.66(11) × 10⁻⁴ s⁻¹; 60 %)",),
+        ),
     ],
 )
 @pytest.mark.structure
 def test_numbers_are_those_of_what_is_named(
-    rival: str, p: float, missing: tuple[str, ...], candidates: str
+    own: float, rival: str, p: float, missing: tuple[str, ...]
 ) -> None:
     """Where a rival leads the class, the parameters of the effect that was fitted say nothing."""
     fitted = replace(
         named("clock-drift", rate=Estimate(1.66e-4, 1.1e-5, "1/s")),
-        probability={0.1: 0.8, 0.5: 0.5, 0.6: 0.3}[p],
+        probability=own,
         indistinguishable=(Mate(rival, p),),
     )
-    summary = diagnosis(fitted).summary
-    assert (summary.missing, summary.candidates) == (missing, candidates)
+    assert diagnosis(fitted).summary.missing == missing
+
+
+@pytest.mark.structure
+def test_no_sentence_has_four_names_and_its_probabilities_are_those_of_the_json() -> None:
+    """Two classes of two would be four; of five equal ones three have 60 % together."""
+    pairs = (
+        likely("impulse", 0.5, ("amplitude-step", 0.3)),
+        likely("clock-drift", 0.3, ("frequency-drift", 0.4)),
+    )
+    five = likely("impulse", 0.2, *((each, 0.2) for each in list(ORDER)[:4]))
+    six = likely("impulse", 0.16, *((each, 0.16) for each in ORDER))
+    for effects, told in ((pairs, 1), ((five,), 1), ((six,), 0)):
+        content = diagnosis(*effects).to_dict()
+        sentence, missing = content["summary"]["sentence"], content["summary"]["missing"]
+        assert len(missing) == told
+        assert sum(each.name in sentence for each in CATALOGUE) <= 3
+        by_name = {
+            by_identifier(name).name: p
+            for each in content["effects"]
+            for name, p in (
+                (each["id"], each["probability"]),
+                *((mate["id"], mate["probability"]) for mate in each["indistinguishable_from"]),
+            )
+        }
+        for cause in missing:
+            names, p = re.fullmatch(r"(.*) \((\d+) % together\)", cause).groups()
+            total = sum(by_name[name] for name in names.split(" or "))
+            assert round(100.0 * total) == int(p)
+            assert cause in sentence
 
 
 def test_what_eq_8_describes_needs_no_effect() -> None:
@@ -213,6 +270,8 @@ def test_what_a_test_has_counted_is_said_in_words_alone() -> None:
 
 # The dozen lines that a diagnosis prints, and the same as fields.
 
+ORDER = ("amplitude-step", "equilibrium-step", "frequency-step", "damping-step", "offset-step")
+
 REST = Remainder(1e4, 6.0, 40.0, {"phase": 0.8, "offset": 0.2})
 
 
@@ -258,7 +317,7 @@ def test_a_misfit_that_chance_does_not_explain_is_not_nothing() -> None:
     left = replace(diagnosis(), search=searched(0.9, p_value=5e-10))
     headline, copied = left.statement.splitlines()
     assert headline == "a small misfit is left, its cause is NOT known (p = 5e-10)"
-    assert copied.endswith("(p = 5e-10); the cause was not identified.”")
+    assert copied.endswith("(p = 5e-10). The cause is not known.”")
     colour = [named("coloured-noise")]
     for p, level, lacks, says in (
         (5e-10, 0.01, [], "missing-physics"),
@@ -282,7 +341,7 @@ def test_what_is_presumed_is_fitted_and_not_missing() -> None:
 @pytest.mark.parametrize(
     ("effect", "headline", "candidates"),
     [
-        (likely("impulse", 0.9), "missing: impulse", ""),
+        (likely("impulse", 0.9), "missing: impulse (90 %)", ""),
         # A class counts together.
         (
             likely("clock-drift", 0.3, ("frequency-drift", 0.4)),
@@ -291,7 +350,8 @@ def test_what_is_presumed_is_fitted_and_not_missing() -> None:
         ),
         (
             likely("clock-drift", 0.22, ("frequency-drift", 0.08)),
-            "something is missing, its cause is NOT known",
+            "something is missing, its cause is NOT known: something in the motion or in the"
+            " sensor: one recording can't tell which",
             "drifting clock (22 %)",
         ),
         (
@@ -319,7 +379,7 @@ def test_the_answer_has_a_dozen_lines_in_the_order_of_the_questions() -> None:
     lines = str(found).splitlines()
     assert len(lines) <= 12
     order = [
-        "a.csv: missing: impulse, and a misfit of unknown cause",
+        "a.csv: missing: impulse (90 %), and a misfit of unknown cause",
         "  how much it matters   the fit misses the readings by 200 µrad (noise 100 µrad): T0",
         "  where                 throughout the record; what is left lies in the phase (80 %)",
         "  how sure              impulse 90 %; cycles left out of the fit are predicted better in",
@@ -399,7 +459,7 @@ def test_parameters_have_words_and_units_and_differ_from_zero() -> None:
         },
     )
     assert diagnosis(effect).summary.missing == (
-        "second mode (amplitude 0.00500(10) rad, frequency 1.500(10) Hz)",
+        "second mode (amplitude 0.00500(10) rad, frequency 1.500(10) Hz; 90 %)",
     )
 
 
@@ -427,7 +487,9 @@ def test_every_number_of_an_effect_is_printed_in_words_with_error_and_unit(effec
 def test_a_drift_that_is_straight_says_no_time_constant() -> None:
     straight = Estimate(STRAIGHT_S, 0.0, "s")
     drift = named("offset-drift", rate=Estimate(1e-5, 1e-7, "rad/s"), tau=straight)
-    assert diagnosis(drift).summary.missing == ("drifting offset (rate 1.000(10) × 10⁻⁵ rad/s)",)
+    assert diagnosis(drift).summary.missing == (
+        "drifting offset (rate 1.000(10) × 10⁻⁵ rad/s; 90 %)",
+    )
 
 
 @pytest.mark.slow

@@ -296,7 +296,7 @@ def test_the_loss_of_the_readings_is_the_viscous_rate(content: Shown) -> None:
 
 def test_a_model_on_its_own_clock_has_its_own_amplitude_and_phase(content: Shown) -> None:
     at = content.baseline.at
-    own = cycles(at.reading, content.data.weight, at, 0.0)
+    own = cycles(at.reading, content.data, at, 0.0)
     assert np.diff(own.phase) == pytest.approx(2.0 * math.pi, abs=1e-6)
     expected = np.interp(own.time_s, at.sampled.time_s, at.sampled.amplitude)
     assert own.amplitude == pytest.approx(expected, rel=1e-4)

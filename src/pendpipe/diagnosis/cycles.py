@@ -84,29 +84,33 @@ class Spans:
     frequency_sd_hz: FloatArray
 
 
-def cycles(reading: FloatArray, weight: FloatArray, clock: Evaluated, noise_rms: float) -> Cycles:
+def cycles(reading: FloatArray, data: Data, clock: Evaluated, noise_rms: float) -> Cycles:
     """Lock in to readings, cycle by cycle, on a model's phase clock.
+
+    Times are those of the recording, whose clock may drift.
 
     Parameters
     ----------
-    reading, weight
-        Readings (or a model's readings) and whether each counts, shape (n,).
+    reading
+        Of the recording, or a model's, shape (n,).
+    data
+        The readings' times, and whether each counts.
     clock
         The model whose phase numbers the cycles.
     noise_rms
         Standard deviation of one reading; 0 for a model's.
     """
-    motion = clock.sampled.motion
-    found = lock_in(reading, weight, clock.sampled, _CYCLE_SHARE)
-    # The middle of a cycle is a turning point of the model.
-    turning = 2 * found.number + 1
-    inside = (turning >= 0) & (turning < len(motion.time_s))
-    turning = turning[inside]
+    sampled = clock.sampled
+    found = lock_in(reading, data.weight, sampled, _CYCLE_SHARE)
+    # The middle of a cycle is a turning point of the model, which a kick may have moved.
+    turned = math.pi * (2.0 * found.number + 1.0)
+    inside = (sampled.phase[0] <= turned) & (turned <= sampled.phase[-1])
+    turned = turned[inside]
     size = np.maximum(np.hypot(found.cosine, found.sine)[inside], 1e-12)
-    amplitude = motion.amplitude[turning, 0] * size
+    amplitude = np.interp(turned, sampled.phase, sampled.amplitude) * size
     sd = noise_rms * np.sqrt(2.0 / found.readings[inside]) / amplitude
-    phase = math.pi * turning + found.phase[inside]
-    return Cycles(motion.time_s[turning, 0], amplitude, phase, sd)
+    stamped_s = np.interp(turned, sampled.phase, data.time_s)
+    return Cycles(stamped_s, amplitude, turned + found.phase[inside], sd)
 
 
 def span_ends(found: Cycles) -> list[int]:
@@ -181,13 +185,13 @@ class SmallSwings:
 
 def small_swings(fit: Fit, data: Data, noise: Noise) -> SmallSwings | None:
     """Compare the last span of cycles with a model; None where there are too few."""
-    measured = cycles(data.values, data.weight, fit.at, noise.white_rms)
+    measured = cycles(data.values, data, fit.at, noise.white_rms)
     if len(measured.time_s) < _FEWEST_SPANS:
         return None
     ends = span_ends(measured)
     if len(ends) <= _FEWEST_SPANS:
         return None
-    own = cycles(fit.at.reading, data.weight, fit.at, 0.0).at(measured.time_s)
+    own = cycles(fit.at.reading, data, fit.at, 0.0).at(measured.time_s)
     one, other = between(measured, ends), between(own, ends)
     off: FloatArray = one.frequency_hz / other.frequency_hz - 1.0
     scatter = float(np.sqrt(np.mean(off[:-1] ** 2)))

@@ -45,7 +45,7 @@ def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
     effect
         The effect.
     """
-    difference = _difference(before, after) * data.weight
+    difference = between_models(before, after) * data.weight
     power = difference**2
     sampled = after.at.sampled
     time = instant_of(after, effect) or _interval(data.time_s, power)
@@ -140,7 +140,7 @@ def mains_of(line: Estimate, data: Data) -> str:
     return ""
 
 
-def _difference(before: Fit, after: Fit) -> FloatArray:
+def between_models(before: Fit, after: Fit) -> FloatArray:
     """Difference of the two models' readings, linearised along the motion where phases differ.
 
     Far out of phase the difference of readings is as large as the motion and no longer shows where

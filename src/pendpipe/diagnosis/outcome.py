@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from pendpipe.diagnosis.held_out import HeldOut
     from pendpipe.diagnosis.hypothesis import Hypothesis
     from pendpipe.diagnosis.refine import Remainder
+    from pendpipe.diagnosis.seen import Seen
 
 
 @dataclass(frozen=True, repr=False)
@@ -36,6 +37,9 @@ class Outcome:
         What the baseline has, and the missing in the order in which they were added.
     held_out
         None where nothing was added.
+    seen, left
+        What the readings show that the baseline does not, whatever its cause; and that the model
+        with all that has a name does not.
     name
         Of the recording.
     search
@@ -52,6 +56,8 @@ class Outcome:
     improved: FittedModel
     effects: tuple[FoundEffect, ...]
     held_out: HeldOut | None
+    seen: tuple[Seen, ...] = ()
+    left: tuple[Seen, ...] = ()
     warnings: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
     name: str = ""

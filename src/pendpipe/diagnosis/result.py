@@ -65,6 +65,8 @@ class Diagnosis(Outcome):
                     "noise_rms_rad": self.noise_rms_rad,
                     "verdict": self.verdict,
                     "p_value": self.p_value,
+                    "seen": self.seen,
+                    "left": self.left,
                     "effects": self.effects,
                     "improved": self.improved,
                     "held_out": dict(zip(_DENSITIES, densities, strict=True)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -35,6 +35,8 @@ from pendpipe.diagnosis.refine import Fit, remainder_of, with_errors
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.search import baseline_fitted, run_search
+from pendpipe.diagnosis.seen import Seen, seen_of
+from pendpipe.diagnosis.summary import NAMED, causes_of, class_of, jumps, test_of
 from pendpipe.diagnosis.values import parameters_of
 from pendpipe.diagnosis.weighing import effect_named, fault_named
 from pendpipe.dynamics.any_law import NoMotionError, sample_pieces
@@ -150,7 +152,9 @@ def diagnose_recording(
     except NoMotionError as error:
         remedy = "cut it with --start and --stop, or change what is held with --fix"
         raise NotAnalysableError(place, f"the model can't follow it ({error})", remedy) from error
-    effects, predicted = _in_order(found, samples), None
+    named = [effect_named(found, step) for step in found.steps]
+    named = [replace(each, discriminating_test=test_of(each)) for each in named]
+    effects, predicted = _in_order(found, named, samples), None
     if verdict_of(effects, found.p_value, level) != "consistent" and not _adds_nothing(found):
         progress("predicting cycles that are left out of the fit")
         both = found.baseline, found.fit
@@ -164,6 +168,7 @@ def diagnose_recording(
         after,
         (*_presumed(found), *effects),
         predicted,
+        *_seen(found, named, level),
         warnings=(*points.notes, *stamps),
         provenance=dict(provenance or {}),
         name=Path(place).name if str(place) != "recording" else "",
@@ -232,9 +237,45 @@ def _adds_nothing(found: Hypothesis) -> bool:
     return found.fit.value is found.baseline.value
 
 
-def _in_order(found: Hypothesis, samples: Samples) -> tuple[FoundEffect, ...]:
+def _seen(
+    found: Hypothesis, named: Sequence[FoundEffect], level: float
+) -> tuple[tuple[Seen, ...], tuple[Seen, ...]]:
+    """Return what the baseline does not show, and what the model with all names does not.
+
+    Where nothing was found that is asked only of what chance does not explain.
+    """
+    if not named and found.unexplained >= level:
+        return (), ()
+    readings, causes = (found.data, found.noise), causes_of(named)
+    with np.errstate(all="ignore"):
+        likely = [each for each in named if class_of(each)[0][0] >= NAMED]
+        sudden = [each.location.time_s for each in likely if jumps(class_of(each)[0][2])]
+        lines = [
+            each.parameters[name]
+            for each in likely
+            if each.location.frequency_hz and not each.location.harmonics
+            for name in list(each.parameters)
+            if each.parameters[name].unit == "Hz"
+        ]
+        bare: Fit | None = found.baseline
+        if not np.array_equal(found.baseline.model.time_s, found.fit.model.time_s):
+            # Time stamps that were wrong are told as such.
+            bare = found.without(*found.steps) if found.steps else None
+        at, line = next(iter(sudden), None), next(iter(lines), None)
+        seen = seen_of(bare, found.fit, *readings, instant_s=at, line_hz=line) if bare else ()
+        others = [step for step, cause in zip(found.steps, causes, strict=True) if not cause.text]
+        open_still = others or found.remainder.systematic
+        if len(others) == len(found.steps) or not open_still:
+            return seen, ()
+        best = found.without(*others) if others else found.fit
+        return seen, seen_of(best, found.fit, *readings) if best else ()
+
+
+def _in_order(
+    found: Hypothesis, named: Sequence[FoundEffect], samples: Samples
+) -> tuple[FoundEffect, ...]:
     """List effects and measurement faults in the order in which they were added."""
-    effects = [(number, effect_named(found, step)) for number, step in enumerate(found.steps)]
+    effects = list(enumerate(named))
     faults = [(fault.after, fault_named(found, fault)) for fault in found.faults]
     # The sort is stable: a fault goes before the effect that followed it.
     order = [each for _, each in sorted([*faults, *effects], key=lambda pair: pair[0])]

@@ -1,12 +1,15 @@
-"""The answer in a dozen lines: what is missing, how much it matters, and what to quote.
+"""The answer in a dozen lines: what is seen, what is missing, how much it matters, what to quote.
 
-A name is given from a probability of one half on, its class counted together; from a fifth on
-it stands in one line of candidates. Everything below is in the details.
+What is seen comes first: it is true whatever its cause. A cause is named from a probability of
+0.8 on; two or three that have one half together are named as "A or B"; of others what they have in
+common is said. From a fifth on they stand in one line of candidates. Everything below is in the
+details.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -18,8 +21,10 @@ from pendpipe.answer import Answer, Table, factor, percent, printed
 from pendpipe.diagnosis.found import CANDIDATE, COLOURED_NOISE, FoundEffect
 from pendpipe.diagnosis.outcome import Outcome
 from pendpipe.diagnosis.refine import Remainder
+from pendpipe.diagnosis.seen import Seen
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier, declared
-from pendpipe.effects.curves import CURVES
+from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES
+from pendpipe.effects.effect import Effect
 from pendpipe.estimate import LISTED, Z95, Estimate
 from pendpipe.files import fields_of
 from pendpipe.levels import FALSE_ALARM
@@ -28,7 +33,11 @@ from pendpipe.quantities import compact, listed, with_error
 BASELINES: Final = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 """The baselines in words."""
 NAMED: Final = 0.5
-"""Probability from which a cause is named, its class counted together."""
+"""Probability from which causes are named, two or three of a class together."""
+_ALONE: Final = 0.8
+"""Probability from which a cause is named without its rivals."""
+_MOST_NAMES: Final = 3
+"""In a sentence: more are no finding."""
 DOUBTFUL: Final = 0.05
 """Probability up to which a name only describes and is not to be quoted."""
 _SURE: Final = 0.95
@@ -41,6 +50,11 @@ UNNAMED: Final = {
     "unnamed-drive": "an unknown drive",
     "unnamed-measurement": "an unknown error of the sensor",
 }
+NAMES_OF_CURVES: Final = {
+    name: tuple(each.name for each in (*CURVES, *FOLLOW_UP_CURVES) if each.identifier == name)
+    for name in UNNAMED
+}
+"""Of the curves of an identifier."""
 PARTS: Final = {
     "offset": "in the offset",
     "amplitude": "in the amplitude",
@@ -112,6 +126,8 @@ class Summary:
         What can be quoted.
     sentence
         To copy.
+    seen
+        What is seen, whatever its cause: clauses, the first of which stands in the headline.
     """
 
     headline: str
@@ -125,6 +141,7 @@ class Summary:
     decide_by: str = ""
     quote: str = ""
     sentence: str = ""
+    seen: str = ""
 
     def pairs(self) -> list[tuple[str, str]]:
         """Return what is known, a title and a clause each, as it is printed."""
@@ -132,7 +149,7 @@ class Summary:
         more = len(self.excluded) - _SHOWN
         pairs = (
             ("how much it matters", self.matters),
-            ("where", self.where),
+            ("seen", self.seen) if self.seen else ("where", self.where),
             ("how sure", self.certainty),
             ("candidates", self.candidates),
             ("looked for, not found", looked + (f" ({more} more: -v)" if more > 0 else "")),
@@ -143,21 +160,24 @@ class Summary:
 
     @property
     def answer(self) -> Answer:
-        """What is printed: where it is too wide, without the numbers of what is missing."""
+        """What is printed: where it is too wide, without times, then without numbers."""
+        told = (
+            self.headline,
+            *(self.headline.replace(long, short) for long, short in self._shorter()),
+        )
         short = self.headline
-        for cause in self.missing:
-            short = short.replace(cause, cause if cause.endswith("together)") else _bare(cause))
-        shorter = short
-        for cause in self.missing:
-            first, *others = cause.split(" or ")
-            if len(others) > 1:
-                p = cause.rpartition(" (")[2]
-                shorter = shorter.replace(cause, f"{first} or {len(others)} others ({p}")
+        for long, bare in self._shorter():
+            short = short.replace(long, bare)
         of_q = [each for each in self.consequence if each.quantity == "Q"]
         fewer = [each for each in self.consequence if each not in of_q[1:-1]]
         tables = (_table(self.consequence), _table(fewer)) if self.consequence else ()
-        headlines = self.headline, short, shorter
-        return Answer(headlines, tuple(self.pairs()), tables=tables, sentence=self.sentence)
+        return Answer((*told, short), tuple(self.pairs()), tables=tables, sentence=self.sentence)
+
+    def _shorter(self) -> Iterator[tuple[str, str]]:
+        """Yield parts of the headline with a shorter form: what stands in brackets can go."""
+        for part in (self.seen.partition("; ")[0], *self.missing):
+            if part:
+                yield part, re.sub(r" \([^()]*(\([^()]*\)[^()]*)*\)", "", part)
 
 
 def _table(changes: Sequence[Change]) -> Table:
@@ -191,11 +211,6 @@ def read_summary(content: Mapping[str, Any], unit: str) -> Summary:
     return Summary(**{**content, **lists, "consequence": changes})
 
 
-def _bare(cause: str) -> str:
-    """Return a cause without its numbers."""
-    return cause.rpartition(" (")[0] if cause.endswith(")") else cause
-
-
 def _title(change: Change) -> str:
     if change.amplitude_rad is None:
         return {"period": "T0"}.get(change.quantity, change.quantity)
@@ -206,6 +221,7 @@ def summarise(diagnosis: Outcome) -> Summary:
     """Make the answer of a diagnosis."""
     presumed = _presumed(diagnosis)
     found = [each for each in diagnosis.missing if each.identifier != COLOURED_NOISE]
+    seen = _seen(diagnosis.seen, presumed)
     if not found:
         beyond = f" beyond {presumed}, which is fitted" if presumed else ""
         noise = any(each.identifier == COLOURED_NOISE for each in diagnosis.effects)
@@ -215,32 +231,64 @@ def summarise(diagnosis: Outcome) -> Summary:
         said, sentence = f"nothing is missing{beyond}", ""
         if diagnosis.verdict != "consistent":
             said = f"a small misfit is left{beyond}, its cause is NOT known"
-            sentence = _sentence(diagnosis, (), presumed)
-        return Summary(f"{said} ({p}){coloured}{zero}", sentence=sentence)
-    named = [word for each in found if (word := _named(each))]
-    candidates = [_candidate(each) for each in found if not _named(each)]
-    candidates = [each for each in candidates if each]
+            said = f"{seen[0]}: {said}" if seen else said
+            sentence = _sentence(diagnosis, seen, presumed, "The cause is not known")
+        whole = "; ".join(seen)
+        return Summary(f"{said} ({p}){coloured}{zero}", sentence=sentence, seen=whole)
+    causes = causes_of(found)
+    named = [cause.text for cause in causes if cause.text]
+    candidates = [_candidate(each.effect) for each in causes if not each.text]
     changes = _changes(diagnosis)
     rest = diagnosis.remainder is not None and diagnosis.remainder.systematic
+    family = family_of([each.effect for each in causes if not each.text])
     if named:
-        headline = f"missing: {'; '.join(named)}"
-        headline += ", and a misfit of unknown cause" if rest or len(named) < len(found) else ""
+        drawn = ["described by " * cause.described + cause.text for cause in causes if cause.text]
+        headline, lacks = f"missing: {'; '.join(drawn)}", _lacks(causes)
+        if rest or len(named) < len(found):
+            headline += ", and a misfit of unknown cause"
+            left = _seen(diagnosis.left, "")
+            more = f" ({left[0]})" if left else f" ({family})" if family else ""
+            lacks += f"; there is a misfit of unknown cause, too{more}"
     else:
-        headline = "something is missing, its cause is NOT known"
+        headline = "its cause is NOT known" + (f": {family}" if family else "")
+        headline = headline if seen else f"something is missing, {headline}"
+        lacks = "The cause is not known" + (f": {family}" if family else "")
     unit = diagnosis.unit
     return Summary(
-        headline,
+        f"{seen[0]}; {headline}" if seen else headline,
         tuple(named),
         _matters(diagnosis, changes, unit),
         changes,
         _where(diagnosis, found),
         _certainty(diagnosis, named, rest=rest),
-        "; ".join(candidates) or ("none above 20 %" if not named else ""),
+        "; ".join(filter(None, candidates)) or ("none above 20 %" if not named else ""),
         _excluded(diagnosis, found),
         _decide_by(found),
         _quote(diagnosis, changes),
-        _sentence(diagnosis, named, presumed),
+        _sentence(diagnosis, seen, presumed, lacks),
+        "; ".join(seen),
     )
+
+
+def _lacks(causes: Sequence[Cause]) -> str:
+    """Say what the causes are, and by what the rest is described."""
+    known = [cause.text for cause in causes if cause.text and not cause.described]
+    drawn = [cause.text for cause in causes if cause.described]
+    if not known:
+        return f"It is described by {listed(drawn)}"
+    verb = "It lacks" if len(known) > 1 else "The cause is"
+    return "; ".join(
+        [
+            f"{verb} {listed(known)}",
+            *([f"the rest is described by {listed(drawn)}"] if drawn else []),
+        ]
+    )
+
+
+def _seen(seen: Sequence[Seen], presumed: str) -> list[str]:
+    """Return what is seen as clauses; a change of the frequency is one beyond sin x."""
+    beyond = ", beyond sin x" if "sin x" in presumed else ""
+    return [each.clause + (beyond if each.part == "frequency" else "") for each in seen]
 
 
 def _presumed(diagnosis: Outcome) -> str:
@@ -258,31 +306,138 @@ def class_of(effect: FoundEffect) -> list[tuple[float, str, str]]:
     return sorted(members, key=lambda member: -member[0])
 
 
-def _is_described(effect: FoundEffect) -> bool:
-    """Whether a curve is more likely than not: it describes a cause, and names none."""
-    p, _, identifier = class_of(effect)[0]
-    return identifier in UNNAMED and p >= NAMED
+@dataclass(frozen=True)
+class Cause:
+    """What is said of an effect and its class.
+
+    Parameters
+    ----------
+    effect
+        The effect.
+    text
+        Its name, or "A or B", with the probability; empty where only the family is said.
+    names
+        The identifiers that are named.
+    """
+
+    effect: FoundEffect
+    text: str = ""
+    names: tuple[str, ...] = ()
+
+    @property
+    def described(self) -> bool:
+        """Whether it is a curve, which describes a cause and names none."""
+        return len(self.names) == 1 and self.names[0] in UNNAMED
 
 
-def _named(effect: FoundEffect) -> str:
-    """Name a cause, or its class, that is more likely than not; nothing otherwise."""
+def causes_of(found: Sequence[FoundEffect]) -> list[Cause]:
+    """Return what is said of each effect: three names together at most, the likeliest first."""
+    room, said = _MOST_NAMES, dict[int, Cause]()
+    for effect in sorted(found, key=lambda each: -class_of(each)[0][0]):
+        said[id(effect)] = cause = _cause(effect, room)
+        room -= len(cause.names)
+    return [said[id(effect)] for effect in found]
+
+
+def _cause(effect: FoundEffect, room: int) -> Cause:
+    """Name a cause, or two or three that share one half; nothing where more would be needed."""
     members = class_of(effect)
-    total = sum(member[0] for member in members)
-    if total < NAMED or _is_described(effect):
-        return ""
-    if members[0][0] >= NAMED:
-        numbers = numbers_of(effect) if class_of(effect)[0][2] == effect.identifier else ""
-        return f"{members[0][1]} ({numbers})" if numbers else members[0][1]
-    likely = [name for p, name, _ in members if p >= LISTED]
-    return f"{' or '.join(likely)} ({percent(min(total, 1.0))} together)"
+    likely = [each for each in members if each[0] >= LISTED] or members[:1]
+    likely = members[:1] if members[0][0] >= _ALONE else likely[:_MOST_NAMES]
+    total = min(sum(p for p, *_ in likely), 1.0)
+    if total < NAMED or len(likely) > room:
+        return Cause(effect)
+    (_, first, identifier), *others = likely
+    numbers = numbers_of(effect) if identifier == effect.identifier and not others else ""
+    if not others and effect.curve and effect.curve["name"] in NAMES_OF_CURVES.get(identifier, ()):
+        numbers = effect.curve["summary"]
+    together = " together" if others else ""
+    inside = "; ".join(filter(None, (numbers, f"{percent(total)}{together}")))
+    names = " or ".join([first, *(name for _, name, _ in others)])
+    names = (
+        f"probably {names}"
+        if total < _ALONE and not others and identifier not in UNNAMED
+        else names
+    )
+    return Cause(effect, f"{names} ({inside})", tuple(each for *_, each in likely))
 
 
 def _candidate(effect: FoundEffect) -> str:
-    members = class_of(effect)
-    if _is_described(effect):
-        return f"described by {effect.name if effect.kind == 'unnamed' else members[0][1]}"
-    likely = [f"{name} ({percent(p)})" for p, name, _ in members if p >= CANDIDATE]
+    likely = [f"{name} ({percent(p)})" for p, name, _ in class_of(effect) if p >= CANDIDATE]
     return " or ".join(likely)
+
+
+_APART: Final = {
+    "time": (
+        "something that changes with time or with the amplitude: one decay can't tell which",
+        "release it again from half the amplitude: what depends on the amplitude is the same at the"
+        " same amplitude, what depends on the time is not",
+    ),
+    "sensor": (
+        "something in the motion or in the sensor: one recording can't tell which",
+        "record it with a second sensor and clock too, a camera's: the motion is the same",
+    ),
+}
+"""What the members of a class differ in, and the measurement that tells them apart."""
+
+
+def _differing(effect: FoundEffect) -> str:
+    """Return by what the likely members of a class differ, a key of `_APART`; "" by neither."""
+    members = class_of(effect)
+    likely = [each for p, _, each in members if p >= LISTED] or [effect.identifier]
+    in_time = {changes_in_time(each) for each in likely}
+    sensor = {kind_of(each) == "measurement" for each in likely}
+    return "time" if len(in_time) > 1 else "sensor" if len(sensor) > 1 else ""
+
+
+def family_of(effects: Sequence[FoundEffect]) -> str:
+    """Say what the likely causes of effects without a name have in common."""
+    if not effects:
+        return ""
+    first = max(effects, key=lambda each: sum(p for p, *_ in class_of(each)))
+    members = class_of(first)
+    if sum(p for p, *_ in members) < CANDIDATE:
+        return ""
+    if apart := _differing(first):
+        return _APART[apart][0]
+    identifier = members[0][2]
+    if is_periodic(identifier):
+        return "something periodic"
+    what = "an error of the sensor" if kind_of(identifier) == "measurement" else "a force"
+    return f"{what} that changes with time" if changes_in_time(identifier) else what
+
+
+def kind_of(identifier: str) -> str:
+    """Return the kind of an effect: a curve of the sensor is of the measurement."""
+    if identifier in UNNAMED:
+        return "measurement" if identifier == "unnamed-measurement" else "dynamics"
+    return "parameter" if identifier.startswith("parameter-") else by_identifier(identifier).kind
+
+
+def is_periodic(identifier: str) -> bool:
+    """Whether an effect has a frequency of its own."""
+    if identifier in UNNAMED or identifier.startswith("parameter-"):
+        return False
+    return any(each.unit == "Hz" for each in by_identifier(identifier).parameters)
+
+
+def jumps(identifier: str) -> bool:
+    """Whether an effect makes the motion, the reading or its time jump at an instant."""
+    if identifier in UNNAMED or identifier.startswith("parameter-"):
+        return False
+    effect = by_identifier(identifier)
+    return effect.local and type(effect).acceleration is Effect.acceleration
+
+
+def changes_in_time(identifier: str) -> bool:
+    """Whether an effect follows the time, by an instant or a time constant, and not the motion."""
+    if identifier in UNNAMED:
+        return identifier == "unnamed-drive"
+    if identifier.startswith("parameter-"):
+        return False
+    effect = by_identifier(identifier)
+    shapes = effect.parameters[effect.sizes :]
+    return effect.local or effect.in_time or any(each.unit == "s" for each in shapes)
 
 
 def numbers_of(effect: FoundEffect) -> str:
@@ -368,7 +523,8 @@ def _where(diagnosis: Outcome, found: Sequence[FoundEffect]) -> str:
     text = first.location.summary
     curves = [each.curve for each in (first, *found) if each.curve and each.curve["summary"]]
     told = list({curve["name"]: curve["summary"] for curve in reversed(curves)}.values())
-    text = "; ".join(told if _is_described(first) and told else [text, *told])
+    described = class_of(first)[0][2] in UNNAMED
+    text = "; ".join(told if described and told else [text, *told])
     remainder = diagnosis.remainder
     if remainder is not None and remainder.systematic and remainder.shares:
         name, share = max(remainder.shares.items(), key=lambda item: item[1])
@@ -380,7 +536,7 @@ def _certainty(diagnosis: Outcome, named: Sequence[str], *, rest: bool) -> str:
     sure = [
         f"{class_of(each)[0][1]} {percent(class_of(each)[0][0])}"
         for each in diagnosis.missing
-        if class_of(each)[0][0] >= NAMED and not _is_described(each)
+        if class_of(each)[0][0] >= NAMED
     ]
     text = ", ".join(sure) if sure else "no cause above 50 %" if not named else ""
     held = diagnosis.held_out
@@ -406,12 +562,18 @@ def _excluded(diagnosis: Outcome, found: Sequence[FoundEffect]) -> tuple[str, ..
     return tuple(name_of(each) for each in (*first, *(x for x in left if x not in first)))
 
 
-def _test_of(effect: FoundEffect) -> str:
-    """The measurement that decides about an effect: that of the leader of its class."""
+def test_of(effect: FoundEffect) -> str:
+    """The measurement that decides about an effect: that of the leader of its class.
+
+    Where no name leads with 80 % it is that which tells apart what the likely ones differ in.
+    """
+    p, _, leader = class_of(effect)[0]
+    if p < _ALONE and (apart := _differing(effect)):
+        return _APART[apart][1]
     tests = {each.identifier: each.discriminating_test for each in reversed(CURVES)}
     tests |= {each.identifier: each.discriminating_test for each in CATALOGUE}
     tests[effect.identifier] = effect.discriminating_test
-    return tests.get(class_of(effect)[0][2], effect.discriminating_test)
+    return tests.get(leader, effect.discriminating_test)
 
 
 def _decide_by(found: Sequence[FoundEffect]) -> str:
@@ -423,7 +585,7 @@ def _decide_by(found: Sequence[FoundEffect]) -> str:
     ]
     leaders = [(class_of(each)[0], each) for each in doubted]
     best = max(leaders, key=lambda one: (one[0][2] not in UNNAMED, one[0][0]), default=None)
-    return _test_of(best[1]) if best else ""
+    return test_of(best[1]) if best else ""
 
 
 def _quote(diagnosis: Outcome, changes: Sequence[Change]) -> str:
@@ -453,14 +615,14 @@ def _quote(diagnosis: Outcome, changes: Sequence[Change]) -> str:
     return "; ".join(said)
 
 
-def _sentence(diagnosis: Outcome, names: Sequence[str], presumed: str) -> str:
+def _sentence(diagnosis: Outcome, seen: Sequence[str], presumed: str, cause: str) -> str:
     name = diagnosis.baseline.name
     model = {"eq8": "Eq. 8", "viscous": "Eq. 3"}.get(name, name)
     model += f" with {presumed}" if presumed else ""
     p = printed(diagnosis.p_value)
-    if not names:
-        return f"“{model} does not describe this recording ({p}); the cause was not identified.”"
-    return f"“{model} does not describe this recording ({p}): it lacks {listed(names)}.”"
+    if not seen:
+        return f"“{model} does not describe this recording ({p}). {cause}.”"
+    return f"“{_capital(', and '.join(seen))}, which {model} does not describe ({p}). {cause}.”"
 
 
 def swinging(outcome: Outcome) -> str:
@@ -550,7 +712,7 @@ def _effect(effect: FoundEffect) -> str:
     if effect.confirmed is not None:
         sure = "confirmed" if effect.confirmed.p_value < FALSE_ALARM else "not confirmed"
         parts.append(f"{sure} without the fit: {effect.confirmed.summary}")
-    decide = f"decide by: {_test_of(effect)}"
+    decide = f"decide by: {test_of(effect)}"
     text = f"{_capital('; '.join(part for part in (*parts, decide) if part))}"
     return text if text.endswith("?") else f"{text}."
 

@@ -101,15 +101,15 @@ def effect_named(found: Hypothesis, step: Step) -> FoundEffect:
         ),
         effect.discriminating_test,
         locate(step.before, found.fit, found.data, effect),
-        curve_of(found, [(1.0, effect, found.fit), *members]),
+        curve_of(found, [(max(step.weights[0], CANDIDATE), effect, found.fit), *members]),
     )
 
 
 def curve_of(
     found: Hypothesis, members: Sequence[tuple[float, Effect, Fit]]
 ) -> dict[str, Any] | None:
-    """Return the first curve among an effect and its rivals that is a candidate."""
-    for probability, effect, fit in members:
+    """Return the likeliest curve among an effect and its rivals, if it is a candidate."""
+    for probability, effect, fit in sorted(members, key=lambda member: -member[0]):
         if isinstance(effect, Curve) and probability >= CANDIDATE:
             fit = with_errors(fit, found.data, found.noise) if fit is not found.fit else fit
             return curve_told(fit, effect, found.data.unit)

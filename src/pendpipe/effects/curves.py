@@ -53,6 +53,8 @@ class Curve(Effect):
     """Returns where the basis functions have their peaks."""
     unit: ClassVar[Callable[[Pendulum, Span], float]]
     """Returns what may reasonably be there, in the unit of `ordinate`."""
+    along: ClassVar[Callable[[Any], FloatArray]]
+    """Returns the argument, from a motion or a sampled motion."""
 
     def __init__(self, span: Span, coefficients: FloatArray | None = None) -> None:
         self.span = span
@@ -136,7 +138,7 @@ def follows(
             drawn = curve.scale(pendulum) * curve.curves(values, along(moving))
             return np.asarray(function(moving, pendulum, *drawn))
 
-        own = {how: method, "make_knots": make_knots, "unit": unit}
+        own = {how: method, "make_knots": make_knots, "unit": unit, "along": along}
         return subclass(Curve, function.__name__, function.__doc__, own | attributes)
 
     return declare

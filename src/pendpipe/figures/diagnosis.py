@@ -103,7 +103,7 @@ class Shown:
     @cached_property
     def _measured(self) -> tuple[Cycles, list[int]]:
         """The cycles of the readings, and those between which they are compared."""
-        found = cycles(self.data.values, self.data.weight, self.clock, self.noise.white_rms)
+        found = cycles(self.data.values, self.data, self.clock, self.noise.white_rms)
         ends = span_ends(found) if len(found.time_s) else []
         # Two points are no curve.
         if len(ends) < 4:
@@ -118,7 +118,7 @@ class Shown:
     def of_model(self, fit: Fit) -> Spans:
         """The same of a model's readings, between the same times."""
         found, ends = self._measured
-        own = cycles(fit.at.reading, self.data.weight, fit.at, 0.0)
+        own = cycles(fit.at.reading, self.data, fit.at, 0.0)
         # Its first cycle may begin after the readings', and its last one end before theirs.
         table = np.stack([np.log(own.amplitude), own.phase, own.sd], axis=1)
         logs, phase, sd = make_interp_spline(own.time_s, table, k=1)(found.time_s).T
