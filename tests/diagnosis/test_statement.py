@@ -15,14 +15,14 @@ from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import Lead
 from pendpipe.diagnosis.found import FittedModel, FoundEffect, Location, Mate, verdict_of
 from pendpipe.diagnosis.held_out import HeldOut
-from pendpipe.diagnosis.location import curve_told, locate, mains_of
+from pendpipe.diagnosis.location import locate, mains_of
+from pendpipe.diagnosis.missing_force import curve_told
 from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import Fit, Remainder, refine, remainder_of, with_errors
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.rivals import near_harmonic_by_chance
 from pendpipe.diagnosis.summary import Change, Summary, numbers_of, test_of as measurement_of
 from pendpipe.diagnosis.values import constants_of, curve_values
-from pendpipe.diagnosis.weighing import curve_of
 from pendpipe.dynamics.eq8 import OMEGA, TIME, A, B, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import (
@@ -49,7 +49,6 @@ from .records import (
     TONE_HZ,
     TRUTH,
     diagnosed,
-    hypothesis_of,
     null_fit,
     other_engine,
     prepared,
@@ -571,20 +570,6 @@ def test_a_curve_says_where_and_how_large_it_is(
     told = curve_told(fit, curve, unit)
     assert told["summary"].startswith(says)
     assert bool(told["summary"]) == bool(says)
-
-
-@pytest.mark.parametrize(("probability", "kept"), [(0.78, True), (0.21, True), (0.1, False)])
-def test_a_curve_is_kept_where_it_is_a_rival_of_a_name(probability: float, kept: bool) -> None:
-    fit, data, noise = null_fit()
-    curve = friction_curve(fit.at.span).reduced(np.ones((15, 1)))
-    start = np.append(fit.value, 0.0)
-    with_it = refine(fit.model.adding(curve), data, noise, start)
-    drift = by_identifier("damping-drift")
-    found = curve_of(
-        hypothesis_of(fit, data, noise, (), fit), [(1.0, drift, fit), (probability, curve, with_it)]
-    )
-    assert (found is not None) is kept
-    assert found is None or found["name"] == friction_curve.name
 
 
 @pytest.mark.parametrize(

@@ -3,25 +3,21 @@
 import itertools
 import math
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from pendpipe.analysis.demodulation import by_cycle
-from pendpipe.analysis.fit.printed import short_size
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.found import Location
 from pendpipe.diagnosis.refine import LARGE_PHASE_ERROR, Fit
-from pendpipe.diagnosis.values import curve_values, curves_of, last_in
+from pendpipe.diagnosis.values import last_in
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
-from pendpipe.effects.curves import Curve
-from pendpipe.estimate import Z95, Estimate
-from pendpipe.quantities import after_number, compact, listed, with_error
+from pendpipe.estimate import Estimate
+from pendpipe.quantities import after_number, listed, with_error
 
-_ROUNDING: Final = 1e-9
-"""Of the usual size: a motion is right to 1e-10 of itself, and a curve below tells of that."""
 _INTERVAL_SHARE: Final = 0.9
 """Part of what an effect explains that its intervals hold."""
 _HARMONICS: Final = 6
@@ -66,44 +62,6 @@ def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
     if beat is not None:
         summary += f", beating with the motion every {beat:.3g} s"
     return replace(found, summary=summary)
-
-
-def curve_told(fit: Fit, effect: Curve, unit: str) -> dict[str, Any]:
-    """Return a fitted curve as `curve_values` does, with its ``name`` and a clause, ``summary``.
-
-    The clause says where and how large it is: of the points beyond their 95 % band on one side,
-    with none on the other side among them, those that make most of it, and their mean; of a torque
-    over the angle, that within the least of these. Where the band holds zero it is empty.
-    """
-    found = curve_values(fit, effect, unit)
-    axes = (found[name].partition(", ") for name in ("argument", "ordinate"))
-    (along, _, per), (_, _, across) = axes
-    told, most, whole = "", 0.0, found["at"]
-    # What is odd in the angle is the same on both sides.
-    right = whole > 0.0 if effect.is_torque else np.full(len(whole), True)
-    at = whole[right]
-    for name, both in curves_of(fit, effect, whole, odd=effect.is_torque).items():
-        subject, larger, smaller = effect.words[name]
-        value, sd = (each[right] / at if effect.is_torque else each for each in both)
-        whole_size = 1.0 if effect.is_torque else abs(effect.scale(fit.model.pendulum(fit.value)))
-        beyond = np.flatnonzero(np.abs(value) > np.maximum(Z95 * sd, _ROUNDING * whole_size))
-        sides = np.split(beyond, np.flatnonzero(np.diff(np.sign(value[beyond]))) + 1)
-        here = max(sides, key=lambda side: float(np.abs(value[side]).sum()))
-        total = float(np.abs(value[here]).sum())
-        if total <= most:
-            continue
-        # A point that stands out is no place.
-        usual = np.quantile(np.abs(value[here]), 0.75)
-        here, most = here[np.abs(value[here]) >= 0.5 * usual], total
-        here = here[:1] if effect.is_torque else here
-        size, low, high = float(value[here].mean()), float(at[here[0]]), float(at[here[-1]])
-        pure = effect.is_torque or not across
-        number = f"{100.0 * abs(size):.2g} %" if pure else compact(abs(size), across)
-        place = f"from {short_size(low, per)} to {short_size(high, per)} ({along})"
-        if along == "angle" and (effect.is_torque or low <= 0.0 <= high):
-            place = f"within {short_size(max(-low, high), per)} of the lowest point"
-        told = f"{subject} {larger if size > 0.0 else smaller} by {number} {place}"
-    return {"name": effect.name, "summary": told, **found}
 
 
 _MAINS_HZ: Final = (50.0, 60.0)  # of the world's grids

@@ -266,7 +266,7 @@ def summarise(diagnosis: Outcome) -> Summary:
         _decide_by(found),
         _quote(diagnosis, changes),
         _sentence(diagnosis, seen, presumed, lacks),
-        "; ".join(seen),
+        "; ".join([*seen, *_forces(found)] if seen else []),
     )
 
 
@@ -521,8 +521,7 @@ def _where(diagnosis: Outcome, found: Sequence[FoundEffect]) -> str:
     """Say where the most probable effect shows, and where the rest lies."""
     first = max(found, key=lambda each: class_of(each)[0][0])
     text = first.location.summary
-    curves = [each.curve for each in (first, *found) if each.curve and each.curve["summary"]]
-    told = list({curve["name"]: curve["summary"] for curve in reversed(curves)}.values())
+    told = _forces((first, *found))
     described = class_of(first)[0][2] in UNNAMED
     text = "; ".join(told if described and told else [text, *told])
     remainder = diagnosis.remainder
@@ -530,6 +529,12 @@ def _where(diagnosis: Outcome, found: Sequence[FoundEffect]) -> str:
         name, share = max(remainder.shares.items(), key=lambda item: item[1])
         text += f"; what is left lies {PARTS[name]} ({percent(share)})"
     return text
+
+
+def _forces(found: Sequence[FoundEffect]) -> list[str]:
+    """Return where the missing forces are how large, each curve once."""
+    curves = [each.curve for each in found if each.curve and each.curve["summary"]]
+    return list({curve["name"]: curve["summary"] for curve in reversed(curves)}.values())
 
 
 def _certainty(diagnosis: Outcome, named: Sequence[str], *, rest: bool) -> str:

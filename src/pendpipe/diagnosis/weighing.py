@@ -4,15 +4,16 @@ import math
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from pendpipe.diagnosis.found import CANDIDATE, Finding, FoundEffect, Mate
+from pendpipe.diagnosis.found import Finding, FoundEffect, Mate
 from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Step, is_further
 from pendpipe.diagnosis.instants import with_instants
-from pendpipe.diagnosis.location import curve_told, locate
-from pendpipe.diagnosis.refine import SETTLED, Fit, best_fit, is_gross, refine, with_errors
+from pendpipe.diagnosis.location import locate
+from pendpipe.diagnosis.missing_force import force_of
+from pendpipe.diagnosis.refine import SETTLED, Fit, best_fit, is_gross, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.rivals import (
     NEAR,
@@ -28,7 +29,6 @@ from pendpipe.diagnosis.rivals import (
 from pendpipe.diagnosis.values import effect_parameters
 from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
-from pendpipe.effects.curves import Curve
 from pendpipe.estimate import LISTED
 from pendpipe.levels import FALSE_ALARM
 
@@ -78,7 +78,6 @@ def effect_named(found: Hypothesis, step: Step) -> FoundEffect:
     effect = step.winner.effect
     found = beside(found, effect)
     mates = list(zip(step.mates, step.weights[1:-1], strict=True))
-    members = [(probability, mate.effect, mate.fit) for mate, probability in mates]
     return FoundEffect(
         effect.identifier,
         effect.name,
@@ -101,19 +100,8 @@ def effect_named(found: Hypothesis, step: Step) -> FoundEffect:
         ),
         effect.discriminating_test,
         locate(step.before, found.fit, found.data, effect),
-        curve_of(found, [(max(step.weights[0], CANDIDATE), effect, found.fit), *members]),
+        force_of(found, step),
     )
-
-
-def curve_of(
-    found: Hypothesis, members: Sequence[tuple[float, Effect, Fit]]
-) -> dict[str, Any] | None:
-    """Return the likeliest curve among an effect and its rivals, if it is a candidate."""
-    for probability, effect, fit in sorted(members, key=lambda member: -member[0]):
-        if isinstance(effect, Curve) and probability >= CANDIDATE:
-            fit = with_errors(fit, found.data, found.noise) if fit is not found.fit else fit
-            return curve_told(fit, effect, found.data.unit)
-    return None
 
 
 def _others_in_place(found: Hypothesis, effect: Effect) -> Fit | None:

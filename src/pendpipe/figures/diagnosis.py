@@ -455,21 +455,22 @@ def _power(values: FloatArray) -> tuple[str, float]:
 
 @styled
 def draw_curve(content: Shown) -> Figure:
-    """Draw each curve without a name that is a candidate, one below the other."""
+    """Draw the missing force that stands in the place of each effect, one below the other."""
     unnamed = [effect for effect in content.diagnosis.missing if effect.curve is not None]
     if not unnamed:
-        raise NothingToDrawError("every effect has a name")
+        raise NothingToDrawError("nothing that is missing is a curve")
     below = [panel for effect in unnamed for panel in _curves(effect.curve or {})]
-    height = 2.7 * len(below)
-    margins = {"left": 0.15, "bottom": 0.5 / height, "top": 1.0 - 0.45 / height, "hspace": 0.5}
+    height = 3.1 * len(below)
+    margins = {"left": 0.17, "bottom": 0.5 / height, "top": 1.0 - 0.72 / height, "hspace": 0.62}
     return figure_of(height, *below, margins=margins, sharex=False)
 
 
 def _curves(drawn: Mapping[str, Any]) -> Iterator[Panel]:
     """A curve, or its two parts (in phase and in quadrature); and its local exponent."""
     at, argument = _scaled(drawn["at"], drawn["argument"])
-    looks = [("value", "sd", BLUE, "-", "in phase")]
+    looks = [("value", "sd", BLUE, "-", "any form, 95 %")]
     if "quadrature" in drawn:
+        looks[0] = (*looks[0][:-1], "in phase")
         looks.append(("quadrature", "quadrature_sd", GREEN, "--", "in quadrature"))
     name, _, unit = str(drawn["ordinate"]).replace("omega^2", "ω²").partition(", ")
     largest = max(float(np.max(np.abs(drawn[key]))) for key, *_ in looks)
@@ -481,14 +482,15 @@ def _curves(drawn: Mapping[str, Any]) -> Iterator[Panel]:
             band(at, value, 1.96 * factor * np.asarray(drawn[sd]), colour),
             curve(at, value, colour, dashes, label=label),
         ]
+    if drawn.get("named") is not None:
+        over = factor * np.asarray(drawn["named"])
+        marks.append(curve(at, over, VERMILION, "--", label=drawn["named_as"]))
     label = f"{name[:1].upper()}{name[1:]}" + (f" ({pretty_unit(short)})" if short else "")
     about = {"xlabel": argument, "xmargin": 0.01}
     own = about | {"ylabel": "\n".join(textwrap.wrap(label, 26))}
-    if len(looks) > 1:
-        yield Panel(marks, own, key=2)
-    else:
-        title = textwrap.fill(drawn["summary"] or drawn["name"], 70)
-        yield Panel(marks, own | {"title": title[:1].upper() + title[1:]})
+    title = textwrap.fill(drawn["summary"] or drawn["name"], 70)
+    own["title"] = title[:1].upper() + title[1:]
+    yield Panel(marks, own, key=2 * (len(marks) > 3), lift=1.1 + 0.09 * title.count("\n"))
     if "local_exponent" in drawn:
         # The power of the velocity that the whole loss follows, by amplitude.
         value = np.asarray(drawn["local_exponent"])

@@ -156,9 +156,10 @@ OF_A_RECORDING: Final = {
         "The difference of the two residuals is the missing effect.",
     ),
     "curve": Caption(
-        "The unknown part",
-        "The curve that describes what no name explains, with its 95 % band.",
-        "Its shape is a hint: something acts where it differs from zero.",
+        "The missing force",
+        "The curve that may stand in the place of what is missing, with its 95 % band; over it,"
+        " what has a name.",
+        "Something acts where it differs from zero. A name whose line leaves the band is not all.",
     ),
 }
 """Words for the figures of one recording's page."""

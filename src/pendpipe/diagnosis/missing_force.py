@@ -1,0 +1,163 @@
+"""The missing force as a curve with its band, in words, and a named effect drawn over it.
+
+Of each effect that acts throughout, the curve is shown that the evidence prefers among those that
+may stand in its place: a torque against the angle, a loss against amplitude, angle or time, an
+error of the sensor. It is a rival of the effect, refitted beside all others; where the search has
+kept none, the curve whose signature explains most is fitted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+
+from pendpipe.analysis.fit.printed import short_size
+from pendpipe.answer import percent
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.detect import detect, prepare
+from pendpipe.diagnosis.hypothesis import Hypothesis, Step, undrawn
+from pendpipe.diagnosis.refine import Fit, loses_phase, with_errors
+from pendpipe.diagnosis.rivals import Rival, refit_leads
+from pendpipe.diagnosis.values import curve_values, curves_of
+from pendpipe.dynamics.any_law import Motion
+from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
+from pendpipe.estimate import Z95
+from pendpipe.levels import deviations
+from pendpipe.quantities import compact
+
+_CLOSE: Final = 64
+"""Nodes of half a cycle at which a part of the swing is cut out."""
+_ROUNDING: Final = 1e-9
+"""Of the usual size: a motion is right to 1e-10 of itself, and a curve below tells of that."""
+
+
+def force_of(found: Hypothesis, step: Step) -> dict[str, Any] | None:
+    """Return the curve that stands in the place of an effect, with the effect as such a curve.
+
+    None of what happens at an instant, and of a line, which no curve describes.
+    """
+    winner = step.winner
+    effect = winner.effect
+    if isinstance(effect, Curve):
+        return curve_told(found.fit, effect, found.data.unit)
+    likely = zip(step.weights[1:-1], step.mates, strict=True)
+    drawn = [mate for _, mate in sorted(likely, key=lambda each: -each[0]) if mate.drawn]
+    drawn += sorted((each for each in step.rivals if each.drawn), key=lambda each: -each.evidence)
+    if not drawn:
+        if effect.local or effect.spectral or effect.kind == "parameter":
+            return None
+        drawn = _curves_in_place(found, step)
+    if not drawn:
+        return None
+    curve = drawn[0].effect
+    assert isinstance(curve, Curve)
+    fit = with_errors(drawn[0].fit, found.data, found.noise)
+    told = curve_told(fit, curve, found.data.unit)
+    return {**told, "named": seen_as(found.fit, fit, curve, told["at"]), "named_as": effect.name}
+
+
+def _curves_in_place(found: Hypothesis, step: Step) -> list[Rival]:
+    """Fit the curve whose signature explains most of what an effect explains."""
+    before, readings = step.before, (found.data, found.noise)
+    curves = undrawn((*CURVES, *FOLLOW_UP_CURVES), before)
+    scanned = detect(prepare(before, *readings, curves), before, seed=0, known=found.scan)
+    best = max(scanned.leads, key=lambda lead: lead.score, default=None)
+    if best is None:
+        return []
+    one = replace(scanned, leads=(best,))
+    return refit_leads(before, *readings, one, held=found.held, phase_lost=loses_phase(before))
+
+
+def seen_as(named: Fit, drawn: Fit, curve: Curve, at: FloatArray) -> FloatArray | None:
+    """Return what a curve would be if the readings were those of the model with a name.
+
+    To first order about the curve's fit, ``J^+ (r_drawn - r_named)`` with the residuals of the two
+    models: so both are told beside the same baseline, whatever it takes of each.
+    """
+    jacobian = drawn.jacobian[:, drawn.free]
+    if named.residual.shape != drawn.residual.shape:
+        return None
+    moved = np.zeros(len(drawn.value))
+    scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+    step = np.linalg.lstsq(jacobian / scale, drawn.residual - named.residual, rcond=1e-12)[0]
+    moved[list(drawn.free)] = step / scale
+    place = next(place for other, place in drawn.model.places() if other is curve)
+    unit = curve.scale(drawn.model.pendulum(drawn.value))
+    return np.asarray(unit * curve.curves((drawn.value + moved)[place], at)[0])
+
+
+def share_of_loss(fit: Fit, curve: Curve, low: float, high: float) -> float:
+    """Return which part of the work of all losses is a curve's, where its argument is within.
+
+    Zero of what is no loss, and where the losses do no work.
+    """
+    if curve.identifier != "unnamed-damping":
+        return 0.0
+    pendulum, motion = fit.model.pendulum(fit.value), _closer(fit.at.tangent.motion)
+    place = next(place for other, place in fit.model.places() if other is curve)
+    inside = (low <= type(curve).along(motion)) & (type(curve).along(motion) <= high)
+    force = np.asarray(curve.acceleration(motion, pendulum, fit.value[place]))
+    # The work is that of each half cycle by itself, over the phase.
+    own, whole = (
+        float(np.sum(_work(np.where(inside, each * motion.velocity, 0.0), motion)))
+        for each in (force, pendulum.losses(motion) + force)
+    )
+    return own / whole if whole < 0.0 else 0.0
+
+
+def _closer(motion: Motion) -> Motion:
+    """Return a motion at nodes that lie closer, to a fiftieth of the swing."""
+    clock, psi = replace(motion.clock, order=_CLOSE), motion.clock.psi.ravel()
+    log_amplitude, time_s = (
+        np.interp(clock.psi, psi, each.ravel()) for each in (motion.log_amplitude, motion.time_s)
+    )
+    return Motion(clock, motion.angular_frequency, log_amplitude, time_s, motion.upwards)
+
+
+def _work(power: FloatArray, motion: Motion) -> FloatArray:
+    return np.diff(motion.clock.integral(power)[:, [0, -1]], axis=1)
+
+
+def curve_told(fit: Fit, effect: Curve, unit: str) -> dict[str, Any]:
+    """Return a fitted curve as `curve_values` does, with its ``name`` and a clause, ``summary``.
+
+    The clause says where and how large it is: of the points beyond their 95 % band on one side,
+    with none on the other side among them, those that make most of it, and their mean; of a torque
+    over the angle, that within the least of these; of a loss which part of the whole loss there it
+    is. Where none of them stands out over all knots it is empty.
+    """
+    found = curve_values(fit, effect, unit)
+    axes = (found[name].partition(", ") for name in ("argument", "ordinate"))
+    (along, _, per), (_, _, across) = axes
+    told, most, whole = "", 0.0, found["at"]
+    # What is odd in the angle is the same on both sides.
+    right = whole > 0.0 if effect.is_torque else np.full(len(whole), True)
+    at = whole[right]
+    for name, both in curves_of(fit, effect, whole, odd=effect.is_torque).items():
+        subject, larger, smaller = effect.words[name]
+        value, sd = (each[right] / at if effect.is_torque else each for each in both)
+        whole_size = 1.0 if effect.is_torque else abs(effect.scale(fit.model.pendulum(fit.value)))
+        sure = np.abs(value) > deviations(len(effect.knots)) * sd
+        beyond = np.flatnonzero(np.abs(value) > np.maximum(Z95 * sd, _ROUNDING * whole_size))
+        sides = np.split(beyond, np.flatnonzero(np.diff(np.sign(value[beyond]))) + 1)
+        here = max(sides, key=lambda side: float(np.abs(value[side]).sum() * np.any(sure[side])))
+        here = here[: len(here) * bool(np.any(sure[here]))]
+        total = float(np.abs(value[here]).sum())
+        if total <= most:
+            continue
+        # A point that stands out is no place.
+        usual = np.quantile(np.abs(value[here]), 0.75)
+        here, most = here[np.abs(value[here]) >= 0.5 * usual], total
+        here = here[:1] if effect.is_torque else here
+        size, low, high = float(value[here].mean()), float(at[here[0]]), float(at[here[-1]])
+        pure = effect.is_torque or not across
+        number = f"{100.0 * abs(size):.2g} %" if pure else compact(abs(size), across)
+        place = f"from {short_size(low, per)} to {short_size(high, per)} ({along})"
+        if along == "angle" and (effect.is_torque or low <= 0.0 <= high):
+            place = f"within {short_size(max(-low, high), per)} of the lowest point"
+        told = f"{subject} {larger if size > 0.0 else smaller} by {number} {place}"
+        share = share_of_loss(fit, effect, low, high)
+        told += f", {percent(abs(share))} of the loss there" if share else ""
+    return {"name": effect.name, "summary": told, **found}

@@ -1,0 +1,73 @@
+"""The missing force as a curve: a named effect as such a curve, and its share of the loss."""
+
+import numpy as np
+import pytest
+
+from pendpipe.diagnosis.missing_force import curve_told, seen_as, share_of_loss
+from pendpipe.diagnosis.refine import refine
+from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.curves import damping_curve, reading_curve, restoring_curve
+from pendpipe.effects.model import Model
+
+from .records import (
+    INTERVAL_S,
+    LINEAR,
+    NOISE_RAD,
+    TIME_S,
+    TRUTH,
+    diagnosed,
+    null_fit,
+    prepared,
+    white,
+)
+
+
+def test_a_loss_that_is_everywhere_has_its_part_of_the_work() -> None:
+    """Beta beside b: beta/(b + beta) of the loss, at any amplitude."""
+    whole = damping_curve(Model(TIME_S, INTERVAL_S).evaluate(LINEAR).span)
+    flat = whole.reduced(np.ones((whole.basis_size, 1)))
+    data, noise = prepared(Model(TIME_S, INTERVAL_S).reading(LINEAR) + white(2))
+    model = Model(TIME_S, INTERVAL_S, (flat,))
+    fit = refine(model, data, noise, np.append(LINEAR, 0.3), held=range(len(LINEAR) + 1), rounds=0)
+    beta = 0.3 * flat.scale(fit.model.pendulum(fit.value))
+    for low, high in ((0.06, 0.1), (0.0, 1.0)):
+        assert share_of_loss(fit, flat, low, high) == pytest.approx(
+            beta / (LINEAR[1] + beta), rel=1e-3
+        )
+
+
+def test_a_named_effect_is_drawn_as_the_curve_that_its_readings_would_give() -> None:
+    """A sensor's s x^3 is itself up to what the motion takes of it: a gain, here 3/4 s y^2."""
+    cubic, size = by_identifier("sensor-cubic"), 0.5
+    named = Model(TIME_S, INTERVAL_S, (cubic,))
+    truth = np.append(TRUTH, size)
+    data, noise = prepared(named.reading(truth) + white(3))
+    fit = refine(named, data, noise, truth)
+    curve = reading_curve(fit.at.span)
+    drawn = Model(TIME_S, INTERVAL_S, (curve,))
+    best = refine(drawn, data, noise, np.append(TRUTH, np.zeros(curve.sizes)))
+    at = np.linspace(-0.14, 0.14, 29)
+    found = seen_as(fit, best, curve, at)
+    assert found is not None
+    # A gain and an offset are the motion's: what is left of both is beside a straight line.
+    bent = [each - np.polyval(np.polyfit(at, each, 1), at) for each in (found, size * at**3)]
+    # The curve is straight between its knots.
+    assert bent[0] == pytest.approx(bent[1], abs=0.15 * np.max(np.abs(bent[1])))
+
+
+def test_what_is_only_noise_is_told_nowhere() -> None:
+    fit, data, noise = null_fit()
+    curve = restoring_curve(fit.at.span)
+    model = fit.model.adding(curve)
+    found = refine(model, data, noise, np.append(fit.value, np.zeros(curve.sizes)))
+    assert curve_told(found, curve, "rad")["summary"] == ""
+
+
+@pytest.mark.parametrize(("name", "drawn"), [("sensor-cubic", True), ("tone-pickup", False)])
+def test_every_effect_but_a_line_has_its_curve(name: str, drawn: bool) -> None:
+    (effect,) = diagnosed(name).effects
+    assert (effect.curve is not None) == drawn
+    if effect.curve is not None:
+        band = 3.0 * effect.curve["sd"] + 0.1 * NOISE_RAD
+        assert effect.curve["named_as"] == effect.name
+        assert np.all(np.abs(effect.curve["named"] - effect.curve["value"]) < band)
