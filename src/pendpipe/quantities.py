@@ -68,7 +68,7 @@ def pretty_unit(unit: str) -> str:
     """
     if unit.startswith("1/") and "sqrt" not in unit:
         return " ".join(
-            f"{of}⁻{'¹²³'[int(n) - 1 if n in '123' and n else 0]}"
+            f"{of}⁻{'¹²³⁴'[int(n) - 1 if n in '1234' and n else 0]}"
             for of, _, n in [part.partition("^") for part in unit[2:].strip("()").split()]
             if of != "1"
         )

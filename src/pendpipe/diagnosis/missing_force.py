@@ -8,6 +8,7 @@ kept none, the curve whose signature explains most is fitted.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final
 
@@ -23,9 +24,9 @@ from pendpipe.diagnosis.rivals import Rival, refit_leads
 from pendpipe.diagnosis.values import curve_values, curves_of
 from pendpipe.dynamics.any_law import Motion
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
-from pendpipe.estimate import Z95
+from pendpipe.estimate import Z95, Estimate
 from pendpipe.levels import deviations
-from pendpipe.quantities import compact
+from pendpipe.quantities import compact, with_error
 
 _CLOSE: Final = 64
 """Nodes of half a cycle at which a part of the swing is cut out."""
@@ -160,4 +161,35 @@ def curve_told(fit: Fit, effect: Curve, unit: str) -> dict[str, Any]:
         told = f"{subject} {larger if size > 0.0 else smaller} by {number} {place}"
         share = share_of_loss(fit, effect, low, high)
         told += f", {percent(abs(share))} of the loss there" if share else ""
+    if formula := polynomial_of(fit, effect, unit):
+        largest = fit.at.span.first_amplitude
+        share = float(found["value"][-1] / whole[-1])
+        at_most = f"{100.0 * abs(share):.2g} % {larger if share > 0.0 else smaller}"
+        told = f"the torque is as x {_signed(formula)}: {at_most} at {short_size(largest, per)}"
+        found["polynomial"] = formula
     return {"name": effect.name, "summary": told, **found}
+
+
+def polynomial_of(fit: Fit, curve: Curve, unit: str) -> dict[str, Estimate]:
+    """Return the coefficients of a torque over omega^2 of two terms, by term; else none."""
+    place = next(place for other, place in fit.model.places() if other is curve)
+    covariance, value = fit.covariance()[place, place], fit.value[place]
+    each = [curve.told(row) for row in np.eye(curve.sizes)]
+    found = {}
+    for name in each[0]:
+        mixing = np.array([one[name] for one in each])
+        power = curve.powers[name] - 1
+        of = f"1/{curve.acts_on(unit)}" + (f"^{power}" if power > 1 else "")
+        found[name] = Estimate(
+            float(mixing @ value), float(np.sqrt(mixing @ covariance @ mixing)), of
+        )
+    return found
+
+
+def _signed(formula: Mapping[str, Estimate]) -> str:
+    """Print terms with their signs."""
+    said = []
+    for name, each in formula.items():
+        size = with_error(abs(each.value), each.sd, each.unit, short=True)
+        said.append(f"{'+' if each.value > 0.0 else '−'} {size} {name}")
+    return " ".join(said)

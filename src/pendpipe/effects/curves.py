@@ -53,6 +53,8 @@ class Curve(Effect):
     """Returns where the basis functions have their peaks."""
     unit: ClassVar[Callable[[Pendulum, Span], float]]
     """Returns what may reasonably be there, in the unit of `ordinate`."""
+    powers: ClassVar[Mapping[str, int]] = {}
+    """Of the angle, by term, where it has a formula."""
     along: ClassVar[Callable[[Any], FloatArray]]
     """Returns the argument, from a motion or a sampled motion."""
 
@@ -89,6 +91,10 @@ class Curve(Effect):
         heights = np.split(self.coefficients @ values, len(self.drawn))
         return np.array([np.interp(at, knots, height) for height in heights])
 
+    def told(self, values: FloatArray) -> Mapping[str, float]:
+        """Return the coefficients of what has a formula, by its term; none of a curve by knots."""
+        return {}
+
     def axes(self, unit: str) -> tuple[str, str]:
         """Return what it is drawn against, and what is drawn, with units, of readings in `unit`."""
         on = self.acts_on(unit)
@@ -112,6 +118,7 @@ def follows(
     along: Callable[[Any], FloatArray],
     make_knots: Callable[[Span], FloatArray],
     unit: Callable[[Pendulum, Span], float],
+    base: type[Curve] = Curve,
     **attributes: Any,
 ) -> Callable[[Callable[..., FloatArray]], type[Curve]]:
     """Declare a curve by the function through which it enters.
@@ -127,6 +134,8 @@ def follows(
         The curve's argument, from a motion or a sampled motion.
     make_knots, unit
         As in `Curve`.
+    base
+        How it is drawn: straight between knots, or a `Polynomial`.
     attributes
         Class variables of `Curve`.
     """
@@ -139,7 +148,7 @@ def follows(
             return np.asarray(function(moving, pendulum, *drawn))
 
         own = {how: method, "make_knots": make_knots, "unit": unit, "along": along}
-        return subclass(Curve, function.__name__, function.__doc__, own | attributes)
+        return subclass(base, function.__name__, function.__doc__, own | attributes)
 
     return declare
 
@@ -214,6 +223,29 @@ def share_of_swing(share: float, _: Pendulum, span: Span) -> float:
 def restoring_curve(motion: Motion, pendulum: Pendulum, torque: FloatArray) -> FloatArray:
     """A restoring torque that is any function of the angle."""
     return -(pendulum.angular_frequency**2) * torque
+
+
+class Polynomial(Curve):
+    """A curve that is a sum of two terms in the angle over the first amplitude, u."""
+
+    def __init__(self, span: Span, coefficients: FloatArray | None = None) -> None:
+        super().__init__(span, np.eye(len(self.powers)) if coefficients is None else coefficients)
+        self.basis_size = len(self.powers)
+
+    def curves(self, values: FloatArray, at: FloatArray) -> FloatArray:
+        """Return the sum of the terms."""
+        of = at / self.span.first_amplitude
+        rows = np.array([of * np.abs(of) ** (power - 1) for power in self.powers.values()])
+        return np.tensordot(self.coefficients @ values, rows, 1)[None]
+
+    def told(self, values: FloatArray) -> Mapping[str, float]:
+        """Return the coefficients of the powers of the angle, of the torque over omega^2."""
+        heights = self.coefficients @ values * self.scale(self.span.pendulum)
+        first = self.span.first_amplitude
+        return {
+            name: float(height / first**power)
+            for (name, power), height in zip(self.powers.items(), heights, strict=True)
+        }
 
 
 @follows(
@@ -457,7 +489,37 @@ def delay_curve(sampled: Sampled, pendulum: Pendulum, delay: FloatArray) -> Floa
     return -delay * sampled.velocity
 
 
+def _polynomial(flavour: str, powers: Mapping[str, int]) -> type[Curve]:
+    """Declare a torque of two terms that are odd in the angle."""
+    return follows(
+        "acceleration",
+        attrgetter("angle"),
+        angles,
+        partial(share_of_swing, 0.1),
+        base=Polynomial,
+        powers=powers,
+        identifier="unnamed-restoring",
+        name="a restoring torque of two terms",
+        equation=r"\omega^2 x \to \omega^2 x + F(x)",
+        argument="angle, rad",
+        ordinate="extra restoring torque over omega^2, rad",
+        flavour=flavour,
+        words=restoring_curve.words,
+        is_torque=True,
+        discriminating_test=restoring_curve.discriminating_test,
+    )(_torque)
+
+
+def _torque(motion: Motion, pendulum: Pendulum, torque: FloatArray) -> FloatArray:
+    """A restoring torque that is a sum of two terms in the angle."""
+    return -(pendulum.angular_frequency**2) * torque
+
+
+fifth_curve = _polynomial("fifth power", {"x³": 3, "x⁵": 5})
+second_curve = _polynomial("second power", {"x|x|": 2, "x³": 3})
 FOLLOW_UP_CURVES: Sequence[type[Curve]] = (
+    fifth_curve,
+    second_curve,
     memory_curve,
     damping_in_time_curve,
     gain_curve,
