@@ -177,6 +177,7 @@ def test_what_is_missing_is_named_and_the_fit_improves_to_the_noise(
         "residual_spectrum.svg",
         "damping.svg",
         "frequency.svg",
+        "curve.svg",
     ]
     assert {path.name for path in tmp_path.glob("*.svg")} == set(content["figures"])
 

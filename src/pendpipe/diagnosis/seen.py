@@ -1,8 +1,10 @@
 """What is seen of a misfit, whatever its cause: in which part of the motion, where, how large.
 
 A model is compared with the readings cycle by cycle, on the phase of the model that stays in step.
-Of all windows of time, or pairs of them, the one is told whose misfit is the largest beyond its
-error, of which all windows together are allowed for (`deviations`).
+Of all windows of time, or pairs of them, the one is told whose misfit is large and sure: the
+geometric mean of its size, less the error that chance makes in one of all windows (`deviations`),
+and of that over the error. The largest alone would be that of the last swings, the surest an
+average.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ import numpy as np
 from pendpipe.analysis.demodulation import by_cycle, cycle_starts
 from pendpipe.analysis.fit.printed import short_size
 from pendpipe.analysis.misfit import misfit_of
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.diagnosis.cycles import Cycles, cycles, span_ends
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.location import between_models
@@ -162,16 +164,25 @@ def _windows(count: int) -> list[tuple[int, int]]:
     return [(i, i + width) for width in widths for i in range(count - width)]
 
 
-def _widest(
+def _told(size: FloatArray, sd: FloatArray, among: BoolArray | None = None) -> int | None:
+    """Return which of several sizes is told; None where chance makes the largest."""
+    asked = sd > 0.0 if among is None else among & (sd > 0.0)
+    if not asked.any():
+        return None
+    beyond = np.abs(size) - deviations(float(asked.sum())) * sd
+    score = np.where(asked & (beyond > 0.0), beyond / np.sqrt(np.where(asked, sd, 1.0)), 0.0)
+    best = int(np.argmax(score))
+    return best if score.ravel()[best] > 0.0 else None
+
+
+def _two(
     windows: list[tuple[int, int]], value: FloatArray, sd: FloatArray
 ) -> tuple[int, int] | None:
-    """Return which two windows, the first before the second, differ the most beyond the error."""
+    """Return which two windows differ, the first before the second."""
     first, last = np.array(windows).T
     apart = last[:, None] <= first
-    beyond = deviations(max(int(apart.sum()), 1)) * np.hypot(sd[:, None], sd)
-    score = np.where(apart, np.abs(value - value[:, None]) - beyond, -math.inf)
-    best = np.unravel_index(int(np.argmax(score)), score.shape)
-    return (int(best[0]), int(best[1])) if score[best] > 0.0 else None
+    best = _told(value - value[:, None], np.hypot(sd[:, None], sd), apart)
+    return None if best is None else divmod(best, len(value))
 
 
 def _frequency(own: Cycles, model: Cycles, fit: Fit) -> _Found | None:
@@ -185,7 +196,7 @@ def _frequency(own: Cycles, model: Cycles, fit: Fit) -> _Found | None:
     lasts = own.time_s[last] - own.time_s[first]
     value = (turns[last] - turns[first]) / lasts
     sd = np.hypot(own.sd[first], own.sd[last]) / float(fit.value[OMEGA]) / lasts
-    if (two := _widest(windows, value, sd)) is None:
+    if (two := _two(windows, value, sd)) is None:
         return None
     one, other = two
     size = Estimate(float(value[other] - value[one]), math.hypot(sd[one], sd[other]), "")
@@ -206,9 +217,8 @@ def _loss(own: Cycles, model: Cycles) -> _Found | None:
     sd = np.hypot(own.sd[first], own.sd[last])
     # A window in which the model loses nothing has no ratio.
     usual = np.maximum(due, 1e-3 * np.ptp(expected))
-    score = (np.abs(more) - deviations(len(more)) * sd) / usual
-    best = int(np.argmax(score))
-    if not score[best] > 0.0:
+    best = _told(more / usual, sd / usual)
+    if best is None:
         return None
     when = float(own.time_s[first[best]]), float(own.time_s[last[best]])
     size = Estimate(float(more[best] / usual[best]), float(sd[best] / usual[best]), "")
@@ -255,7 +265,7 @@ def _offset(missed: FloatArray, phase: FloatArray, data: Data, noise: Noise) -> 
     """A change of the offset, between two windows."""
     found = _series(missed, phase, data, noise)
     value, sd = found.value[0], found.sd[0]
-    if not found.windows or (two := _widest(found.windows, value, sd)) is None:
+    if not found.windows or (two := _two(found.windows, value, sd)) is None:
         return None
     one, other = two
     size = Estimate(
@@ -273,10 +283,9 @@ def _waveform(missed: FloatArray, phase: FloatArray, data: Data, noise: Noise) -
         return None
     size = np.hypot(found.value[3::2], found.value[4::2])
     sd = found.sd[3::2]
-    score = size - deviations(size.size) * sd
-    order, best = np.unravel_index(int(np.argmax(score)), score.shape)
-    if not score[order, best] > 0.0:
+    if (told := _told(size, sd)) is None:
         return None
+    order, best = divmod(told, size.shape[1])
     number = Estimate(float(size[order, best]), float(sd[order, best]), data.unit)
     when = float(found.time_s[best, 0]), float(found.time_s[best, 1])
     return _Found(number, when, f"harmonic {order + 2} is off by {_number(number)}")

@@ -47,7 +47,7 @@ _SHOWN: Final = 4
 UNNAMED: Final = {
     "unnamed-damping": "a loss of unknown form",
     "unnamed-restoring": "a restoring torque of unknown form",
-    "unnamed-drive": "an unknown drive",
+    "unnamed-drive": "a torque that depends on the time in an unknown way",
     "unnamed-measurement": "an unknown error of the sensor",
 }
 NAMES_OF_CURVES: Final = {
@@ -403,6 +403,9 @@ def family_of(effects: Sequence[FoundEffect]) -> str:
     identifier = members[0][2]
     if is_periodic(identifier):
         return "something periodic"
+    if first.curve:
+        names = NAMES_OF_CURVES.items()
+        return next(UNNAMED[each] for each, of in names if first.curve["name"] in of)
     what = "an error of the sensor" if kind_of(identifier) == "measurement" else "a force"
     return f"{what} that changes with time" if changes_in_time(identifier) else what
 
