@@ -14,7 +14,7 @@ each.
 
 import math
 from argparse import ArgumentTypeError
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -119,7 +119,9 @@ class Curves:
         omega, loss, _, (late, *_) = self._at(amplitude)
         return omega / (1.0 + late), loss
 
-    def driven(self, amplitude: FloatArray, drive: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def driven(
+        self, amplitude: FloatArray
+    ) -> Callable[[FloatArray], tuple[FloatArray, FloatArray]]:
         """The same of a motion that is driven at angular frequencies, rad/s; the loss times g.
 
         Which friction it is changes the frequency to the second order of the loss as well. What
@@ -132,7 +134,9 @@ class Curves:
         # As unsure as the third harmonic is large.
         longer = np.exp(self.log_omega[:, :1]) / omega - 1.0
         work = 1.0 + _WORK * np.log(bent) + longer / 16.0 * rough
-        return omega * (1.0 + lower), loss * work * (drive / omega) ** power
+        swings, takes = omega * (1.0 + lower), loss * work * omega**-power
+        # (An exponential: a power takes four times as long.)
+        return lambda drive: (swings, takes * np.exp(power * np.log(drive)))
 
     def _at(self, amplitude: FloatArray) -> tuple[FloatArray, ...]:
         logs = np.log(np.atleast_2d(amplitude))
@@ -324,15 +328,20 @@ def phase_of(curves: Curves, frequency_hz: FloatArray, amplitude: FloatArray) ->
     It does not depend on the force: ``tan phi = -2 lambda g Omega/(omega^2 - Omega^2)``.
     """
     drive = math.tau * frequency_hz
-    omega, loss = curves.driven(amplitude, drive)
+    omega, loss = curves.driven(amplitude)(drive)
     return np.asarray(-np.degrees(np.arctan2(2.0 * loss * drive, omega**2 - drive**2)))
 
 
-def force_of(curves: Curves, frequency_hz: FloatArray, amplitude: FloatArray) -> FloatArray:
-    """The force per inertia that holds amplitudes, in their unit/s^2, shape (draws, n)."""
-    drive = math.tau * frequency_hz
-    omega, loss = curves.driven(amplitude, drive)
-    return np.asarray(amplitude * np.hypot(omega**2 - drive**2, 2.0 * loss * drive))
+def force_of(curves: Curves, amplitude: FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """The force per inertia that holds amplitudes, of a drive in Hz: unit/s^2, (draws, n)."""
+    driven = curves.driven(amplitude)
+
+    def force(frequency_hz: FloatArray) -> FloatArray:
+        drive = math.tau * frequency_hz
+        omega, loss = driven(drive)
+        return np.asarray(amplitude * np.hypot(omega**2 - drive**2, 2.0 * loss * drive))
+
+    return force
 
 
 def response(curves: Curves, frequency_hz: FloatArray, force: FloatArray) -> "DataFrame":
@@ -362,10 +371,11 @@ def response(curves: Curves, frequency_hz: FloatArray, force: FloatArray) -> "Da
 
     logs = np.linspace(math.log(0.1 * curves.seen[0]), curves.log_amplitude[-1], _STEPS)
     draw, states = np.arange(DRAWS), list[tuple[float, str, FloatArray]]()
+    holds = force_of(curves, np.exp(logs))
     for hertz, pushed in zip(
         frequency_hz, np.broadcast_to(force, (DRAWS, len(frequency_hz))).T, strict=True
     ):
-        held = np.log(force_of(curves, np.array(hertz), np.exp(logs))) - np.log(pushed)[:, None]
+        held = np.log(holds(np.array(hertz))) - np.log(pushed)[:, None]
         rising = (held[:, 1:] > 0.0) & (held[:, :-1] <= 0.0)
         falling = (held[:, 1:] <= 0.0) & (held[:, :-1] > 0.0)
         last = _STEPS - 2 - rising[:, ::-1].argmax(axis=1)
@@ -680,7 +690,7 @@ def _beside_driven(
         return found, None
     drive = table["drive"].to_numpy() * (math.tau * hertz) ** (2.0 * moves)
     largest = int(np.argmax(np.where(curves.outside(y), 0.0, y)))
-    constant = force_of(curves, hertz, y)[:, largest] / drive[largest]
+    constant = force_of(curves, y)(hertz)[:, largest] / drive[largest]
     states, limits = (
         response(curves, hertz, constant[:, None] * drive),
         np.full((3, len(y)), math.nan),
