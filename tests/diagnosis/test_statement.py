@@ -21,6 +21,7 @@ from pendpipe.diagnosis.noise import white_noise
 from pendpipe.diagnosis.refine import Fit, Remainder, refine, remainder_of, with_errors
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.rivals import near_harmonic_by_chance
+from pendpipe.diagnosis.seen import Seen
 from pendpipe.diagnosis.summary import Change, Summary, numbers_of, test_of as measurement_of
 from pendpipe.diagnosis.values import constants_of, curve_values
 from pendpipe.dynamics.eq8 import OMEGA, TIME, A, B, C
@@ -302,6 +303,16 @@ def likely(identifier: str, probability: float, *rivals: tuple[str, float]) -> F
         probability=probability,
         indistinguishable=tuple(Mate(*rival) for rival in rivals),
     )
+
+
+@pytest.mark.structure
+def test_what_a_test_of_the_measurement_found_is_told_beside_what_is_seen() -> None:
+    mark = replace(named("tracking-noise"), location=Location(summary="the tracked mark wanders"))
+    loss = Seen("loss", 0.8, Estimate(0.1, 0.01, ""), (1.0, 9.0), (0.2, 0.1), "the loss is larger")
+    summary = diagnosis(mark, seen=(loss,)).summary
+    assert summary.seen == "the loss is larger; the tracked mark wanders"
+    assert ("seen", summary.seen) in summary.pairs()
+    assert summary.headline.startswith("the loss is larger; missing: ")
 
 
 @pytest.mark.structure

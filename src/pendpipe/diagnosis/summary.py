@@ -266,7 +266,7 @@ def summarise(diagnosis: Outcome) -> Summary:
         _decide_by(found),
         _quote(diagnosis, changes),
         _sentence(diagnosis, seen, presumed, lacks),
-        "; ".join([*seen, *_forces(found)] if seen else []),
+        "; ".join([*seen, *_forces(found), *_by_a_test(found)] if seen else []),
     )
 
 
@@ -532,6 +532,13 @@ def _where(diagnosis: Outcome, found: Sequence[FoundEffect]) -> str:
         name, share = max(remainder.shares.items(), key=lambda item: item[1])
         text += f"; what is left lies {PARTS[name]} ({percent(share)})"
     return text
+
+
+def _by_a_test(found: Sequence[FoundEffect]) -> list[str]:
+    """Return what tests of the measurement have found: it is in no model of the readings."""
+    own = [each for each in found if each.kind == "measurement" and each.identifier not in UNNAMED]
+    tested = [each for each in own if not by_identifier(each.identifier).has_signature]
+    return [each.location.summary for each in tested if each.location.summary]
 
 
 def _forces(found: Sequence[FoundEffect]) -> list[str]:
