@@ -197,14 +197,15 @@ def test_packets_are_put_on_a_line_and_called_a_guess(
     block = np.arange(6000) // packet
     arrival = (np.arange(block[-1] + 1) + 1) * packet / rate
     arrival = np.maximum.accumulate(arrival + np.abs(rng.normal(0.0, late, len(arrival))))
-    rows = "".join(f"{t:.3f},{a:.5f}\n" for t, a in zip(arrival[block], x, strict=True))
+    # Of three digits some are equal under one stamp, and no copies.
+    rows = "".join(f"{t:.3f},{a:.3f}\n" for t, a in zip(arrival[block], x, strict=True))
     (tmp_path / "a.csv").write_text("time (s),theta (rad)\n" + rows)
     recording = read(tmp_path / "a.csv")
     fact = recording.fact("clock")
     assert fact is not None
     assert fact.how == "guessed"
     found = 1.0 / np.mean(np.diff(recording.time_s))
-    assert found == pytest.approx(rate, rel=1e-3)
+    assert found == pytest.approx(rate, rel=3e-4)
     assert float(fact.value.split()[0]) == pytest.approx(found, rel=1e-5)
 
 
@@ -225,13 +226,13 @@ def test_a_name_states_a_unit(tmp_path: Path, header: str, unit: str) -> None:
     assert recording.unit_is_stated
 
 
-@pytest.mark.parametrize("noise", [0.01, 1.0])
+@pytest.mark.parametrize(("noise", "steady"), [(0.01, 0.3), (1.0, 0.3), (0.02, 2.5), (0.5, 3.0)])
 def test_of_columns_without_names_one_that_swings_clearly_is_read(
-    tmp_path: Path, noise: float
+    tmp_path: Path, noise: float, steady: float
 ) -> None:
     """Noise before it, and half the period: the pull along the string."""
     rng = np.random.default_rng(5)
-    buzz = noise * (0.3 * np.sin(40.0 * TIME) + rng.standard_normal(len(TIME)))
+    buzz = noise * (steady * np.sin(40.0 * TIME) + rng.standard_normal(len(TIME)))
     pull = 1e-3 * ANGLE**2 + 1e-5 * rng.standard_normal(len(TIME))
     rows = np.column_stack([TIME, buzz, pull, 20.0 * ANGLE, buzz[::-1]])
     np.savetxt(tmp_path / "a.csv", rows, fmt="%.6f", delimiter=",")

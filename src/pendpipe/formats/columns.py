@@ -35,8 +35,10 @@ _WORTH: Final[Mapping[Role, float]] = {
 }
 _PAIR: Final = 5.0
 """A position x, y on a circle about the pivot is worth less than an angle, more than x."""
-_LONGEST_NAME: Final = 60
+_LONG: Final = 60
 """Letters of a column's name in a message of one line."""
+_PACE: Final = 1.4
+"""By which a pendulum's pace and its drive's differ at most: far off resonance it hardly moves."""
 _STILL: Final = 0.01
 """What a column is worth that does not oscillate, beside one that does."""
 
@@ -71,8 +73,7 @@ class Choice:
 
 def listing(names: Sequence[str], most: int = 12) -> str:
     """Join names for a message of one line: the first dozen, each of a bearable length."""
-    long = _LONGEST_NAME
-    shown = [name if len(name) <= long else name[: long - 3] + "..." for name in names[:most]]
+    shown = [name if len(name) <= _LONG else name[: _LONG - 3] + "..." for name in names[:most]]
     return ", ".join(shown) + f" and {len(names) - most} more" * (len(names) > most) or "none"
 
 
@@ -400,26 +401,29 @@ def _of_equals(equals: Sequence[tuple[Column, ...]]) -> tuple[tuple[Column, ...]
     first = equals[0]
     if len(equals) == 1 or len(first) > 1:
         return first, ", which alone swings clearly" * wander
-    # A drive has one size from beginning to end; a free decay has all of them.
-    own = first[0].swing
+    own, apart = first[0].swing, [first]
     for column in equals:
         swing = column[0].swing
-        ratio = swing.samples_per_cycle / (own.samples_per_cycle or np.inf)
-        # The pendulum goes along with its drive; what only drifts does not.
-        graded = swing.clear and swing.graded > 0.3 and 0.7 < ratio < 1.4
-        if graded and own.graded < 0.1 and own.clear:
+        ratio = swing.clear * swing.samples_per_cycle / (own.samples_per_cycle or np.inf)
+        # A drive has one size from beginning to end; a free decay has all of them.
+        along = 1.0 / _PACE < ratio < _PACE
+        if along and swing.graded > 0.3 and own.graded < 0.1 and own.clear:
             return column, ", whose swing decays"
         # Height, and the pull along the string, go through two cycles in one of the swing.
         # Known to one cycle more or less in the whole.
         blur = max(0.05, min(1.01 * swing.samples_per_cycle / len(column[0].values), 0.2))
-        if swing.clear and abs(ratio - 2.0) < blur:
+        if abs(ratio - 2.0) < blur:
             return column, f", of which '{first[0].label}' has twice the frequency"
+        apart += [column] if ratio and not along and not column[0].wanders else []
     units = {(unit_of(c[0].unit) or c[0].unit) for c in equals if c[0].unit}
-    if len(units) > 1 or not all(c[0].unit or c[0].name for c in equals):
+    named = all(c[0].unit or c[0].name for c in equals)
+    if len(units) > 1:
         return first, ""
-    largest = max(column[0].swing.amplitude for column in equals)
-    wide = next(c for c in equals if c[0].swing.amplitude >= largest / 3)
-    return wide, "" if wide is first else ", which swings most"
+    # What swings along with a column that nobody names may be its derivative.
+    some = equals if named else apart
+    largest = max(column[0].swing.amplitude for column in some)
+    wide = next(c for c in some if c[0].swing.amplitude >= largest / 3)
+    return wide, ", which swings most" if wide is not first and named else ""
 
 
 def _not_a_derivative(

@@ -291,9 +291,11 @@ def _refuse_absurd(table: Table, base: TimeBase, values: FloatArray) -> None:
         raise InputError(where, problem, "drop the rows, or leave the cells blank")
     for name, some in (("times", base.time_s), ("readings", values[~np.isnan(values)])):
         span = np.ptp(some) if some.size else 0.0
-        problem = f"the {name} span {span:.3g}, which no pendulum does"
         refuse_if(
-            span and not 1.0 / ABSURD < span < ABSURD, table.place, problem, "check their unit"
+            span and not 1.0 / ABSURD < span < ABSURD,
+            table.place,
+            f"the {name} span {span:.3g}, which no pendulum does",
+            "check their unit",
         )
 
 

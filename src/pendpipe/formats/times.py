@@ -22,12 +22,6 @@ _EPOCH: Final = 3e8
 """Seconds beyond which a clock counts from a date (1979 in Unix time), not a start."""
 _LATEST: Final = 1e10
 """Seconds since 1970 that no recording has reached: the unit in the header is wrong."""
-_EPOCHS: Final = (
-    (3e17, 1e-9, "nanoseconds"),
-    (3e14, 1e-6, "microseconds"),
-    (3e11, 1e-3, "milliseconds"),
-    (_EPOCH, 1.0, "seconds"),
-)
 _LONGEST_S: Final = 300.0
 """Period beyond which a time without a unit is hardly in seconds: no pendulum is so slow."""
 _SHORTEST_S: Final = 5e-4
@@ -237,11 +231,11 @@ def _time_unit(
         if unit and fits and (word == column.unit or plain(word) not in ("t", "h", "min")):
             return unit.factor, Fact("unit of time", word, "stated")
     period = 0.0 if listed else _period(reading, values)
-    for least, factor, name in _EPOCHS:
+    for factor, name in _TICKS[::-1]:
         ticks = factor < 1.0 and float(np.ptp(values)) > 0.1 * largest
         # What wanders shows no period that would be none since 1970.
         short = reading.wanders or factor * period < _LONGEST_S
-        if largest > least and not ticks and short:
+        if largest * factor > _EPOCH and not ticks and short:
             said = f"'{column.label}' counts {name} since 1970"
             return factor, Fact("unit of time", name, "shown", said, _OTHER_PERIODS)
     return _time_by_size(column, period, values)
@@ -421,13 +415,14 @@ def _drop_repeats(choice: Choice, base: TimeBase) -> None:
     _, first, which = np.unique(base.time_s, return_index=True, return_inverse=True)
     origin = first[which.reshape(-1)]
     again = origin < np.arange(len(origin))
-    if again.sum() > max(20, 0.01 * len(again)):
+    if many := (of_one_stamp := again.sum()) > max(20, 0.01 * len(again)):
         for column in choice.channels:
             if len(column.values) > base.rows.max():
                 values = column.values[base.rows]
                 same = (values == values[origin]) | (np.isnan(values) & np.isnan(values[origin]))
                 again &= same
-    if again.any():
+    # Of many rows with one stamp, some have the same reading near a turn.
+    if again.any() and not (many and again.sum() < 0.5 * of_one_stamp):
         base.keep(~again, f"{again.sum()} row(s) that repeat the time of an earlier row left out")
 
 
@@ -555,8 +550,8 @@ def _coarseness(time: FloatArray) -> FloatArray:
     step = np.diff(time[starts])
     around = sliding_window_view(np.pad(np.append(step, step[-1:]), _BESIDE, mode="edge"), window)
     usual = np.median(around, axis=1)
-    padded = np.pad(rows, _BESIDE, mode="reflect")
-    crowded = np.mean(sliding_window_view(padded, window), axis=1) > 1.3
+    many = sliding_window_view(np.pad(rows, _BESIDE, mode="reflect"), window)
+    crowded = np.mean(many, axis=1) > 1.3
     blocks: FloatArray = np.repeat(np.where(crowded, usual, 0.0), rows)
     return np.maximum(digit, blocks)
 

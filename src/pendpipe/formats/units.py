@@ -26,8 +26,8 @@ from pendpipe.physics.lengthening import ANGLES, unit_shown
 from pendpipe.readings import from_below, jumps_of_a_turn
 from pendpipe.recording import Quantity
 
-_RADIAN = Unit("angle", 1.0, "rad")
-_DEGREE = Unit("angle", np.pi / 180, "rad")
+_ANGLES = {name: Unit("angle", size, "rad") for name, size in ANGLES.items()}
+_RADIAN, _DEGREE = _ANGLES["radians"], _ANGLES["degrees"]
 _UNKNOWN = Unit("own", 1.0, "1")
 _QUANTITIES: dict[str, Quantity] = {
     "angle": "angle_rad",
@@ -172,23 +172,19 @@ _UNITS_OF = re.compile(r"(?i)\b(?:vertical|length) units?\W+([a-zµ]+)")
 
 def _contradicted(column: Column, written: Unit, time_s: FloatArray) -> _Guess | None:
     """Doubt a header that gives the one unit of angles where the period shows the other."""
-    headed = next((name for name, size in ANGLES.items() if _angle_in(size) == written), "")
+    headed = next((name for name, unit in _ANGLES.items() if unit == written), "")
     other = {"radians": "degrees", "degrees": "radians"}.get(headed, "")
     name = _by_sine(column, time_s, other) if other else None
     if name is None:
         return None
     why = f"is headed in {headed}, but its period grows as a swing in {name} does: taken as such"
-    return _Guess(_angle_in(ANGLES[name]), why, "guessed")
+    return _Guess(_ANGLES[name], why, "guessed")
 
 
 def _by_sine(column: Column, time_s: FloatArray, *names: str) -> str | None:
     """The unit of angles, among those named, in which the period lengthens as that of sin x."""
     units = {name: ANGLES[name] for name in names}
     return unit_shown(lambda size: sine_in(time_s, column.values, size), units)
-
-
-def _angle_in(size: float) -> Unit:
-    return Unit("angle", size, "rad")
 
 
 def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray) -> _Guess | None:
@@ -248,7 +244,7 @@ def _by_period(column: Column, time_s: FloatArray) -> _Guess | None:
     usual = float(np.median(periods(time_s, column.values)[0]))
     if name == "radians" and column.role != "angle" and abs(usual - 2.0) < _METRE_S:
         return _Guess(_RADIAN, f"{why}, or in metres, with a string of 1 m", "guessed")
-    return _Guess(_angle_in(ANGLES[name]), why, "shown", _BY_SINE)
+    return _Guess(_ANGLES[name], why, "shown", _BY_SINE)
 
 
 def _by_digits(finite: FloatArray) -> _Guess | None:
