@@ -222,6 +222,7 @@ def _among_records(base: JointFit, level: float) -> CampaignSearch:
             break
         left_out.append(suspect)
         answer = _search(fewer, level)
+    answer = _beside_each_other(answer, level)
     if not left_out:
         return answer
     return replace(
@@ -282,8 +283,6 @@ def _search(baseline: JointFit, level: float) -> CampaignSearch:
             break
         found.append(one)
         fit = one.leader
-    found = _beside_each_other(found, everything, level) if len(found) > 1 else found
-    fit = found[-1].leader if found else baseline
     return CampaignSearch(baseline, fit, first, tuple(found), first < level)
 
 
@@ -327,16 +326,15 @@ def _found(fit: JointFit, scan: _Scan) -> Found | None:
     return Found(leader, tuple(members[1:]), probability, nothing, chance, gain, excluded, price)
 
 
-def _beside_each_other(
-    found: list[Found], everything: Sequence[Candidate], level: float
-) -> list[Found]:
+def _beside_each_other(answer: CampaignSearch, level: float) -> CampaignSearch:
     """Weigh each effect beside all others; one that they make needless, or a better one, goes in.
 
     The order in which effects were added is none of nature's.
     """
-    last = found[-1].leader
+    last = answer.improved
+    everything = candidates(last.design)
     added, start = list(last.added), last.unknowns[: len(last.design.nuisances)]
-    for _ in range(2 * MOST_EFFECTS):
+    for _ in range(2 * MOST_EFFECTS if len(added) > 1 else 0):
         again = list[Found]()
         for number, own in enumerate(added):
             others = added[:number] + added[number + 1 :]
@@ -348,8 +346,9 @@ def _beside_each_other(
                 break
             again.append(one)
         else:
-            return again
-    return found
+            fit = again[-1].leader if again else answer.baseline
+            return replace(answer, improved=fit, found=tuple(again))
+    return answer
 
 
 def refit(fit: JointFit, tried: Sequence[Candidate], scores: FloatArray) -> list[JointFit]:

@@ -378,7 +378,7 @@ def draw_fig09(comparison: Mapping[str, Any]) -> Figure:
         for name in names
     ]
     key = curve([], [], label="lines: Eq. 16 and hysteresis together")
-    factor = comparison.get("theory_factor")
+    factor = comparison.get("drag_factor") or comparison.get("theory_factor")
     known = factor and np.isfinite(number(factor))
     note = f"Drag measured over Eq. 16: {with_error(number(factor), error(factor))}"
     return figure_of(

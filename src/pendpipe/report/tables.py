@@ -299,6 +299,12 @@ def headline(comparison: Comparison, configuration: Mapping[str, Any]) -> list[R
             for assembly, found in (comparison.get("loss_torque") or {}).items()
         ),
         _row(
+            "Drag measured over Eq. 16, one factor for all records",
+            comparison.get("drag_factor"),
+            "theory_factor",
+            drag,
+        ),
+        _row(
             "Drag measured over Eq. 16, mean of the records",
             comparison.get("theory_factor"),
             "theory_factor",
@@ -308,12 +314,6 @@ def headline(comparison: Comparison, configuration: Mapping[str, Any]) -> list[R
             "Drag measured over Eq. 16 with the walls of the told tank",
             comparison.get("theory_factor_in_tank"),
             "",
-        ),
-        _row(
-            "Drag over Eq. 16 as one factor in the fit of all records",
-            comparison.get("drag_factor"),
-            "theory_factor",
-            drag,
         ),
         _row(
             "History coefficient C_H of Eq. 2, if it takes the whole difference",

@@ -15,7 +15,14 @@ from pendpipe.estimate import Z95, Estimate
 from pendpipe.files import write_json
 from pendpipe.options import INPUT, OUTPUT, flags
 from pendpipe.stages.archive import gathered
-from pendpipe.stages.results import RecordResult, campaign_data, left_out, read_results, surprises
+from pendpipe.stages.results import (
+    RecordResult,
+    campaign_data,
+    left_out,
+    read_results,
+    surprises,
+    torques_not_to_quote,
+)
 
 
 @command(
@@ -37,6 +44,7 @@ def run(arguments: Arguments) -> None:
         results = read_results(campaign, folder)
     out = left_out(campaign, results, arguments.diagnosis)
     content = separate_campaign(campaign, results, out)
+    content["torques_not_to_quote"] = torques_not_to_quote(arguments.diagnosis)
     known = surprises(arguments.diagnosis)
     for row in content["records"]:
         row["surprise"] = known.get(row["record"])
