@@ -310,8 +310,8 @@ def test_what_a_test_of_the_measurement_found_is_told_beside_what_is_seen() -> N
     mark = replace(named("tracking-noise"), location=Location(summary="the tracked mark wanders"))
     loss = Seen("loss", 0.8, Estimate(0.1, 0.01, ""), (1.0, 9.0), (0.2, 0.1), "the loss is larger")
     summary = diagnosis(mark, seen=(loss,)).summary
-    assert summary.seen == "the loss is larger; the tracked mark wanders"
-    assert ("seen", summary.seen) in summary.pairs()
+    assert summary.seen == "the loss is larger"
+    assert ("where", "the tracked mark wanders") in summary.pairs()
     assert summary.headline.startswith("the loss is larger; missing: ")
 
 

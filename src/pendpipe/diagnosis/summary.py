@@ -149,7 +149,7 @@ class Summary:
         more = len(self.excluded) - _SHOWN
         pairs = (
             ("how much it matters", self.matters),
-            ("seen", self.seen) if self.seen else ("where", self.where),
+            ("where", self.where),
             ("how sure", self.certainty),
             ("candidates", self.candidates),
             ("looked for, not found", looked + (f" ({more} more: -v)" if more > 0 else "")),
@@ -266,7 +266,7 @@ def summarise(diagnosis: Outcome) -> Summary:
         _decide_by(found),
         _quote(diagnosis, changes),
         _sentence(diagnosis, seen, presumed, lacks),
-        "; ".join([*seen, *_forces(found), *_by_a_test(found)] if seen else []),
+        "; ".join(seen),
     )
 
 
@@ -521,12 +521,14 @@ def _matters(diagnosis: Outcome, changes: Sequence[Change], unit: str) -> str:
 
 
 def _where(diagnosis: Outcome, found: Sequence[FoundEffect]) -> str:
-    """Say where the most probable effect shows, and where the rest lies."""
+    """Say what tests have found, where the missing forces are how large, and where the rest lies.
+
+    What does not fit into a line is left out from its end.
+    """
     first = max(found, key=lambda each: class_of(each)[0][0])
-    text = first.location.summary
-    told = _forces((first, *found))
-    described = class_of(first)[0][2] in UNNAMED
-    text = "; ".join(told if described and told else [text, *told])
+    told = dict.fromkeys([*_by_a_test(found), *_forces((first, *found))])
+    described = class_of(first)[0][2] in UNNAMED and _forces([first])
+    text = "; ".join(told if described else dict.fromkeys([*told, first.location.summary]))
     remainder = diagnosis.remainder
     if remainder is not None and remainder.systematic and remainder.shares:
         name, share = max(remainder.shares.items(), key=lambda item: item[1])
