@@ -258,30 +258,30 @@ def _try(recipe: Recipe, rng: Rng, ease: float, noise: Noise | None) -> Item | N
     ):
         bench = Bench(scene, [causes[0], causes[1]._replace(size=-causes[1].size)])
     left: dict[str, Any] = {}
-    if laboratory:
+    if laboratory and family != "outside":
         oracle = Oracle(bench, listed(scene), rng)
-        if family == "outside":
-            # Sized by what no listed effect takes up.
-            (cause,), seed = causes, int(rng.integers(2**32))
+    elif laboratory:
+        # Sized by what no listed effect takes up.
+        (cause,), seed = causes, int(rng.integers(2**32))
 
-            @cache
-            def at(size: float) -> Oracle:
-                there = cause._replace(size=float(np.copysign(size, cause.size)))
-                bench = Bench(scene, [there])
-                return Oracle(bench, listed(scene), np.random.default_rng(seed))
+        @cache
+        def at(size: float) -> Oracle:
+            there = cause._replace(size=float(np.copysign(size, cause.size)))
+            bench = Bench(scene, [there])
+            return Oracle(bench, listed(scene), np.random.default_rng(seed))
 
-            size, _ = size_worth(
-                recipe["delta_chi2"][0] * ease,
-                lambda size: at(size).left_by_catalogue()[0],
-                abs(cause.size),
-                laws[0].most,
-                close=2 * CLOSE,
-            )
-            oracle = at(size)
-            bench = oracle.bench
-            left = dict(
-                zip(("left_by_catalogue", "best_mimic"), oracle.left_by_catalogue(), strict=True)
-            )
+        size, _ = size_worth(
+            recipe["delta_chi2"][0] * ease,
+            lambda size: at(size).left_by_catalogue()[0],
+            abs(cause.size),
+            laws[0].most,
+            close=2 * CLOSE,
+        )
+        oracle = at(size)
+        bench = oracle.bench
+        left = dict(
+            zip(("left_by_catalogue", "best_mimic"), oracle.left_by_catalogue(), strict=True)
+        )
     columns = recorded(rng, scene, bench.causes, noise)
     if columns is None:
         return None
