@@ -402,11 +402,15 @@ def family_of(effects: Sequence[FoundEffect]) -> str:
         return _APART[apart][0]
     identifier = members[0][2]
     if is_periodic(identifier):
-        return "something periodic"
+        return "perhaps something periodic"
     if first.curve:
         names = NAMES_OF_CURVES.items()
-        return next(UNNAMED[each] for each, of in names if first.curve["name"] in of)
-    what = "an error of the sensor" if kind_of(identifier) == "measurement" else "a force"
+        return next(f"perhaps {UNNAMED[each]}" for each, of in names if first.curve["name"] in of)
+    what = (
+        "perhaps an error of the sensor"
+        if kind_of(identifier) == "measurement"
+        else "perhaps a force"
+    )
     return f"{what} that changes with time" if changes_in_time(identifier) else what
 
 
