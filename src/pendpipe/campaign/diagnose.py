@@ -40,7 +40,9 @@ from pendpipe.campaign.seen import (
     told_and_measured,
     told_by_frequency,
 )
+from pendpipe.diagnosis.found import FoundEffect, Location, Mate
 from pendpipe.estimate import LISTED, Estimate, averaged
+from pendpipe.files import plain
 from pendpipe.levels import FALSE_ALARM
 
 BASELINE = "eq16"
@@ -78,7 +80,7 @@ def campaign_diagnosis(
         _effect(search, found, runs) for found, runs in zip(search.found, ranked, strict=True)
     ]
     if search.scatter:
-        effects.append(_errors(search))
+        effects.append(_errors(search, search.scatter))
     if search.missing and not effects:
         effects = [_unnamed(search)]
     return {
@@ -228,30 +230,34 @@ def _fit(fit: JointFit) -> dict[str, Any]:
 
 
 def _effect(search: CampaignSearch, found: Found, runs: Sequence[NextRun]) -> dict[str, Any]:
+    """Return one cause in the form of diagnosis.json, with what only a campaign has of it."""
     effect = found.leader.last
+    told = FoundEffect(
+        effect.identifier,
+        effect.name,
+        "campaign",
+        effect.equation,
+        {},
+        found.delta_chi2,
+        found.p_value,
+        found.probability,
+        tuple(Mate(rival.last.identifier, share) for rival, share in found.rivals),
+        _deciding(runs),
+        _location(search),
+    )
+    rivals = [
+        {
+            "id": rival.last.identifier,
+            "parameters": _parameters(rival),
+            "chi2_above_best": rival.chi2 - found.leader.chi2,
+        }
+        for rival, _ in found.rivals
+    ]
     return {
-        "id": effect.identifier,
-        "name": effect.name,
-        "kind": "campaign",
-        "equation": effect.equation,
+        **plain(told),
         "parameters": _parameters(found.leader),
-        "delta_chi2": found.delta_chi2,
-        "p_value_global": found.p_value,
-        "probability": found.probability,
         "probability_of_nothing": found.nothing,
-        "indistinguishable_from": [
-            {"id": rival.last.identifier, "probability": probability}
-            for rival, probability in found.rivals
-        ],
-        "rivals": [
-            {
-                "id": rival.last.identifier,
-                "parameters": _parameters(rival),
-                "chi2_above_best": rival.chi2 - found.leader.chi2,
-            }
-            for rival, _ in found.rivals
-        ],
-        "deciding_measurement": _deciding(runs),
+        "rivals": rivals,
         "next_measurements": [
             {
                 "measurement": run.what,
@@ -266,7 +272,6 @@ def _effect(search: CampaignSearch, found: Found, runs: Sequence[NextRun]) -> di
             }
             for run in runs
         ],
-        "location": _location(search),
     }
 
 
@@ -277,22 +282,22 @@ def _parameters(fit: JointFit) -> dict[str, Any]:
     return {fit.last.parameter.name: size}
 
 
-def _errors(search: CampaignSearch) -> dict[str, Any]:
+def _errors(search: CampaignSearch, factor: Estimate) -> dict[str, Any]:
     """The records' own errors as a cause: they are larger than is stated."""
-    assert search.scatter is not None
-    return {
-        "id": "record-errors",
-        "name": "larger errors of the records than are stated",
-        "kind": "campaign",
-        "equation": r"\sigma \to s\, \sigma",
-        "parameters": {"factor": search.scatter.as_json()},
-        "delta_chi2": search.baseline.chi2 - search.improved.chi2,
-        "p_value_global": search.p_value,
-        "probability": search.scattered,
-        "indistinguishable_from": [],
-        "deciding_measurement": "some records once more: their scatter is their error",
-        "location": _location(search),
-    }
+    told = FoundEffect(
+        "record-errors",
+        "larger errors of the records than are stated",
+        "campaign",
+        r"\sigma \to s\, \sigma",
+        {"factor": factor},
+        search.baseline.chi2 - search.improved.chi2,
+        search.p_value,
+        search.scattered,
+        (),
+        "some records once more: their scatter is their error",
+        _location(search),
+    )
+    return dict(plain(told))
 
 
 def _of(shape: Any) -> str | float:
@@ -310,38 +315,31 @@ def _unnamed(search: CampaignSearch) -> dict[str, Any]:
     pairs = zip(names, pulls.tolist(), strict=True)
     far = search.left_out or sorted((Far(*pair) for pair in pairs), key=lambda one: -abs(one.sigma))
     summary = "; ".join(f"{one.record} by {one.sigma:+.1f} sigma" for one in far[:3])
-    return {
-        "id": "unnamed-damping",
-        "name": "records that disagree, by nothing that the catalogue has",
-        "kind": "unnamed",
-        "equation": r"b \to b + \Delta b(\text{record})",
-        "parameters": {},
-        "delta_chi2": whole.baseline.chi2 - search.baseline.chi2
-        if search.whole
-        else whole.baseline.chi2 - whole.baseline.degrees_of_freedom,
-        "p_value_global": search.p_value,
-        "probability": 1.0,
-        "indistinguishable_from": [],
-        "deciding_measurement": "take the records anew that the others predict worst",
-        "location": _location(search) | {"summary": f"worst predicted by the others: {summary}"},
-    }
+    left = search.baseline if search.whole else None
+    told = FoundEffect(
+        "unnamed-damping",
+        "records that disagree, by nothing that the catalogue has",
+        "unnamed",
+        r"b \to b + \Delta b(\text{record})",
+        {},
+        whole.baseline.chi2 - (left.chi2 if left else whole.baseline.degrees_of_freedom),
+        search.p_value,
+        1.0,
+        (),
+        "take the records anew that the others predict worst",
+        replace(_location(search), summary=f"worst predicted by the others: {summary}"),
+    )
+    return dict(plain(told))
 
 
-def _location(search: CampaignSearch) -> dict[str, Any]:
+def _location(search: CampaignSearch) -> Location:
     """The band of frequencies in which b changes most between the two fits."""
     moved = np.abs(search.improved.prediction / search.baseline.prediction - 1.0)[:, 1]
     frequency = search.baseline.data.values[:, 0]
     most = moved >= 0.5 * moved.max()
-    low, high = float(frequency[most].min()), float(frequency[most].max())
-    return {
-        "summary": f"the records between {low:.3g} and {high:.3g} Hz",
-        "time_s": None,
-        "amplitude_rad": None,
-        "phase_rad": None,
-        "frequency_hz": [low, high],
-        "harmonics": [],
-        "adc_codes": [],
-    }
+    band = float(frequency[most].min()), float(frequency[most].max())
+    summary = f"the records between {band[0]:.3g} and {band[1]:.3g} Hz"
+    return Location(frequency_hz=band, summary=summary)
 
 
 def _deciding(runs: Sequence[NextRun]) -> str:
