@@ -107,14 +107,13 @@ class Waveform(Eq8Model):
 
     def residual(self, value: FloatArray) -> FloatArray:
         """Readings less model, shape (n,)."""
-        if not (self._residuals and np.array_equal(self._residuals[0][0], value)):
-            self._residuals[:] = [(value.copy(), self._residual(value))]
-        return self._residuals[0][1]
-
-    def _residual(self, value: FloatArray) -> FloatArray:
-        # A rate takes the derivatives, which fill the memory.
-        found = [each.reading for _, each in self._pieces(value)] if self.seen == "rate" else None
-        return self.values - (np.concatenate(found) if found else self.evaluate(value).reading)
+        last = self._residuals
+        if not (last and np.array_equal(last[0][0], value)):
+            # A rate takes the derivatives, which fill the memory.
+            pieces = self._pieces(value) if self.seen == "rate" else [(..., self.evaluate(value))]
+            found = np.concatenate([each.reading for _, each in pieces])
+            last[:] = [(value.copy(), self.values - found)]
+        return last[0][1]
 
     def _pieces(self, value: FloatArray) -> Iterator[tuple[slice, Followed]]:
         """The model along the record, piece by piece."""
