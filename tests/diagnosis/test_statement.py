@@ -667,6 +667,7 @@ def test_a_tone_of_the_mains_is_known_behind_its_alias(tone_hz: float, says: str
     assert ("50 Hz" in numbers_of(replace(named("tone-pickup"), location=found))) == bool(says)
 
 
+@pytest.mark.slow
 def test_a_square_in_the_sensor_lies_in_the_second_harmonic_and_a_cube_in_the_third() -> None:
     """Amplitude and losses absorb its effect on the fundamental."""
     for name, harmonic in (("sensor-quadratic", 2), ("sensor-cubic", 3)):
