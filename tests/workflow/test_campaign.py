@@ -233,9 +233,7 @@ stage turning-points --campaign config/config.yaml --chunk all \
 stage fit --campaign config/config.yaml --chunk all --out results/chunks/fit-all.zip --reading \
  results/chunks/acquire-all.zip results/chunks/calibrate-all.zip \
  results/chunks/turning-points-all.zip
-diagnose-campaign results --campaign config/config.yaml --out results/campaign_diagnosis.json
-separate --campaign config/config.yaml --diagnosis results/campaign_diagnosis.json \
- --out results/separation.json
+separate --campaign config/config.yaml --out results/separation.json
 compare --campaign config/config.yaml --separation results/separation.json \
  --out results/comparison.json --summary results/campaign.json
 """
@@ -279,8 +277,12 @@ def test_a_campaign_of_refused_records_ends_with_its_figures_places(
     monkeypatch.chdir(tmp_path)
     rows = f"water\t{source}\twater\thigh\thigh-4\t\t20\nair\t{source}\tair\tair\tair-07\t\t20\n"
     results = run_by_hand(tmp_path, rows)
-    call = "figures --campaign config/config.yaml --comparison results/comparison.json --out"
-    assert main([*call.split(), "results/figures"]) == 0
+    for call in (
+        "diagnose-campaign results --out results/campaign_diagnosis.json",
+        "separate --out results/other.json --diagnosis results/campaign_diagnosis.json",
+        "figures --comparison results/comparison.json --out results/figures",
+    ):
+        assert main([*call.split(), "--campaign", "config/config.yaml"]) == 0
     drawn = json.loads((results / "figures/drawn.json").read_text())
     assert "figures/fig09.svg" in drawn["files"]
     assert "fig09" in drawn["left_out"]
