@@ -114,8 +114,9 @@ class Eq8Model:
 
     @property
     def eq8(self) -> Eq8Model:
-        """The law and sensor alone, of a model with more."""
-        return Eq8Model(**{each.name: getattr(self, each.name) for each in fields(Eq8Model)})
+        """The law and sensor alone, of a model with more, without the times of its readings."""
+        forms = {each.name: getattr(self, each.name) for each in fields(Eq8Model)}
+        return Eq8Model(**forms | {"time_s": np.zeros(0)})
 
     def held_parts(self) -> Mapping[str, float]:
         """The parts of b that are held."""
