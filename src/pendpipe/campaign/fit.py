@@ -121,6 +121,8 @@ class JointFit:
         Whitened data, then priors.
     jacobian
         Of the residuals.
+    shaped
+        Their derivatives by the logarithms of what is fitted of shapes, shape (rows, shapes).
     """
 
     design: Any
@@ -129,6 +131,12 @@ class JointFit:
     unknowns: FloatArray
     residuals: FloatArray
     jacobian: FloatArray
+    shaped: FloatArray
+
+    @property
+    def tangent(self) -> FloatArray:
+        """Derivatives of the residuals by all that is fitted."""
+        return np.concatenate([self.jacobian, self.shaped], axis=-1)
 
     @property
     def chi2(self) -> float:
@@ -138,7 +146,7 @@ class JointFit:
     @property
     def degrees_of_freedom(self) -> int:
         """Data less what is free: a prior weighs as much as its unknown."""
-        return len(self.residuals) - len(self.unknowns)
+        return len(self.residuals) - len(self.tangent.T)
 
     @property
     def free(self) -> BoolArray:
@@ -149,9 +157,9 @@ class JointFit:
     @cached_property
     def root(self) -> FloatArray:
         """A square root of the covariance, from the Jacobian itself: no variance is negative."""
-        _, sizes, directions = np.linalg.svd(self.jacobian, full_matrices=False)
+        _, sizes, directions = np.linalg.svd(self.tangent, full_matrices=False)
         # What no record depends on gets a huge error, not a division by zero.
-        return np.asarray(directions.T / np.sqrt(sizes**2 + 1e-12))
+        return np.asarray(directions.T / np.sqrt(sizes**2 + 1e-12))[: len(self.unknowns)]
 
     @cached_property
     def covariance(self) -> FloatArray:
@@ -232,7 +240,28 @@ def joint_fit(
             problem = Problem(partial(_weighted, design, weighted, added), bounds)
             found = minimise(problem, first)
             first = found.value
-        return JointFit(design, data, added, first, -found.point.residual, found.point.columns)
+        shaped = _by_shapes(design, data, added, first)
+        point = found.point
+        return JointFit(design, data, added, first, -point.residual, point.columns, shaped)
+
+
+def _by_shapes(
+    design: Any, data: Measured, added: tuple[Candidate, ...], unknowns: FloatArray
+) -> FloatArray:
+    """Derivatives of the residuals by the logarithms of the shapes that are sought."""
+    columns = [np.zeros((0, len(_residuals(design, data, added, unknowns))))]
+    for at, one in enumerate(added):
+        for turn in np.eye(len(one.shape)) if one.effect.finer else ():
+            ends = [
+                one._replace(shape=tuple((one.shape * np.exp(step * turn)).tolist()))
+                for step in (STEP, -STEP)
+            ]
+            moved = [
+                _residuals(design, data, (*added[:at], end, *added[at + 1 :]), unknowns)
+                for end in ends
+            ]
+            columns.append((moved[0] - moved[1])[None] / (2.0 * STEP))
+    return np.concatenate(columns).T
 
 
 def _weighted(

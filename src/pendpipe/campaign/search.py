@@ -11,7 +11,7 @@ from scipy.special import ndtr
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.campaign.design import Design
 from pendpipe.campaign.effects import WRONG
-from pendpipe.campaign.fit import Candidate, JointFit, Measured, candidates, chi2_near, joint_fit
+from pendpipe.campaign.fit import Candidate, JointFit, Measured, candidates, joint_fit
 from pendpipe.campaign.seen import (
     FAR_SIGMA,
     Far,
@@ -129,7 +129,7 @@ def local_scores(fit: JointFit, tried: Sequence[Candidate]) -> tuple[FloatArray,
     scores, correlations
         Shapes (n,) and (n, n).
     """
-    basis, _ = np.linalg.qr(fit.jacobian)
+    basis, _ = np.linalg.qr(fit.tangent)
     rows = np.stack([fit.derivative(one) for one in tried])
     units, _ = unit_rows(rows, basis, _VISIBLE)
     return -(units @ fit.residuals), units @ units.T
@@ -375,25 +375,22 @@ def _best_shape(tried: Sequence[Candidate], gains: FloatArray, one: Candidate) -
 
 
 def _finer(fit: JointFit) -> JointFit:
-    """Seek the best shape of the last effect about its own, by ever smaller steps."""
-    step, (*others, last), chi2 = _FIRST_STEP, fit.added, fit.chi2
+    """Fit the shape of the last effect too (Gauss-Newton), as long as chi^2 falls."""
+    (*others, last), width = fit.added, len(fit.added[-1].shape)
     for _ in range(_MOST_STEPS):
-        shape = np.array(last.shape)
-        moves = step * np.concatenate([np.eye(len(shape)), -np.eye(len(shape))])
-        near = [last._replace(shape=tuple(row)) for row in (shape * np.exp(moves)).tolist()]
-        found = [chi2_near(fit.design, fit.data, (*others, one), fit.unknowns) for one in near]
-        if min(found) < chi2 - 1e-3:
-            last, chi2 = near[int(np.argmin(found))], min(found)
-        elif (step := 0.5 * step) < _LAST_STEP:
+        step = -np.linalg.lstsq(fit.tangent, fit.residuals)[0][-width:]
+        step *= min(1.0, _LONGEST / float(np.max(np.abs(step))))
+        last = last._replace(shape=tuple((last.shape * np.exp(step)).tolist()))
+        other = joint_fit(fit.design, fit.data, (*others, last), fit.unknowns)
+        if other.chi2 > fit.chi2 - 1e-3:
             break
-    return joint_fit(fit.design, fit.data, (*others, last), fit.unknowns)
+        fit = other
+    return fit
 
 
-_FIRST_STEP: Final = 0.03
-"""Of the logarithm of a shape: half of what lies between those that are tried."""
-_LAST_STEP: Final = 1e-3
-_MOST_STEPS: Final = 20
-"""Of them: from one end of what is tried to the other it would be fifty."""
+_LONGEST: Final = 0.3
+"""Step of the logarithm of a shape: from one damping ratio that is tried to the next is 1.1."""
+_MOST_STEPS: Final = 12
 
 
 def class_of(
