@@ -268,14 +268,31 @@ def test_a_slow_creep_has_hardly_begun(identifier: str, values: tuple[float, ...
     assert displaced == pytest.approx(went, rel=0.05)
 
 
+def test_a_knock_is_seldom_just_where_it_leaves_the_amplitude_alone() -> None:
+    """Of a quarter turn's instants each is as likely; from a hundredth on nearer ones are alike."""
+    knock = by_identifier("impulse")
+    span = evaluated("impulse", (0.0, 30.0), baseline(), TIME).span
+    costs = [
+        knock.prior_penalty(np.array([1e-3, (20.0 + part) * 0.25 * CYCLE]), span)
+        for part in (0.0, 0.1, 0.5, 1.0)
+    ]
+    expected = [2.0 * math.log(times) for times in (100.0, 10.0, 2.0, 1.0)]
+    np.testing.assert_allclose(costs, expected, atol=1e-3)
+
+
 @pytest.mark.parametrize("samples", [1.0, -1.0, 3.0])
 def test_samples_are_lost_whole(samples: float) -> None:
     """A tenth of one is lost where ten are read for each that is reported, as rarely as that."""
     effect = by_identifier("dropped-samples")
-    span = evaluated("dropped-samples", (0.0, 30.0), baseline(b=0.01), TIME).span
+    time_s = times(60.0, 0.01)
+    span = evaluated("dropped-samples", (0.0, 30.0), baseline(b=0.01), time_s).span
 
     def cost(part: float) -> float:
-        return effect.prior_penalty(np.array([part * samples * 0.04, 30.0]), span)
+        return effect.prior_penalty(np.array([part * samples * 0.01, 30.0]), span)
+
+    # A computer's clock ticks 64 times a second: between slow readings it jumps by less than one.
+    slow = span._replace(interval_s=0.361)
+    assert effect.prior_penalty(np.array([samples / 64.0, 30.0]), slow) == 0.0
 
     assert cost(1.0) == 0.0
     assert cost(0.1 / abs(samples)) == pytest.approx(2.0 * math.log(10.0))

@@ -94,8 +94,11 @@ def begin(
         # The turning points of a beat tell nothing of either mode, nor of the torque.
         law = replace(law, restoring="linear")
         readings = samples.time_s, samples.values, 2.0 * math.pi / float(value[OMEGA])
-        starts = tuple(each for effect in CATALOGUE if (each := effect.start(*readings)))
-        value = values_of(starts[0].law, starts[0].release, float(value[OFFSET]))
+        found = [each for effect in CATALOGUE if (each := effect.start(*readings))]
+        torques = {"linear"} if samples.unit != "rad" else {"linear", "sine"}
+        starts = tuple(each for each in found if each.law.restoring in torques)
+        if starts:
+            value = values_of(starts[0].law, starts[0].release, float(value[OFFSET]))
     else:
         span = usable_span(samples, angles, value, at_release=at_release)
     omega, angle = float(value[OMEGA]), float(value[START])

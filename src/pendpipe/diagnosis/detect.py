@@ -28,6 +28,7 @@ from pendpipe.dynamics.eq8 import OMEGA
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import plane_band_hz
 from pendpipe.effects.curves import Curve
+from pendpipe.effects.model import Model
 from pendpipe.estimate import Z95
 from pendpipe.score import Trials, trials_of
 
@@ -226,12 +227,15 @@ class Lead(NamedTuple):
         Fall of chi^2, to first order.
     p_value
         Probability that chance does better over the effect's own shapes.
+    begun
+        The model with it, and the values where a refit begins (`Effect.restart`); None at size 0.
     """
 
     effect: Effect
     shape: tuple[float, ...] = ()
     score: float = 0.0
     p_value: float = 1.0
+    begun: tuple[Model, FloatArray] | None = None
 
 
 @dataclass(frozen=True)

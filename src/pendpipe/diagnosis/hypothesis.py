@@ -32,6 +32,7 @@ from pendpipe.diagnosis.refine import (
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.dynamics.eq8 import OMEGA, Restoring
 from pendpipe.effects import Effect
+from pendpipe.effects.catalogue.in_time import resonant_drive, slow_modulation
 from pendpipe.effects.catalogue.reading import SoftClipping
 from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN, circular_error
 from pendpipe.effects.curves import CURVES, Curve
@@ -317,7 +318,7 @@ def applicable(
     if rare:
         return list(fit.model.admitted(named))
     keys = {effect.key for effect in fit.model.effects}
-    forms: list[Effect | None] = [SoftClipping()]
+    forms: list[Effect | None] = [SoftClipping(), resonant_drive, slow_modulation]
     if any(effect.identifier == circular_error.identifier for effect in catalogue):
         forms.append(CIRCULAR_ERROR_IN.get(unit))
     named += [form for form in forms if form and form.key not in keys]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -33,9 +34,11 @@ from pendpipe.diagnosis.refine import (
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.values import last_in
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.dynamics.eq8 import OMEGA
+from pendpipe.dynamics.eq8 import OFFSET, OMEGA, SHARE, TIME
+from pendpipe.dynamics.eq8_model import values_of
 from pendpipe.effects import Effect
 from pendpipe.effects.curves import Curve
+from pendpipe.effects.model import Model
 from pendpipe.estimate import Estimate
 from pendpipe.score import CLASS, Trials
 from pendpipe.solve import Search
@@ -367,6 +370,8 @@ _BEHIND_NAMED: Final = 0.1
 """The same behind a named effect."""
 _FIRST_ROUNDS: Final = 4
 """Rounds after which the refits are compared."""
+_ROUNDS_OF_A_START: Final = 2
+"""Rounds of a start before it is judged: its numbers are right to a hundredth."""
 _STALLED_GAIN: Final = 0.3
 """Fall of chi^2 in two rounds below which a refit stops (a winner is refined again)."""
 _LARGEST_DISPLACEMENT: Final = 0.5
@@ -392,7 +397,10 @@ def refit_leads(
     most: int = _MOST_REFITTED,
 ) -> list[Rival]:
     """Refit the leading effects nonlinearly, and return them ranked, the best first."""
-    leads = _worth_refitting(detection.leads, phase_lost, most, wide=bool(pulled(base)))
+    lost = phase_lost and base.model.restoring == "linear" and data.unit == "rad"
+    as_pendulum = replace(base.model, restoring="sine") if lost else base.model
+    found = [_restarted(base, as_pendulum, data, noise, lead, held) for lead in detection.leads]
+    leads = _worth_refitting(found, phase_lost, most, wide=bool(pulled(base)))
     fits = side_by_side(base, data, noise, leads, held, phase_lost=phase_lost)
     if not fits:
         return []
@@ -536,13 +544,45 @@ def _started(
     # An effect without a free size is there; of others none is, at first.
     sizes = np.ones(1) if effect.parameter_free else np.zeros(min(effect.sizes, effect.count))
     start = np.concatenate([base.value, sizes, finer_shape(base, noise, effect, lead.shape)])
+    refits = []
+    for model, begun in [(base.model.adding(effect), start), *([lead.begun] if lead.begun else [])]:
+        with suppress(NoMotionError, np.linalg.LinAlgError):
+            refit = searching(model, data, noise, begun, held=held, little=little)
+            refit.go(_FIRST_ROUNDS)
+            refits.append(refit)
+    return min(refits, key=lambda refit: refit.here.chi2, default=None)
+
+
+def _restarted(
+    base: Fit, model: Model, data: Data, noise: Noise, lead: Lead, held: Sequence[int]
+) -> Lead:
+    """Return the lead of an effect that may begin at what it makes of the readings, if it explains.
+
+    What the model's other effects add to these is taken off. `model` is that of the fit; where
+    this has lost the phase of angles, which tells nothing of the torque, that of a pendulum.
+    """
+    effect = lead.effect
+    if type(effect).restart is Effect.restart or data.unit != "rad" or base.at.parts:
+        return lead
+    angle = base.at.sampled.angle
+    left = np.where(data.weight > 0.0, data.residual(base.at.reading), 0.0)
+    about_s = float(base.value[TIME])
+    pendulum = model.pendulum(base.value)
+    found = effect.restart(data.time_s, left + angle, pendulum, about_s)
+    if found is None:
+        return lead
+    own = values_of(found.law, found.release, float(base.value[OFFSET]))
+    start = np.concatenate([own, base.value[len(own) :], found.values])
+    kept = [SHARE, *held]
+    start[kept] = base.value[kept]
     try:
-        model = base.model.adding(effect)
-        refit = searching(model, data, noise, start, held=held, little=little)
-        refit.go(_FIRST_ROUNDS)
+        model = model.adding(effect)
+        search = searching(model, data, noise, start, held=held)
+        search.go(_ROUNDS_OF_A_START)
     except (NoMotionError, np.linalg.LinAlgError):
-        return None
-    return refit
+        return lead
+    gain, begun = base.chi2 - search.here.chi2, (model, search.here.value)
+    return lead._replace(score=max(gain, lead.score), begun=begun) if gain > 0.0 else lead
 
 
 def _finished(refit: Search[Evaluation], useful: float) -> Fit | None:

@@ -66,12 +66,13 @@ from pendpipe.diagnosis.rivals import (
 from pendpipe.diagnosis.summary import BASELINES
 from pendpipe.diagnosis.weighing import weigh
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.dynamics.eq8 import C
+from pendpipe.dynamics.eq8 import OFFSET, C
+from pendpipe.dynamics.eq8_model import values_of
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES
 from pendpipe.quantities import compact
-from pendpipe.score import Trials
+from pendpipe.score import CLASS, Trials
 
 
 def with_other_noise(state: Hypothesis, task: Task) -> Hypothesis:
@@ -192,8 +193,10 @@ def leading(state: Hypothesis, task: Task, *, names_first: bool) -> Step | None:
     )
     if not rivals:
         return None
-    # A rare name is a rival of what it looks like, and leads where `prefer_rare` says so.
-    rivals.sort(key=lambda rival: rival.effect.rare)
+    # A rare name is a rival of what it looks like, and leads where it is told from that, or where
+    # `prefer_rare` says so.
+    usual = max((each.evidence for each in rivals if not each.effect.rare), default=-math.inf)
+    rivals.sort(key=lambda rival: rival.effect.rare and rival.evidence < usual + CLASS)
     if names_first:
         rivals.sort(key=lambda rival: rival.drawn)
     return Step(tuple(prefer_rare(state, rivals, task)), state.unexplained, state.fit)
@@ -436,8 +439,10 @@ def _starts(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:
     before, data, noise = state.fit, state.data, state.noise
     for start in state.beginning.starts:
         task.progress(f"the turning points beat: fitting {start.effect.name} first")
-        value = np.concatenate([state.beginning.value, start.values])
-        fit = fitted_from(before.model.adding(start.effect), data, noise, value, held=state.held)
+        own = values_of(start.law, start.release, float(before.value[OFFSET]))
+        model = replace(before.model, restoring=start.law.restoring).adding(start.effect)
+        value = np.concatenate([own, start.values])
+        fit = fitted_from(model, data, noise, value, held=state.held)
         if fit is None:
             continue
         scale = Scale.of(fit, data, noise)

@@ -132,6 +132,8 @@ class Span(NamedTuple):
     offset: float = 0.0
     fold: int = 1
     """How many recorded readings each of those that are analysed is the mean of."""
+    sampled: Sampled | None = None
+    """The motion at the readings."""
 
     @property
     def duration_s(self) -> float:
@@ -142,6 +144,16 @@ class Span(NamedTuple):
     def period_s(self) -> float:
         """2 pi/omega."""
         return 2.0 * math.pi / self.pendulum.angular_frequency
+
+    def to_a_turn(self, instant_s: float) -> float:
+        """Return the phase to the next turning point, before or behind, of a quarter turn: 0 to 1.
+
+        Of an instant at random each is as likely.
+        """
+        if self.sampled is None:
+            return 1.0
+        phase = float(np.interp(instant_s, self.sampled.time_s, self.sampled.phase))
+        return abs(math.remainder(phase, math.pi)) / (0.5 * math.pi)
 
     def times(self, count: int) -> FloatArray:
         """Instants for a scan: inside the record, one and a half periods from its ends.
@@ -304,6 +316,15 @@ class Effect:
 
     def start(self, time_s: FloatArray, values: FloatArray, period_s: float) -> Start | None:
         """Return where a fit with it begins, if these readings beat and a fit would not find it."""
+        return None
+
+    def restart(
+        self, time_s: FloatArray, values: FloatArray, pendulum: Pendulum, about_s: float
+    ) -> Start | None:
+        """Return where a refit with it begins, of these readings, that would get stuck at size 0.
+
+        The start is to be the turning point about an instant.
+        """
         return None
 
     def small(self, span: Span) -> float:

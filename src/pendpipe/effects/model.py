@@ -296,6 +296,7 @@ class Model(Eq8Model):
             float(sampled.amplitude[-1]),
             float(value[OFFSET]),
             self.fold,
+            sampled,
         )
 
     def law(self, value: FloatArray) -> Law:

@@ -178,18 +178,25 @@ def _complex(value: FloatArray, count: int) -> tuple[AnyArray, AnyArray]:
     return grown + 1j * turned, cosine - 1j * sine
 
 
-_READINGS: Final = 6
-"""Twice the numbers of a level and a wave, which are told from as many readings."""
+def slow_amplitude(
+    phase: FloatArray, values: FloatArray, edges: list[int], *, slopes: bool = False
+) -> AnyArray:
+    """Complex amplitude between neighbouring edges, each about its own level.
 
-
-def slow_amplitude(phase: FloatArray, values: FloatArray, edges: list[int]) -> AnyArray:
-    """Complex amplitude between neighbouring edges, each about its own level."""
-    found = []
+    With `slopes` it may change within; without, a loss of g a cycle turns it by g/(2 pi).
+    """
+    found, numbers = [], 5 if slopes else 3
     for first, last in pairwise(edges):
-        wave = np.exp(-1j * phase[first:last])
-        if last - first < _READINGS:
+        own = phase[first:last]
+        wave = np.exp(-1j * own)
+        # Twice the numbers of a level and a wave, which are told from as many readings.
+        if last - first < 2 * numbers:
             break
-        design = np.stack([np.ones(len(wave)), wave.real, wave.imag], axis=1)
-        _, cosine, sine = np.linalg.lstsq(design, values[first:last], rcond=None)[0]
+        columns = [np.ones(len(wave)), wave.real, wave.imag]
+        if slopes:
+            late = own - 0.5 * (own[0] + own[-1])
+            columns += [late * wave.real, late * wave.imag]
+        design = np.stack(columns, axis=1)
+        _, cosine, sine, *_ = np.linalg.lstsq(design, values[first:last], rcond=None)[0]
         found.append(cosine + 1j * sine)
     return np.array(found)

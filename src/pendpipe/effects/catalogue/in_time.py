@@ -1,7 +1,7 @@
 """What has a time of its own: added oscillations; drifts, sudden changes, the release."""
 
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from pendpipe.effects.effect import (
     without_template,
 )
 from pendpipe.effects.two_modes import two_modes
+from pendpipe.effects.two_planes import planes, two_planes, waveform
 
 
 def _beating(time_s: FloatArray, values: FloatArray, period_s: float) -> Start | None:
@@ -122,14 +123,37 @@ def _detunings(span: Span) -> list[tuple[float, ...]]:
     return rows([*(-beats[::-1]), *beats])
 
 
+def _in_two_planes(
+    time_s: FloatArray, values: FloatArray, pendulum: Pendulum, about_s: float
+) -> Start | None:
+    """Start at the two planes that explain the slow amplitude of the readings."""
+    if pendulum.restoring != "sine":
+        return None
+    found = two_planes(time_s, values, pendulum.angular_frequency)
+    if found is None:
+        return None
+    own = 0.5 * found.linear
+    law = Eq8(found.omega, found.quadratic, own, own, restoring="sine")
+    turns = round((found.phase_rad + found.omega * (about_s - time_s[0])) / math.pi)
+    late = (turns * math.pi - found.phase_rad) / found.omega
+    side = -1.0 if turns % 2 else 1.0
+    lost = (found.linear + found.quadratic * found.amplitude) * late
+    at = Release(float(time_s[0]) + late, side * found.amplitude * math.exp(-lost))
+    share = side * found.other * found.amplitude
+    detuning = found.detuning / (2.0 * math.pi)
+    return Start(plane_coupling, law, at, np.array([share.real, -share.imag, detuning]))
+
+
 @enters(
     "reading",
     identifier="plane-coupling",
     name="swing in a second plane",
     kind="dynamics",
     equation=(
-        r"y = x + \frac{r}{r_1} \left[q_c \cos(\psi + 2\pi \delta t)"
-        r" + q_s \sin(\psi + 2\pi \delta t)\right]"
+        r"y = \operatorname{Re}\left[(a \cos\alpha - b \sin\alpha)\, e^{i\psi}\right], \quad"
+        r" \dot a = -\tfrac{i \omega}{16} (|a|^2 + |b|^2) a - \Omega b, \quad"
+        r" \dot b = -\tfrac{i \omega}{16} (|a|^2 + |b|^2) b + \Omega a + 2\pi i \delta b,"
+        r" \quad \Omega = -\tfrac38 \omega \operatorname{Im}(a^* b)"
     ),
     parameters=(
         Parameter("q_cosine", "rad", -10.0, 10.0, word="amplitude"),
@@ -140,19 +164,37 @@ def _detunings(span: Span) -> list[tuple[float, ...]]:
     example=(1e-3, 5e-4, 0.02),
     discriminating_test="add a second sensor across the first, or record longer: beats must repeat",
     shapes=_detunings,
+    start=lambda time_s, values, period_s: _in_two_planes(
+        time_s, values, Pendulum(2.0 * math.pi / period_s, restoring="sine"), float(time_s[0])
+    ),
+    restart=_in_two_planes,
 )
 def plane_coupling(
     sampled: Sampled, pendulum: Pendulum, cosine: float, sine: float, detuning: float
 ) -> FloatArray:
     """A second plane, of nearly the same frequency and loss, seen by the sensor: beats.
 
-    The tone has the main motion's envelope, and runs ahead of it by `detuning`. A slow
-    precession is a pair of such tones.
+    Along the suspension's axis of frequency f_0 + `detuning` the motion seen is
+    q_c cos(psi) + q_s sin(psi) at the first reading. Where the torque is that of sin x, both planes
+    are those of a spherical pendulum: the more they swing, the slower, and an ellipse turns by 3/8
+    of the product of its half axes. Without detuning that is precession alone. The axes' angle
+    alpha to the plane that is seen, tan^2 alpha = q/r, is that with which the other moves least.
     """
-    phase = sampled.phase + 2.0 * math.pi * detuning * elapsed(sampled.time_s)
-    return np.asarray(sampled.amplitude / sampled.amplitude[0] * tone_at(cosine, sine, phase))
+    motion, first = sampled.motion, sampled.amplitude[0]
+    share, turned = complex(cosine, -sine), 2.0 * math.pi * detuning
+    time = elapsed(sampled.time_s)
+    if pendulum.restoring != "sine" or abs(share) < _LINEAR * first:
+        return np.asarray(
+            sampled.amplitude / first * tone_at(cosine, sine, sampled.phase + turned * time)
+        )
+    reached = sampled.at_nodes(motion.clock.integral(motion.amplitude**2))
+    ratio = motion.upwards * share / first
+    both = planes(time, reached - reached[0], ratio, turned)
+    return motion.upwards * waveform(sampled.amplitude, sampled.phase, *both)
 
 
+_LINEAR: Final = 1e-5
+"""Of the amplitude: a second plane so small turns no ellipse, and enters in proportion."""
 PlaneCoupling = type(plane_coupling)
 
 
@@ -167,30 +209,67 @@ class SteadyTone(Effect):
         return (frequency_hz,) if math.isinf(decay_time_s) else None
 
 
-@enters(
-    "acceleration",
-    SteadyTone,
-    identifier="periodic-drive",
-    name="periodic drive",
-    equation=r"\ddot x \mathrel{+}= d_c \cos 2\pi f_d t + d_s \sin 2\pi f_d t",
-    parameters=(
-        Parameter("d_cosine", "rad/s^2", -100.0, 100.0, word="amplitude of the acceleration"),
-        Parameter("d_sine", "rad/s^2", -100.0, 100.0, 0.0, word="amplitude of the acceleration"),
-        Parameter("f_d", "Hz", 0.0, 1e6, word="frequency"),
-    ),
-    example=(5e-4, 3e-4, 1.2),
-    discriminating_test=(
-        "record the pendulum at rest: the tone must stay, and fall off above resonance"
-    ),
-    shapes=lambda span: rows(
-        np.array([*np.linspace(0.3, 0.97, 8), *np.geomspace(1.03, 4.0, 8)]) / span.period_s
-    ),
-)
-def periodic_drive(
+_STRENGTH: Final = "amplitude of the acceleration"
+
+
+def _drive(base: type[Effect], **more: Any) -> Effect:
+    """Declare the drive; `more` is what distinguishes a form of it."""
+    return enters(
+        "acceleration",
+        base,
+        identifier="periodic-drive",
+        name="periodic drive",
+        equation=r"\ddot x \mathrel{+}= d_c \cos 2\pi f_d t + d_s \sin 2\pi f_d t",
+        parameters=(
+            Parameter("d_cosine", "rad/s^2", -100.0, 100.0, word=_STRENGTH),
+            Parameter("d_sine", "rad/s^2", -100.0, 100.0, 0.0, word=_STRENGTH),
+            Parameter("f_d", "Hz", 0.0, 1e6, word="frequency"),
+        ),
+        sizes=2,
+        discriminating_test=(
+            "record the pendulum at rest: the tone must stay, and fall off above resonance"
+        ),
+        **more,
+    )(_driven)
+
+
+def _driven(
     motion: Motion, pendulum: Pendulum, cosine: float, sine: float, f_d: float
 ) -> FloatArray:
     """A periodic torque: fan, building, mains. Also rings the pendulum where it sets in."""
     return tone_at(cosine, sine, 2.0 * math.pi * f_d * since_release(motion, pendulum))
+
+
+periodic_drive: Final = _drive(
+    SteadyTone,
+    example=(5e-4, 3e-4, 1.2),
+    shapes=lambda span: rows(
+        np.array([*np.linspace(0.3, 0.97, 8), *np.geomspace(1.03, 4.0, 8)]) / span.period_s
+    ),
+)
+
+_APART: Final = 0.8
+"""Of 1/duration between frequencies near resonance: half of it from one, two thirds of the power of
+a steady tone are seen."""
+
+
+def _near_resonance(span: Span) -> list[tuple[float, ...]]:
+    """On both sides of the pendulum's frequency, where the scan for tones leaves it alone."""
+    beats = np.arange(0.5 * _APART, plane_band_hz(span) * span.duration_s, _APART)
+    own = 1.0 / span.period_s
+    return rows(own + np.array([*(-beats[::-1]), *beats]) / span.duration_s)
+
+
+def _near_by_chance(values: FloatArray, span: Span) -> float:
+    """Twice the logarithm by which a drive is less likely as near resonance: it may be anywhere."""
+    apart = abs(float(values[2]) * span.period_s - 1.0)
+    return -2.0 * math.log(min(max(2.0 * apart, 1e-6), 1.0))
+
+
+resonant_drive: Final = _drive(
+    Effect, key="periodic-drive:near", shapes=_near_resonance, prior_penalty=_near_by_chance
+)
+"""The form that is looked for near resonance: it beats with the motion, and does not decay."""
 
 
 def _keeps_in_step(values: FloatArray, span: Span) -> float:
@@ -199,31 +278,56 @@ def _keeps_in_step(values: FloatArray, span: Span) -> float:
     return -2.0 * math.log(min(max(4.0 * slipped, 1e-6), 1.0))
 
 
-@enters(
-    "acceleration",
-    identifier="parametric-drive",
-    name="parametric drive",
-    equation=r"\omega^2 x \to \omega^2 x (1 + h_c \cos 2\pi f_h t + h_s \sin 2\pi f_h t)",
-    parameters=(
-        Parameter("h_cosine", "1", -1.0, 1.0, word="relative amplitude"),
-        Parameter("h_sine", "1", -1.0, 1.0, 0.0, word="relative amplitude"),
-        Parameter("f_h", "Hz", 0.0, 1e6, word="frequency"),
-    ),
-    sizes=2,
-    example=(2e-4, 1e-4, 1.85),
-    discriminating_test="stop what shakes the pivot, or record another length beside it",
-    shapes=lambda span: rows(2.0 / span.period_s - np.ravel(_detunings(span))),
-    prior_penalty=_keeps_in_step,
-)
-def parametric_drive(
+def _parametric(**more: Any) -> Effect:
+    """Declare the parametric drive; `more` is what distinguishes a form of it."""
+    return enters(
+        "acceleration",
+        identifier="parametric-drive",
+        name="parametric drive",
+        equation=r"\omega^2 x \to \omega^2 x (1 + h_c \cos 2\pi f_h t + h_s \sin 2\pi f_h t)",
+        parameters=(
+            Parameter("h_cosine", "1", -1.0, 1.0, word="relative amplitude"),
+            Parameter("h_sine", "1", -1.0, 1.0, 0.0, word="relative amplitude"),
+            Parameter("f_h", "Hz", 0.0, 1e6, word="frequency"),
+        ),
+        sizes=2,
+        discriminating_test="stop what shakes the pivot, or record another length beside it",
+        **more,
+    )(_modulated)
+
+
+def _modulated(
     motion: Motion, pendulum: Pendulum, cosine: float, sine: float, f_h: float
 ) -> FloatArray:
     """A pivot that is shaken up and down, or a length that changes, at about twice the frequency.
 
-    Amplitude and phase beat with the difference to twice the pendulum's frequency.
+    Amplitude and phase beat with the difference to twice the pendulum's frequency. A slow change
+    of the stiffness makes side bands at equal distances, which are one cause.
     """
     torque = tone_at(cosine, sine, 2.0 * math.pi * f_h * since_release(motion, pendulum))
     return np.asarray(-pendulum.torque(motion.angle) * torque)
+
+
+parametric_drive: Final = _parametric(
+    example=(2e-4, 1e-4, 1.85),
+    shapes=lambda span: rows(2.0 / span.period_s - np.ravel(_detunings(span))),
+    prior_penalty=_keeps_in_step,
+)
+
+_SLOWEST: Final = 1.5
+"""Cycles of a modulation within the recording: slower ones are drifts."""
+
+slow_modulation: Final = _parametric(
+    key="parametric-drive:slow",
+    shapes=lambda span: rows(
+        np.arange(_SLOWEST, plane_band_hz(span) * span.duration_s, _APART) / span.duration_s
+    ),
+    # Of less than one cycle it is a drift.
+    prior_penalty=lambda values, span: (
+        -2.0 * math.log(min(max(float(values[2]) * span.duration_s, 1e-6), 1.0))
+    ),
+)
+"""The form that is looked for at slow changes of the stiffness."""
 
 
 broadband_drive: Final[Effect] = without_template(
@@ -396,6 +500,19 @@ def damping_step(motion: Motion, pendulum: Pendulum, change: float, instant_s: f
     return np.asarray(change * smooth_step(motion, instant_s) * pendulum.losses(motion))
 
 
+_TOLD_FROM_A_TURN: Final = 0.01
+"""Of a quarter turn, how near a turning point an instant may be: as near as by chance one of a
+hundred is. What is nearer says no more, since its own error is a part of the step that it makes."""
+
+
+def _at_a_turn(values: FloatArray, span: Span) -> float:
+    """Return twice the logarithm by which a knock is less likely to leave the amplitude alone.
+
+    At a turning point it does, as a jump of the clock does anywhere.
+    """
+    return -2.0 * math.log(max(span.to_a_turn(float(values[1])), _TOLD_FROM_A_TURN))
+
+
 @enters(
     "kick",
     Sudden,
@@ -407,6 +524,7 @@ def damping_step(motion: Motion, pendulum: Pendulum, change: float, instant_s: f
     turn=0.25 * math.pi,
     example=(5e-3, 21.03),
     discriminating_test="repeat the recording: a knock does not recur at the same time",
+    prior_penalty=_at_a_turn,
 )
 def impulse(jump: float, instant_s: float) -> Kick:
     """A knock: the velocity jumps, the angle does not."""

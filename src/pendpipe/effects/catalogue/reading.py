@@ -332,13 +332,18 @@ clock_slips: Final[Effect] = without_template(
 )
 
 
+_TICK_S: Final = 1.0 / 64.0
+"""Of a computer's timer at its slowest: a clock that is set anew may jump by any part of it."""
+
+
 def _part_of_a_sample(values: FloatArray, span: Span) -> float:
     """Return what a part of a sample costs.
 
-    Samples are lost whole. Less than one is lost where the instrument itself reads n times
-    as fast as it reports, which is the less likely the larger n: by 1/n.
+    Samples are lost whole. Less than one, or than a tick of the clock that stamps them, is lost
+    where the instrument itself reads n times as fast, which is the less likely the larger n: by
+    1/n.
     """
-    part = abs(float(values[0])) * span.fold / span.interval_s
+    part = abs(float(values[0])) / min(span.interval_s / span.fold, _TICK_S)
     return -2.0 * math.log(min(max(part, 1e-6), 1.0))
 
 
@@ -384,7 +389,6 @@ def dropped_samples(time_s: FloatArray, late_s: float, instant_s: float) -> Floa
     equation=r"y(t) = x(t + \kappa x)",
     parameters=(Parameter("kappa", "s/rad", -1.0, 1.0, word="delay"),),
     rare=True,
-    angular=True,
     example=(0.005,),
     discriminating_test="turn the camera by 180 degrees: the sign of kappa must turn with it",
 )

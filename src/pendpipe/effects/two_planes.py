@@ -1,0 +1,220 @@
+"""The slow flow of a spherical pendulum: a string's two planes, of which a camera sees one.
+
+With x = Re[a e^(i psi)] and y = Re[b e^(i psi)] along the axes of the suspension, a and b being
+what averaging over a cycle leaves, and psi the phase at small amplitude,
+
+    a' = -i omega/16 (|a|^2 + |b|^2) a - W b,
+    b' = -i omega/16 (|a|^2 + |b|^2) b + W a + 2 pi i delta b,    W = -3/8 omega Im(a* b):
+
+the circular error of both planes together, the turn of the ellipse by 3/8 of its area, the product
+of its half axes (Olsson 1978), and the detuning delta of the second axis. Both lose alike.
+"""
+
+import math
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from pendpipe.arrays import AnyArray, FloatArray
+from pendpipe.effects.two_modes import slow_amplitude
+
+_TURN: Final = 0.15
+"""Angle of a step, rad: its error, a twelfth of the cube, is 3e-4, and steps change sign."""
+_WINDOWS: Final = 60
+"""Of a record at most: six beats of ten each."""
+_FEWEST: Final = 10
+"""Windows, each of a period or more: two planes have eight numbers."""
+
+
+def _stepped(a: Any, b: Any, reached: Any, detuned: Any) -> tuple[Any, Any]:
+    """Follow both planes over a step in which omega r^2 integrates to `reached`.
+
+    Both halves of the detuning about the rest, whose turns are by Cayley's transform: unitary, and
+    the same for numbers and for arrays.
+    """
+    b = b * detuned
+    energy = a.real**2 + a.imag**2 + b.real**2 + b.imag**2 - 1.0
+    area = a.imag * b.real - a.real * b.imag
+    turn, late = 0.1875 * area * reached, -0.03125j * energy * reached
+    scale = (1.0 + late) / (1.0 - late) / (1.0 + turn * turn)
+    cosine, sine = scale * (1.0 - turn * turn), scale * (2.0 * turn)
+    return cosine * a - sine * b, (sine * a + cosine * b) * detuned
+
+
+def _begun(other: Any) -> tuple[Any, Any, Any, Any]:
+    """Return the amplitudes along both axes, and how each is seen.
+
+    What is seen is 1 + q, q being the second mode's part. The angle of the axes, tan^2 = |q|, is
+    that with which the hidden plane moves least; let go at rest in the plane that is seen, q is
+    real and nothing is hidden.
+    """
+    ratio = np.sqrt(np.maximum(np.abs(other), 1e-300))
+    seen = 1.0 / np.sqrt(1.0 + ratio**2)
+    hidden = ratio * seen
+    return 1.0 / seen, -other / hidden, seen, hidden
+
+
+def planes(
+    time_s: FloatArray, reached: FloatArray, other: complex, detuning: float
+) -> tuple[AnyArray, AnyArray]:
+    """Return the complex amplitudes in the plane that is seen, and across, over the first mode's.
+
+    Parameters
+    ----------
+    time_s
+        Since the first reading, s, shape (n,).
+    reached
+        The integral of omega r^2 until then, r being the first mode's amplitude as it is seen.
+    other
+        The second mode's part of what is seen at the first reading, over the first one's.
+    detuning
+        Of the second mode, rad/s.
+    """
+    a, b, seen, hidden = (each.item() for each in map(np.asarray, _begun(other)))
+    last_s, size = float(time_s[-1]), (1.0 + abs(other)) ** 2
+    turns = abs(detuning) * last_s + 0.375 * size * float(reached[-1])
+    count = min(8 + math.ceil(turns / _TURN), 20_000)
+    at = np.linspace(0.0, last_s, count + 1)
+    parts = np.diff(np.interp(at, time_s, reached)).tolist()
+    detuned = complex(np.exp(0.5j * detuning * last_s / count))
+    along, across = [a], [b]
+    for part in parts:
+        a, b = _stepped(a, b, part, detuned)
+        along.append(a)
+        across.append(b)
+    both = np.array([along, across])
+    turned = np.array([[seen, -hidden], [hidden, seen]]) @ both
+    u, w = _cubic(turned, time_s * (count / last_s))
+    return u, w
+
+
+def waveform(amplitude: FloatArray, phase: FloatArray, u: AnyArray, w: AnyArray) -> FloatArray:
+    """Return the angle that is seen, less that of one plane alone, to the third power of r.
+
+    Seen is arctan(x/|z|) = x + x^3/6 + x y^2/2 of the horizontal displacements, whose third
+    harmonic is -3/64 r^3 Re[(u^2 + w^2)(u, w) e^(3 i phi)]. r e^(i psi) = x - i x'/omega of sin x
+    is an even turn phi, and its amplitude, only nearly.
+    """
+    square = amplitude**2
+    phi = phase + square / 32.0 * np.sin(2.0 * phase)
+    wave = amplitude * (1.0 + square / 16.0 * np.sin(phase) ** 2) * np.exp(1j * phi)
+    oblique = 0.25 * w * (u.real * w.real + u.imag * w.imag)
+    third = -3.0 / 64.0 * (u * u + w * w) * u + u**3 / 24.0 + u * w * w / 8.0 + 1.0 / 192.0
+    return np.asarray(((u - 1.0 + square * oblique) * wave + third * wave**3).real)
+
+
+def _cubic(values: AnyArray, place: FloatArray) -> AnyArray:
+    """Interpolate at fractional places by cubics through four neighbours."""
+    first = np.clip(place.astype(np.int64) - 1, 0, values.shape[-1] - 4)
+    s = place - first
+    weights = (
+        -(s - 1.0) * (s - 2.0) * (s - 3.0) / 6.0,
+        s * (s - 2.0) * (s - 3.0) / 2.0,
+        -s * (s - 1.0) * (s - 3.0) / 2.0,
+        s * (s - 1.0) * (s - 2.0) / 6.0,
+    )
+    return np.asarray(sum(weight * values[..., first + k] for k, weight in enumerate(weights)))
+
+
+class Planes(NamedTuple):
+    """What two planes leave least of the slow amplitude."""
+
+    amplitude: float
+    """Of the first mode, as seen at the first reading."""
+    phase_rad: float
+    omega: float
+    linear: float
+    """Relative loss of amplitude, 1/s, and what it grows by with amplitude, 1/(rad s)."""
+    quadratic: float
+    other: complex
+    """The second mode's part of what is seen, over the first one's."""
+    detuning: float
+    """rad/s."""
+
+
+_TRIED: Final = tuple(
+    (size * np.exp(1j * angle), turned)
+    for size in (0.1, 0.4, 0.9)
+    for angle in (0.0, 0.5, -0.5, 1.8, -1.8)
+    for turned in (0.0, 2.0, -2.0, 6.0, -6.0, 15.0, -15.0)
+)
+"""Second modes, and their detuning over the record, rad, from which the search begins."""
+_FIRST, _THEN, _BEST = 6, 15, 8
+"""Steps of all, and of the best of them."""
+
+
+def two_planes(time_s: FloatArray, values: FloatArray, omega: float) -> Planes | None:
+    """Find the two planes that explain the slow amplitude of readings; None of too few cycles."""
+    time = time_s - time_s[0]
+    width = max(2.0 * math.pi / omega, float(time[-1]) / _WINDOWS)
+    edges = np.searchsorted(time, np.arange(0.0, time[-1], width)).tolist()
+    slow = slow_amplitude(omega * time, values, edges, slopes=True)
+    if len(slow) < _FEWEST:
+        return None
+    last_s, size = width * len(slow), float(np.abs(slow).max())
+    aim = slow / size
+    count = len(aim)
+
+    def model(value: FloatArray) -> AnyArray:
+        """The slow amplitude at the windows' middles; shape (..., windows)."""
+        log, phase, faster, b, a, cosine, sine, turned = value.T[..., None]
+        at = (np.arange(count) + 0.5) / count
+        decayed = np.exp(-b * at)
+        level = np.exp(log) * decayed / (1.0 + a * np.exp(log) * -np.expm1(-b * at) / b)
+        square = (size * level) ** 2
+        whole = omega * last_s / count * square
+        part = np.concatenate([0.5 * whole[..., :1], 0.5 * (whole[..., 1:] + whole[..., :-1])], -1)
+        other = cosine - 1j * sine
+        x, y, seen, hidden = _begun(other[..., 0])
+        half = np.exp(0.5j * turned[..., 0] / count)
+        found = np.empty(level.shape, dtype=np.complex128)
+        for k in range(count):
+            x, y = _stepped(x, y, part[..., k], np.sqrt(half) if k == 0 else half)
+            found[..., k] = seen * x - hidden * y
+        turn = phase + faster * at - np.cumsum(part, axis=-1) / 16.0
+        return np.asarray(found * level * np.exp(1j * turn))
+
+    def residual(value: FloatArray) -> FloatArray:
+        left = model(value) - aim
+        return np.concatenate([left.real, left.imag], axis=-1)
+
+    starts = []
+    early = np.unwrap(np.angle(aim[:4]))
+    faster = (early[-1] - early[0]) * count / 3.0
+    for other, turned in _TRIED:
+        now = aim[0] / (1.0 + other)
+        log, square = math.log(max(abs(now), 1e-3)), (size * abs(aim[0])) ** 2
+        quick = faster + omega * last_s * square / 16.0
+        starts.append([log, np.angle(now), quick, 0.3, 0.1, other.real, -other.imag, turned])
+    value = np.array(starts)
+    least, damped = np.sum(residual(value) ** 2, axis=1), np.full(len(value), 1e-2)
+    for round_ in range(_FIRST + _THEN):
+        if round_ == _FIRST:
+            best = np.argsort(least)[:_BEST]
+            value, least, damped = value[best], least[best], damped[best]
+        steps = 1e-5 * np.eye(value.shape[1])
+        moved = residual((value[:, None] + steps).reshape(-1, value.shape[1]))
+        here = residual(value)
+        slopes = (moved.reshape(len(value), -1, here.shape[1]) - here[:, None]) / 1e-5
+        gram = slopes @ np.swapaxes(slopes, 1, 2)
+        diagonal = np.einsum("kii->ki", gram)
+        gram = gram + (damped[:, None] * diagonal + 1e-12)[:, :, None] * np.eye(value.shape[1])
+        step = np.linalg.solve(gram, slopes @ here[..., None])[..., 0]
+        new = value - np.clip(step, -3.0, 3.0)
+        new[:, 3:5] = np.clip(new[:, 3:5], 1e-6, 50.0)
+        new[:, 0] = np.minimum(new[:, 0], 2.0)
+        squares = np.sum(residual(new) ** 2, axis=1)
+        better = squares < least
+        value[better], least[better] = new[better], squares[better]
+        damped = np.clip(np.where(better, 0.2 * damped, 5.0 * damped), 1e-7, 1e6)
+    log, phase, faster, b, a, cosine, sine, turned = value[int(np.argmin(least))].tolist()
+    amplitude = size * math.exp(log)
+    return Planes(
+        amplitude,
+        phase,
+        omega + faster / last_s,
+        b / last_s,
+        a / last_s / size,
+        complex(cosine, -sine),
+        turned / last_s,
+    )

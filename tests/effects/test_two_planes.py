@@ -1,0 +1,94 @@
+"""A second plane against the equations of a spherical pendulum, which scipy integrates."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pendpipe.arrays import FloatArray
+from pendpipe.diagnosis.data import Data
+from pendpipe.diagnosis.noise import white_noise
+from pendpipe.diagnosis.refine import refine
+from pendpipe.dynamics.eq8 import OMEGA, SHARE, C
+from pendpipe.dynamics.eq8_model import values_of
+from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.effect import Pendulum
+from pendpipe.effects.model import Model
+from pendpipe.effects.two_planes import planes, two_planes
+
+PLANES = by_identifier("plane-coupling")
+TIME = np.arange(0.0, 60.0, 1.0 / 30.0)
+SQUARE, LOSS = 8.0, 0.008
+
+
+def spherical(
+    along: float, across: float, stiffer: float, axis_rad: float, camera_rad: float = 0.0
+) -> FloatArray:
+    """The angle that a camera sees of a mass on a string of length 1.
+
+    Let go at `along` with a velocity that would carry it to `across`; the suspension is stiffer
+    along one axis, as a string on two hooks is.
+    """
+    axis = np.array([math.cos(axis_rad), math.sin(axis_rad), 0.0])
+
+    def slopes(_: float, state: FloatArray) -> FloatArray:
+        place, velocity = state[:3], state[3:]
+        force = np.array([0.0, 0.0, -SQUARE]) - 2.0 * LOSS * velocity
+        force -= SQUARE * stiffer * (place @ axis) * axis
+        pull = -(velocity @ velocity) - place @ force
+        return np.concatenate([velocity, force + pull * place])
+
+    start = [along, 0.0, -math.sqrt(1.0 - along**2), 0.0, math.sqrt(SQUARE) * across, 0.0]
+    solved = solve_ivp(
+        slopes, (0.0, TIME[-1]), start, method="DOP853", t_eval=TIME, rtol=1e-9, atol=1e-11
+    )
+    x, y, z = solved.y[:3]
+    return np.asarray(np.arctan2(math.cos(camera_rad) * x + math.sin(camera_rad) * y, -z))
+
+
+@pytest.mark.parametrize(
+    ("along", "across", "stiffer", "axis_rad", "camera_rad"),
+    [
+        pytest.param(0.1, 0.03, 0.0, 0.0, 0.0, id="an ellipse"),
+        pytest.param(0.25, 0.06, 0.0, 0.0, 0.0, id="one that turns"),
+        pytest.param(0.25, -0.05, 0.0, 0.0, 0.8, id="seen obliquely"),
+        pytest.param(0.1, 0.0, 0.02, 0.6, 0.0, id="two hooks"),
+        pytest.param(0.25, 0.0, 0.02, 1.1, 0.0, id="apart by a hundredth"),
+    ],
+)
+def test_a_string_pendulum_seen_by_one_camera(
+    along: float, across: float, stiffer: float, axis_rad: float, camera_rad: float
+) -> None:
+    """The slow flow leaves the next power of the amplitude, A^3/12 at most; one plane far more."""
+    readings = spherical(along, across, stiffer, axis_rad, camera_rad)
+    begun = PLANES.restart(TIME, readings, Pendulum(math.sqrt(SQUARE), restoring="sine"), 0.0)
+    assert begun is not None
+    value = np.concatenate([values_of(begun.law, begun.release), begun.values])
+    data = Data(TIME, readings, 1.0 / 30.0, True, np.ones(len(TIME)))
+    noise = white_noise(data, 1e-4)
+    both = Model(TIME, 1.0 / 30.0, (PLANES,), restoring="sine")
+    fit = refine(both, data, noise, value, held=[C, SHARE])
+    alone = refine(both.bare(), data, noise, value[: both.first], held=[C, SHARE])
+    left, one = data.rms_left(fit.at.reading), data.rms_left(alone.at.reading)
+    assert left < min(along**3 / 12.0, 0.25 * one)
+    assert fit.value[OMEGA] == pytest.approx(math.sqrt(SQUARE), rel=max(stiffer, 1e-3))
+
+
+def test_an_ellipse_turns_by_three_eighths_of_the_product_of_its_half_axes() -> None:
+    """And the sum of squares stays; at 45 degrees to both axes, one a quarter turn ahead."""
+    reached = np.linspace(0.0, 40.0, 300)
+    # Half axes 2 cos(0.1) and 2 sin(0.1) of the first mode's part of what is seen, 1.
+    u, w = planes(reached, reached, complex(np.exp(0.2j)), 0.0)
+    np.testing.assert_allclose(np.abs(u) ** 2 + np.abs(w) ** 2, 4.0, rtol=1e-6)
+    area = 4.0 * math.cos(0.1) * math.sin(0.1)
+    np.testing.assert_allclose(np.abs((np.conj(u) * w).imag), area, rtol=1e-6)
+    turned = 0.5 * np.unwrap(
+        np.arctan2(2.0 * (u * np.conj(w)).real, np.abs(u) ** 2 - np.abs(w) ** 2)
+    )
+    rate = np.polyfit(reached, turned, 1)[0]
+    assert abs(rate) == pytest.approx(0.375 * area, rel=1e-3)
+
+
+def test_of_a_few_cycles_two_planes_are_not_told() -> None:
+    assert two_planes(TIME[:100], np.cos(math.sqrt(SQUARE) * TIME[:100]), math.sqrt(SQUARE)) is None
