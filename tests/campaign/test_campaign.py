@@ -451,7 +451,7 @@ def test_a_record_that_disagrees_is_named_and_no_cause(record: str, percent: flo
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("record", ["air-03", "water-high-8"])
+@pytest.mark.parametrize("record", ["air-03", "water-high-7", "water-high-8"])
 def test_the_table_of_a_campaign_is_that_without_a_foreign_record(
     record: str, tmp_path: Path
 ) -> None:

@@ -60,7 +60,11 @@ def campaign_diagnosis(
     Added are ``baseline.chi2`` and ``improved.chi2``; for each effect ``rivals`` (values and chi^2
     of its class), ``next_measurements`` and ``probability_of_nothing``; for the campaign
     ``priors``, ``excluded``, ``records``, ``left_out`` (records that disagree with all others,
-    with the numbers with and without them) and ``patterns`` (`causes`).
+    with the numbers with and without them), ``patterns`` (`causes`), ``scatter`` (the factor by
+    which the records' errors are too small, where that is found), ``described`` and ``seen`` (what
+    the records show where the model does not describe them), ``quoted`` (k, and the loss torques,
+    None in a fluid whose drag may follow another law), and of each fit ``pulls_of_inputs`` in
+    stated errors.
 
     Parameters
     ----------

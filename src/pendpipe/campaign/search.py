@@ -208,10 +208,12 @@ def _among_records(base: JointFit, level: float) -> CampaignSearch:
     left_out: list[Far] = []
     while answer.missing and len(answer.baseline.design.runs) > MOST_LEFT_OUT:
         unexplained = farthest(answer.improved)
-        suspect = unexplained or farthest(answer.baseline)
-        if suspect is None:
+        suspects = [far for far in (unexplained, farthest(answer.baseline)) if far]
+        if not suspects:
             break
-        fewer = without(answer.baseline, suspect.record)
+        # A cause that bends to a foreign record makes others far.
+        each = {far: without(answer.baseline, far.record) for far in suspects}
+        suspect, fewer = min(each.items(), key=lambda item: item[1].chi2)
         better = answer.improved.chi2 - fewer.chi2
         # A mode that one record sees is that record.
         needed = -CLASS if answer.found and answer.found[-1].leader.last.finer else CLASS
@@ -379,7 +381,7 @@ def _finer(fit: JointFit) -> JointFit:
     (*others, last), width = fit.added, len(fit.added[-1].shape)
     for _ in range(_MOST_STEPS):
         step = -np.linalg.lstsq(fit.tangent, fit.residuals)[0][-width:]
-        step *= min(1.0, _LONGEST / float(np.max(np.abs(step))))
+        step *= _LONGEST / max(_LONGEST, float(np.max(np.abs(step))))
         last = last._replace(shape=tuple((last.shape * np.exp(step)).tolist()))
         other = joint_fit(fit.design, fit.data, (*others, last), fit.unknowns)
         if other.chi2 > fit.chi2 - 1e-3:
