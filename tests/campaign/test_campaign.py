@@ -524,6 +524,7 @@ def scattered(factor: float, seed: int) -> Measured:
     return found._replace(values=none + factor * (found.values - none))
 
 
+@pytest.mark.slow
 def test_errors_of_all_records_are_a_cause_like_others() -> None:
     """Records that scatter three times more than their errors say: nothing else is named."""
     answer = search(DESIGN, scattered(3.0, 7))
