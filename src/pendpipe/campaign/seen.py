@@ -210,9 +210,9 @@ class Groups(NamedTuple):
     excess: tuple[float, float]
 
 
-_TWO_KINDS: Final = 0.1
-"""Variance that is left within two groups: of a normal distribution that is split 0.36 is left,
-of an even one 0.25."""
+_TWO_KINDS: Final = 0.04
+"""Variance that is left within two groups: of twelve normal numbers, beside a line, a quarter as a
+rule, and so little by chance once in 2,000."""
 
 
 def groups(fit: JointFit) -> Groups | None:
