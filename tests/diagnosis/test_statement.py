@@ -17,13 +17,14 @@ from pendpipe.diagnosis.found import FittedModel, FoundEffect, Location, Mate, v
 from pendpipe.diagnosis.held_out import HeldOut
 from pendpipe.diagnosis.location import locate, mains_of
 from pendpipe.diagnosis.missing_force import curve_told
-from pendpipe.diagnosis.noise import white_noise
+from pendpipe.diagnosis.noise import Noise, white_noise
 from pendpipe.diagnosis.refine import Fit, Remainder, refine, remainder_of, with_errors
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.rivals import near_harmonic_by_chance
 from pendpipe.diagnosis.seen import Seen
 from pendpipe.diagnosis.summary import Change, Summary, numbers_of, test_of as measurement_of
 from pendpipe.diagnosis.values import constants_of, curve_values
+from pendpipe.dynamics.any_law import Motion
 from pendpipe.dynamics.eq8 import OMEGA, TIME, A, B, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.curves import (
@@ -36,7 +37,7 @@ from pendpipe.effects.curves import (
     reading_curve,
     restoring_curve,
 )
-from pendpipe.effects.effect import STRAIGHT_S, Effect
+from pendpipe.effects.effect import STRAIGHT_S, Effect, Parameter, Pendulum
 from pendpipe.effects.model import Model
 from pendpipe.estimate import Z95, Estimate
 from pendpipe.quantities import with_error
@@ -516,39 +517,53 @@ def test_a_diagnosis_prints_as_its_answer() -> None:
 
 AT_20_HZ_S = np.arange(3000) / 20.0
 FAINT_RAD = 1e-5
-LINEAR, QUADRATIC = 0.01, 0.08
+LINEAR, CUBIC = 0.01, 0.8
 
 
-def fitted(kind: type[Curve], quadratic: float) -> tuple[Fit, Curve]:
-    """Readings with a quadratic loss, fitted by b and a curve, a and c held at zero."""
+class LossByCube(Effect):
+    """-dy/dt = k y^3 beside Eq. 14."""
+
+    identifier, name, kind, equation = "cube", "a loss", "dynamics", ""
+    parameters = (Parameter("k", "1/s", 0.0, 10.0),)
+    discriminating_test = ""
+
+    def acceleration(self, motion: Motion, _: Pendulum, values: FloatArray) -> FloatArray:
+        return np.asarray(-2.0 * values[0] * motion.amplitude**2 * motion.velocity)
+
+
+def fitted(kind: type[Curve], cubic: float) -> tuple[Fit, Curve, Noise]:
+    """Readings with a loss of the third power, fitted by b and a curve."""
     omega = 2.0 * math.pi * 0.9
-    truth = np.array([quadratic, LINEAR, 0.0, 0.0, omega, 0.15, -0.3, 0.0])
-    model = Model(AT_20_HZ_S, 0.05)
-    noise_free = model.evaluate(truth)
+    truth = np.array([0.0, LINEAR, 0.0, 0.0, omega, 0.15, -0.3, 0.0, cubic])
+    noise_free = Model(AT_20_HZ_S, 0.05, (LossByCube(),)).evaluate(truth)
     values = noise_free.reading + FAINT_RAD * np.random.default_rng(2).standard_normal(
         len(AT_20_HZ_S)
     )
     data = Data(AT_20_HZ_S, values, 0.05, True, np.ones(len(AT_20_HZ_S)))
-    effect = kind(noise_free.span)
-    if kind is drive_curve:
-        effect = kind(noise_free.span, np.eye(effect.basis_size)[:, :3])
-    start = np.concatenate([truth, np.zeros(effect.sizes)])
-    start[0] = 0.0
-    fit = refine(model.adding(effect), data, white_noise(data, FAINT_RAD), start, held=(0, 1, 2, 3))
-    return fit, effect
+    whole = kind(noise_free.span)
+    # What is smooth is seen: three of its combinations.
+    smooth = np.vander(np.linspace(-1.0, 1.0, whole.basis_size), 6)
+    effect = whole.reduced(np.linalg.qr(whole.coefficients.T @ smooth)[0][:, :6])
+    noise = white_noise(data, FAINT_RAD)
+    start = np.concatenate([truth[:-1], np.zeros(effect.sizes)])
+    model = Model(AT_20_HZ_S, 0.05, (effect,))
+    return refine(model, data, noise, start, held=(3,)), effect, noise
 
 
 def test_a_loss_curve_is_the_missing_loss() -> None:
-    """Quadratic drag takes -dy/dt = a y^2: a loss rate of a y (Eq. 13)."""
-    fit, effect = fitted(damping_curve, QUADRATIC)
-    found = curve_values(fit, effect)
-    expected = QUADRATIC * found["at"]
-    inside = slice(5, -5)
-    assert found["value"][inside] == pytest.approx(expected[inside], rel=0.06)
-    assert np.all(found["sd"][inside] < 0.05 * expected[inside])
+    """A loss rate of k y^2, beyond the a y + b + c/y that Eq. 14 takes of it."""
+    fit, effect, noise = fitted(damping_curve, CUBIC)
+    found = curve_values(fit, effect, noise)
+    at = found["at"]
+    law = np.column_stack([at, np.ones_like(at), 1.0 / at])
+    expected = CUBIC * at**2
+    expected = expected - law @ np.linalg.lstsq(law, expected, rcond=None)[0]
+    assert np.mean(np.abs(found["value"] - expected) < 1.96 * found["sd"]) > 0.9
+    assert np.median(found["sd"]) < 0.2 * np.max(np.abs(expected))
     assert found["argument"].startswith("amplitude")
-    # The whole loss is b + a y: n = 1 + a y/(b + a y), between 1 (linear) and 2 (quadratic).
-    exponent = 1.0 + expected / (LINEAR + expected)
+    # The whole loss is b + k y^2: n = 1 + 2 k y^2/(b + k y^2), between 1 (linear) and 3 (cubic).
+    exponent = 1.0 + 2.0 * CUBIC * at**2 / (LINEAR + CUBIC * at**2)
+    inside = slice(5, -5)
     assert found["local_exponent"][inside] == pytest.approx(exponent[inside], abs=0.15)
     assert np.all(found["local_exponent_sd"] > 0.0)
 
@@ -556,31 +571,47 @@ def test_a_loss_curve_is_the_missing_loss() -> None:
 @pytest.mark.parametrize(
     ("kind", "height", "unit", "says"),
     [
-        (restoring_curve, 0.05, "rad", "the torque is stiffer by 5 % within 0.291° of the lowest"),
-        (restoring_curve, -0.05, "m", "the torque is softer by 5 % within 5.08 mm of the lowest"),
-        (friction_curve, 0.5, "rad", "the friction is larger by 4.77 mrad/s² within 1.16° of the"),
-        (reading_curve, -0.05, "rad/s", "the reading is lower by 342 µrad/s from -20.3 mrad/s to"),
-        (damping_curve, 0.3, "rad", "the loss is larger by 0.00338 s⁻¹ from 2.88° to 3.73° (ampl"),
-        (offset_curve, 0.02, "rad", "the offset is higher by 136 µrad from 11.7 s to 33.3 s (time"),
+        (
+            restoring_curve,
+            0.05,
+            "rad",
+            "the torque is stiffer by 7.4 % within 0.299° of the low",
+        ),
+        (restoring_curve, -0.05, "m", "the torque is softer by 7.5 % within 5.05 mm of the lowest"),
+        (friction_curve, 0.5, "rad", "the friction is larger by 3.67 mrad/s² within 0.873° of the"),
+        (reading_curve, -0.05, "rad/s", "the reading is lower by 289 µrad/s from -20.3 mrad/s to"),
+        (damping_curve, 0.3, "rad", "the loss is larger by 0.00212 s⁻¹ from 2.95° to 3.65° (ampl"),
+        (offset_curve, 0.02, "rad", "the offset is higher by 107 µrad from 13.3 s to 33.3 s (time"),
         (drive_curve, 0.0, "rad", ""),
     ],
 )
 def test_a_curve_says_where_and_how_large_it_is(
     kind: type[Curve], height: float, unit: str, says: str
 ) -> None:
-    """Beside the lowest point, or between the second knot and the sixth, the middle three alike."""
+    """Beside the lowest point, or between the second knot and the sixth, the middle three alike.
+
+    Beyond what Eq. 8 and a sensor have: a torque as the angle, dry friction, an offset, a gain.
+    """
     model = Model(TIME_S, INTERVAL_S)
     whole = kind(model.evaluate(TRUTH).span)
     shape, middle = np.zeros((whole.basis_size, 1)), len(whole.knots) // 2
     near = slice(middle - 2, middle + 3) if "angle" in whole.argument else slice(2, 5)
     shape[near, 0] = whole.knots[near] / whole.knots[near][-1] if whole.is_torque else 1.0
-    curve, faint = whole.reduced(shape), 1e-6
+    curve, faint = kind(whole.span, shape), 1e-6
     start = np.append(TRUTH, height)
     readings = model.adding(curve).reading(start) + white(3, rms=faint)
-    fit = refine(model.adding(curve), *prepared(readings, rms=faint), start)
-    told = curve_told(fit, curve, unit)
+    data, noise = prepared(readings, rms=faint)
+    fit = refine(model.adding(curve), data, noise, start)
+    told = curve_told(fit, curve, noise, unit)
     assert told["summary"].startswith(says)
     assert bool(told["summary"]) == bool(says)
+    at = told["at"]
+    powers = {restoring_curve: (0, 1), reading_curve: (0, 1), damping_curve: (-1, 0, 1)}
+    columns = np.column_stack([at**power for power in powers.get(kind, (0,))])
+    there = curve.scale(fit.model.pendulum(fit.value)) * curve.curves(np.array([height]), at)[0]
+    there = there - columns @ np.linalg.lstsq(columns, there, rcond=None)[0]
+    # Its corners are rounded.
+    assert np.mean(np.abs(told["value"] - there) <= 0.2 * np.ptp(there) + faint) > 0.8
 
 
 @pytest.mark.parametrize(
@@ -614,8 +645,8 @@ def test_what_acts_on_the_motion_of_a_gyroscope_has_the_units_of_an_angle() -> N
 
 
 def test_a_drive_has_two_curves() -> None:
-    fit, effect = fitted(drive_curve, 0.0)
-    found = curve_values(fit, effect, "m")
+    fit, effect, noise = fitted(drive_curve, 0.0)
+    found = curve_values(fit, effect, noise, "m")
     assert len(found["value"]) == len(found["quadrature"]) == len(found["at"])
     # Nothing was driven: nothing is seen.
     assert np.all(np.abs(found["value"]) <= 4.0 * found["sd"] + 1e-12)

@@ -124,7 +124,7 @@ def _predicted(
         part = replace(noise, weight=known.weight)
         try:
             predicted = refine(fit.model, known, part, fit.value, held=held, rounds=6).at.reading
-        except NoMotionError:
+        except (NoMotionError, np.linalg.LinAlgError):
             predicted = fit.at.reading
         # A curve may diverge where blocks are missing: limit the error to that of no prediction.
         off = np.clip(data.residual(predicted), -largest, largest)

@@ -326,10 +326,10 @@ def applicable(
 
 
 def undrawn(curves: Sequence[type[Curve]], fit: Fit) -> list[Effect]:
-    """Return the curves along a fitted motion, without those in its model."""
-    present = {effect.key for effect in fit.model.effects}
-    made = fit.model.admitted([curve(fit.at.span) for curve in curves])
-    return [curve for curve in made if curve.key not in present]
+    """Return the curves along a fitted motion, but for what its model has a curve of."""
+    present = {(e.identifier, e.argument) for e in fit.model.effects if isinstance(e, Curve)}
+    absent = [each for each in curves if (each.identifier, each.argument) not in present]
+    return list(fit.model.admitted([curve(fit.at.span) for curve in absent]))
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,10 @@ from pendpipe.answer import percent
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.detect import detect, prepare
 from pendpipe.diagnosis.hypothesis import Hypothesis, Step, undrawn
+from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, loses_phase, with_errors
 from pendpipe.diagnosis.rivals import Rival, refit_leads
-from pendpipe.diagnosis.values import curve_values, curves_of
+from pendpipe.diagnosis.values import Drawn, curve_values, drawn_of
 from pendpipe.dynamics.any_law import Motion
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
 from pendpipe.estimate import Z95, Estimate
@@ -42,7 +43,7 @@ def force_of(found: Hypothesis, step: Step) -> dict[str, Any] | None:
     winner = step.winner
     effect = winner.effect
     if isinstance(effect, Curve):
-        return curve_told(found.fit, effect, found.data.unit)
+        return curve_told(found.fit, effect, found.noise, found.data.unit)
     likely = zip(step.weights[1:-1], step.mates, strict=True)
     drawn = [mate for _, mate in sorted(likely, key=lambda each: -each[0]) if mate.drawn]
     drawn += sorted((each for each in step.rivals if each.drawn), key=lambda each: -each.evidence)
@@ -55,8 +56,9 @@ def force_of(found: Hypothesis, step: Step) -> dict[str, Any] | None:
     curve = drawn[0].effect
     assert isinstance(curve, Curve)
     fit = with_errors(drawn[0].fit, found.data, found.noise)
-    told = curve_told(fit, curve, found.data.unit)
-    return {**told, "named": seen_as(found.fit, fit, curve, told["at"]), "named_as": effect.name}
+    told = curve_told(fit, curve, found.noise, found.data.unit)
+    named = seen_as(found.fit, fit, drawn_of(fit, curve, found.noise))
+    return {**told, "named": named, "named_as": effect.name}
 
 
 def _curves_in_place(found: Hypothesis, step: Step) -> list[Rival]:
@@ -71,22 +73,14 @@ def _curves_in_place(found: Hypothesis, step: Step) -> list[Rival]:
     return refit_leads(before, *readings, one, held=found.held, phase_lost=loses_phase(before))
 
 
-def seen_as(named: Fit, drawn: Fit, curve: Curve, at: FloatArray) -> FloatArray | None:
-    """Return what a curve would be if the readings were those of the model with a name.
+def seen_as(named: Fit, fit: Fit, drawn: Drawn) -> FloatArray | None:
+    """Return what the curve of a fit would be if the readings were those of the model with a name.
 
-    To first order about the curve's fit, ``J^+ (r_drawn - r_named)`` with the residuals of the two
-    models: so both are told beside the same baseline, whatever it takes of each.
+    Both are then told beside the same baseline, whatever it takes of each, and equally smooth.
     """
-    jacobian = drawn.jacobian[:, drawn.free]
-    if named.residual.shape != drawn.residual.shape:
+    if named.residual.shape != fit.residual.shape:
         return None
-    moved = np.zeros(len(drawn.value))
-    scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
-    step = np.linalg.lstsq(jacobian / scale, drawn.residual - named.residual, rcond=1e-12)[0]
-    moved[list(drawn.free)] = step / scale
-    place = next(place for other, place in drawn.model.places() if other is curve)
-    unit = curve.scale(drawn.model.pendulum(drawn.value))
-    return np.asarray(unit * curve.curves((drawn.value + moved)[place], at)[0])
+    return np.asarray(drawn.gain @ (drawn.readings - named.residual))[: len(drawn.at)]
 
 
 def share_of_loss(fit: Fit, curve: Curve, low: float, high: float) -> float:
@@ -121,31 +115,31 @@ def _work(power: FloatArray, motion: Motion) -> FloatArray:
     return np.diff(motion.clock.integral(power)[:, [0, -1]], axis=1)
 
 
-def curve_told(fit: Fit, effect: Curve, unit: str) -> dict[str, Any]:
+def curve_told(fit: Fit, effect: Curve, noise: Noise, unit: str) -> dict[str, Any]:
     """Return a fitted curve as `curve_values` does, with its ``name`` and a clause, ``summary``.
 
     The clause says where and how large it is: of the points beyond their 95 % band on one side,
-    with none on the other side among them, those that make most of it, and their mean; of a torque
+    with none on the other side among them, those of the largest square, and their mean; of a torque
     over the angle, that within the least of these; of a loss which part of the whole loss there it
     is. Where none of them stands out over all knots it is empty.
     """
-    found = curve_values(fit, effect, unit)
+    found, drawn = curve_values(fit, effect, noise, unit), drawn_of(fit, effect, noise)
     axes = (found[name].partition(", ") for name in ("argument", "ordinate"))
     (along, _, per), (_, _, across) = axes
     told, most, whole = "", 0.0, found["at"]
     # What is odd in the angle is the same on both sides.
     right = whole > 0.0 if effect.is_torque else np.full(len(whole), True)
     at = whole[right]
-    for name, both in curves_of(fit, effect, whole, odd=effect.is_torque).items():
+    for name, both in drawn.curves(odd=effect.is_torque).items():
         subject, larger, smaller = effect.words[name]
         value, sd = (each[right] / at if effect.is_torque else each for each in both)
         whole_size = 1.0 if effect.is_torque else abs(effect.scale(fit.model.pendulum(fit.value)))
         sure = np.abs(value) > deviations(len(effect.knots)) * sd
         beyond = np.flatnonzero(np.abs(value) > np.maximum(Z95 * sd, _ROUNDING * whole_size))
         sides = np.split(beyond, np.flatnonzero(np.diff(np.sign(value[beyond]))) + 1)
-        here = max(sides, key=lambda side: float(np.abs(value[side]).sum() * np.any(sure[side])))
+        here = max(sides, key=lambda side: float(value[side] @ value[side] * np.any(sure[side])))
         here = here[: len(here) * bool(np.any(sure[here]))]
-        total = float(np.abs(value[here]).sum())
+        total = float(value[here] @ value[here])
         if total <= most:
             continue
         # A point that stands out is no place.
@@ -163,7 +157,10 @@ def curve_told(fit: Fit, effect: Curve, unit: str) -> dict[str, Any]:
         told += f", {percent(abs(share))} of the loss there" if share else ""
     if formula := polynomial_of(fit, effect, unit):
         largest = fit.at.span.first_amplitude
-        share = float(found["value"][-1] / whole[-1])
+        # The law's own part of it is none of the curve.
+        share = sum(
+            each.value * largest ** (effect.powers[name] - 1) for name, each in formula.items()
+        )
         at_most = f"{100.0 * abs(share):.2g} % {larger if share > 0.0 else smaller}"
         told = f"the torque is as x {_signed(formula)}: {at_most} at {short_size(largest, per)}"
         found["polynomial"] = formula

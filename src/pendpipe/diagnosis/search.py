@@ -427,8 +427,18 @@ def run_search(state: Hypothesis, task: Task) -> Hypothesis:
                 state = best.settle(best.fit)
                 break
         else:
-            state = _judged(examine(state, task))
-            return replace(state, steps=tuple(weigh(state, step) for step in state.steps))
+            return _weighed(_judged(examine(state, task)))
+
+
+def _weighed(state: Hypothesis) -> Hypothesis:
+    """Compare each effect with its rivals; drop one that explains nothing beside the others."""
+    steps = tuple(weigh(state, step) for step in state.steps)
+    for step, weighed in zip(state.steps, steps, strict=True):
+        without = None if any(weighed.weights) else state.without(step)
+        if without is not None:
+            others = tuple(other for other in state.steps if other is not step)
+            return _weighed(replace(state, fit=without, steps=others).settle(without))
+    return replace(state, steps=steps)
 
 
 def _starts(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -12,7 +12,9 @@ from numpy.lib.stride_tricks import sliding_window_view
 from pendpipe.analysis.fit.fitted import PARAMETERS, units
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
-from pendpipe.diagnosis.refine import Fit
+from pendpipe.diagnosis.noise import Noise
+from pendpipe.diagnosis.projection import whitened
+from pendpipe.diagnosis.refine import Fit, span_of
 from pendpipe.dynamics.any_law import Motion, NoMotionError
 from pendpipe.dynamics.eq8 import OFFSET, OMEGA, TIME, A, B, C
 from pendpipe.effects import Effect
@@ -279,9 +281,13 @@ def last_in(fit: Fit, effect: Effect, unit: str) -> Estimate | None:
 
 _CURVE_POINTS: Final = 61
 """Of a drawn curve: ten between its knots."""
+_SMOOTHNESS: Final = np.exp(np.linspace(-20.0, 6.0, 53))
+"""Variances of a curve's change of slope: standard deviations from 1e-4 to 20 of what is usual."""
+_LAWS: Final = 100.0
+"""Variance of what of a curve the law has: the readings tell it, or it is the law's."""
 
 
-def curve_values(fit: Fit, effect: Curve, unit: str = "rad") -> dict[str, Any]:
+def curve_values(fit: Fit, effect: Curve, noise: Noise, unit: str = "rad") -> dict[str, Any]:
     """Return a fitted curve with its error band.
 
     Parameters
@@ -290,6 +296,8 @@ def curve_values(fit: Fit, effect: Curve, unit: str = "rad") -> dict[str, Any]:
         The extended model, the curve in it.
     effect
         The curve.
+    noise
+        Of the readings.
     unit
         Of the readings: ``"rad"``, ``"rad/s"``, or ``"m"`` for a displacement.
 
@@ -300,35 +308,110 @@ def curve_values(fit: Fit, effect: Curve, unit: str = "rad") -> dict[str, Any]:
         and ``sd``, shape (k,). A drive has ``quadrature`` and ``quadrature_sd`` besides; a
         loss by amplitude ``local_exponent`` and ``local_exponent_sd``.
     """
-    by_amplitude = isinstance(effect, damping_curve)
-    spaced = np.geomspace if by_amplitude else np.linspace
-    at = np.asarray(spaced(effect.knots[0], effect.knots[-1], _CURVE_POINTS))
+    drawn = drawn_of(fit, effect, noise)
     argument, ordinate = effect.axes(unit)
-    found: dict[str, Any] = {"argument": argument, "ordinate": ordinate, "at": at}
-    for name, (value, sd) in curves_of(fit, effect, at).items():
+    found: dict[str, Any] = {"argument": argument, "ordinate": ordinate, "at": drawn.at}
+    for name, (value, sd) in drawn.curves().items():
         prefix = f"{name}_" if name != "value" else ""
         found |= {name: value, f"{prefix}sd": sd}
-    if by_amplitude:
-        exponent = _with_errors(fit, lambda value: _local_exponent(fit, effect, value, at))
+    if isinstance(effect, damping_curve):
+        exponent = _with_errors(fit, lambda value: _local_exponent(fit, effect, value, drawn.at))
         found["local_exponent"], found["local_exponent_sd"] = exponent
     return found
 
 
-def curves_of(
-    fit: Fit, effect: Curve, at: FloatArray, *, odd: bool = False
-) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Return the values and errors of each curve that is drawn, or of its odd part."""
-    position = next(position for other, position in fit.model.places() if other is effect)
-    scale = effect.scale(fit.model.pendulum(fit.value))
-    covariance = fit.covariance()[position, position]
-    each = [effect.curves(one, at) for one in np.eye(effect.sizes)]
-    if odd:
-        each = [0.5 * (one - one[:, ::-1]) for one in each]
-    drawn = np.stack(each, axis=2)
-    return {
-        name: (scale * columns @ fit.value[position], abs(scale) * _errors(columns, covariance))
-        for name, columns in zip(effect.drawn, drawn, strict=True)
-    }
+class Drawn(NamedTuple):
+    """A fitted curve as it is drawn.
+
+    Parameters
+    ----------
+    names
+        Of the curves over one argument.
+    at
+        The argument, shape (k,).
+    value
+        Of each curve, one after the other, shape (m,).
+    covariance
+        Shape (m, m).
+    gain
+        The value by the whitened readings that the curve is to describe, shape (m, n + 1).
+    readings
+        These: what the fit leaves, with the curve's own part, shape (n + 1,).
+    """
+
+    names: tuple[str, ...]
+    at: FloatArray
+    value: FloatArray
+    covariance: FloatArray
+    gain: FloatArray
+    readings: FloatArray
+
+    def curves(self, *, odd: bool = False) -> dict[str, tuple[FloatArray, FloatArray]]:
+        """Return the values and errors of each curve, or of its odd part, by name."""
+        whole = np.eye(len(self.at))
+        part = np.kron(np.eye(len(self.names)), 0.5 * (whole - whole[::-1]) if odd else whole)
+        each = zip(part @ self.value, _errors(np.asarray(part), self.covariance), strict=True)
+        rows = np.array(list(each)).reshape(len(self.names), -1, 2)
+        return {name: (row[:, 0], row[:, 1]) for name, row in zip(self.names, rows, strict=True)}
+
+
+def drawn_of(fit: Fit, effect: Curve, noise: Noise) -> Drawn:
+    """Draw a fitted curve: the smoothest that the readings allow, with its error band.
+
+    To first order about the fit, the readings r beside all other parameters are A f + noise, with
+    the values f at `_CURVE_POINTS` places. Before the readings f is an integrated Wiener process
+    of variance t beside any amount of what the law has itself, which is then taken off
+    (`Curve.smooth`), and t is unknown: with C = 1 + A K(t) A' each of `_SMOOTHNESS` counts by
+    sqrt(t/det C) exp(-r' C^-1 r/2). The 95 % band of such a curve holds 95 % of the truth over all
+    its places (Wahba, J. R. Stat. Soc. B 45, 133, 1983).
+    """
+    place = next(place for other, place in fit.model.places() if other is effect)
+    unit, described = effect.scale(fit.model.pendulum(fit.value)), fit.value[place]
+    spaced = np.geomspace if effect.over_logarithm else np.linspace
+    at = np.asarray(spaced(effect.knots[0], effect.knots[-1], _CURVE_POINTS))
+    curve, bent, beyond = effect.smooth(at)
+    described = fit.jacobian[:, place] @ described
+    readings = fit.residual + described
+    others = fit.jacobian.copy()
+    for index in (A, B, C):
+        # The curve's unit follows the losses; what is drawn does not.
+        moved = fit.value.copy()
+        moved[index] += max(1e-6 * abs(float(moved[index])), 1e-9)
+        grown = effect.scale(fit.model.pendulum(moved)) / unit - 1.0
+        others[:, index] -= described * grown / (moved[index] - fit.value[index])
+    others = others[:, [k for k in fit.free if not place.start <= k < place.stop]]
+    law, columns = span_of(others, 1e-11), whitened(fit, noise, curve, ((),)).T
+    basis, seen = np.linalg.qr(columns - law @ (law.T @ columns))
+    basis, seen = basis.T / fit.error_scale, seen / fit.error_scale
+    told = basis @ readings
+    fitted, costs = [], []
+    for variance in _SMOOTHNESS:
+        prior = variance * bent + _LAWS * (np.eye(len(bent)) - beyond)
+        spread = np.eye(len(seen)) + seen @ prior @ seen.T
+        gain = np.linalg.solve(spread, seen @ prior).T
+        fitted.append((gain, prior - gain @ seen @ prior))
+        chi2 = told @ np.linalg.solve(spread, told)
+        # No standard deviation is likelier than another before the readings, up to the largest.
+        costs.append(chi2 + np.linalg.slogdet(spread)[1] - math.log(variance))
+    weights = np.exp(-0.5 * (np.array(costs) - min(costs)))
+    weights /= weights.sum()
+    gains, covariances = zip(*fitted, strict=True)
+    gain = np.tensordot(weights, gains, 1)
+    apart = np.array(gains) @ told - gain @ told
+    covariance = np.tensordot(weights, covariances, 1) + (weights * apart.T) @ apart
+    law = np.zeros(len(bent))
+    if effect.is_torque:
+        # It swings about where the whole torque is zero: there the angle is.
+        pendulum, model_at = fit.model.pendulum(fit.value), at
+        law = pendulum.torque(at) / pendulum.angular_frequency**2
+        rest = float(np.interp(0.0, law + unit * gain @ told, at))
+        at = np.linspace(at[0] - min(rest, 0.0), at[-1] - max(rest, 0.0), len(at))
+        law = pendulum.torque(at + rest) / pendulum.angular_frequency**2
+        moved = np.array([np.interp(at + rest, model_at, one) for one in np.eye(len(at))]).T
+        own = effect.smooth(at)[0].beyond_the_law()
+        beyond, law = own @ own.T @ moved, own @ own.T @ law
+    gain, covariance = unit * beyond @ gain @ basis, unit**2 * beyond @ covariance @ beyond.T
+    return Drawn(effect.drawn, at, law + gain @ readings, covariance, gain, readings)
 
 
 def _local_exponent(fit: Fit, effect: Curve, value: FloatArray, at: FloatArray) -> FloatArray:

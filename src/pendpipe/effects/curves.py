@@ -53,14 +53,22 @@ class Curve(Effect):
     """Returns where the basis functions have their peaks."""
     unit: ClassVar[Callable[[Pendulum, Span], float]]
     """Returns what may reasonably be there, in the unit of `ordinate`."""
+    taken: ClassVar[Callable[[FloatArray, Pendulum], Sequence[FloatArray]]]
+    """Returns what the law (or a straight sensor) has itself, at values of the argument: the curve
+    is what is beyond it."""
     powers: ClassVar[Mapping[str, int]] = {}
     """Of the angle, by term, where it has a formula."""
     along: ClassVar[Callable[[Any], FloatArray]]
     """Returns the argument, from a motion or a sampled motion."""
 
-    def __init__(self, span: Span, coefficients: FloatArray | None = None) -> None:
+    def __init__(
+        self,
+        span: Span,
+        coefficients: FloatArray | None = None,
+        knots: FloatArray | None = None,
+    ) -> None:
         self.span = span
-        self.knots = type(self).make_knots(span)
+        self.knots = type(self).make_knots(span) if knots is None else knots
         self.basis_size = len(self.drawn) * len(self.knots)
         self.coefficients = np.eye(self.basis_size) if coefficients is None else coefficients
         self.sizes = self.coefficients.shape[1]  # type: ignore[misc]
@@ -82,6 +90,32 @@ class Curve(Effect):
     def reduced(self, coefficients: FloatArray) -> Curve:
         """Return the same with fewer combinations."""
         return type(self)(self.span, coefficients)
+
+    def beyond_the_law(self) -> FloatArray:
+        """Return combinations of one curve's knots that the law has not, orthonormal columns."""
+        taken = np.column_stack(type(self).taken(self.knots, self.span.pendulum))
+        whole, _ = np.linalg.qr(taken, mode="complete")
+        return np.asarray(whole[:, taken.shape[1] :])
+
+    def smooth(self, at: FloatArray) -> tuple[Curve, FloatArray, FloatArray]:
+        """Return the curve by its values at many places, and how they vary before any reading.
+
+        Returns
+        -------
+        curve
+            With knots there.
+        bent
+            Covariance of an integrated Wiener process and of a slope as large.
+        beyond
+            Projects out what the law has.
+        """
+        count, several = len(at), np.eye(len(self.drawn))
+        curve = type(self)(self.span, np.eye(count * len(self.drawn)), at)
+        # Its second differences are independent, of a variance as the cube of their spacing.
+        bent = np.linalg.pinv(np.diff(np.eye(count), 2, axis=0) * count**1.5)
+        straight, own = np.linspace(-1.0, 1.0, count), curve.beyond_the_law()
+        rough, beyond = bent @ bent.T + np.outer(straight, straight), own @ own.T
+        return curve, np.asarray(np.kron(several, rough)), np.asarray(np.kron(several, beyond))
 
     def curves(self, values: FloatArray, at: FloatArray) -> FloatArray:
         """Return the values of all curves `drawn`, in their reasonable units, a row each."""
@@ -113,12 +147,29 @@ class Curve(Effect):
         return 1e-3
 
 
+def _constant(at: FloatArray, _: Pendulum) -> Sequence[FloatArray]:
+    return [np.ones_like(at)]
+
+
+def _torque_of_the_law(at: FloatArray, pendulum: Pendulum) -> Sequence[FloatArray]:
+    return [np.ones_like(at), pendulum.torque(at)]
+
+
+def _losses_of_the_law(at: FloatArray, _: Pendulum) -> Sequence[FloatArray]:
+    return [at, np.ones_like(at), 1.0 / at]
+
+
+def _straight(at: FloatArray, _: Pendulum) -> Sequence[FloatArray]:
+    return [np.ones_like(at), at]
+
+
 def follows(
     how: How,
     along: Callable[[Any], FloatArray],
     make_knots: Callable[[Span], FloatArray],
     unit: Callable[[Pendulum, Span], float],
     base: type[Curve] = Curve,
+    taken: Callable[[FloatArray, Pendulum], Sequence[FloatArray]] = _constant,
     **attributes: Any,
 ) -> Callable[[Callable[..., FloatArray]], type[Curve]]:
     """Declare a curve by the function through which it enters.
@@ -132,7 +183,7 @@ def follows(
         The method.
     along
         The curve's argument, from a motion or a sampled motion.
-    make_knots, unit
+    make_knots, unit, taken
         As in `Curve`.
     base
         How it is drawn: straight between knots, or a `Polynomial`.
@@ -147,7 +198,7 @@ def follows(
             drawn = curve.scale(pendulum) * curve.curves(values, along(moving))
             return np.asarray(function(moving, pendulum, *drawn))
 
-        own = {how: method, "make_knots": make_knots, "unit": unit, "along": along}
+        own = {how: method, "make_knots": make_knots, "unit": unit, "along": along, "taken": taken}
         return subclass(base, function.__name__, function.__doc__, own | attributes)
 
     return declare
@@ -209,6 +260,7 @@ def share_of_swing(share: float, _: Pendulum, span: Span) -> float:
     attrgetter("angle"),
     angles,
     partial(share_of_swing, 0.1),
+    taken=_torque_of_the_law,
     identifier="unnamed-restoring",
     name="a restoring torque of unknown form",
     equation=r"\omega^2 x \to \omega^2 x + F(x)",
@@ -232,6 +284,10 @@ class Polynomial(Curve):
         super().__init__(span, np.eye(len(self.powers)) if coefficients is None else coefficients)
         self.basis_size = len(self.powers)
 
+    def smooth(self, at: FloatArray) -> tuple[Curve, FloatArray, FloatArray]:
+        """Return that of a torque of any form: the band is to hold others too."""
+        return restoring_curve(self.span).smooth(at)
+
     def curves(self, values: FloatArray, at: FloatArray) -> FloatArray:
         """Return the sum of the terms."""
         of = at / self.span.first_amplitude
@@ -253,6 +309,7 @@ class Polynomial(Curve):
     attrgetter("amplitude"),
     partial(amplitudes, 15),
     usual_loss_rate,
+    taken=_losses_of_the_law,
     over_logarithm=True,
     identifier="unnamed-damping",
     name="a loss that depends on the amplitude in an unknown way",
@@ -342,6 +399,7 @@ def drive_curve(
     attrgetter("angle"),
     angles,
     partial(share_of_swing, 0.05),
+    taken=_straight,
     identifier="unnamed-measurement",
     name="a sensor curve of unknown form",
     equation=r"y = x + s(x)",
