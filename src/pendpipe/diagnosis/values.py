@@ -283,8 +283,8 @@ _CURVE_POINTS: Final = 61
 """Of a drawn curve: ten between its knots."""
 _SMOOTHNESS: Final = np.exp(np.linspace(-20.0, 6.0, 53))
 """Variances of a curve's change of slope: standard deviations from 1e-4 to 20 of what is usual."""
-_LAWS: Final = 100.0
-"""Variance of what of a curve the law has: the readings tell it, or it is the law's."""
+_LAWS: Final = 1.0
+"""Variance of what of a curve the law has: that of what is usual."""
 
 
 def curve_values(fit: Fit, effect: Curve, noise: Noise, unit: str = "rad") -> dict[str, Any]:
@@ -404,7 +404,8 @@ def drawn_of(fit: Fit, effect: Curve, noise: Noise) -> Drawn:
         # It swings about where the whole torque is zero: there the angle is.
         pendulum, model_at = fit.model.pendulum(fit.value), at
         law = pendulum.torque(at) / pendulum.angular_frequency**2
-        rest = float(np.interp(0.0, law + unit * gain @ told, at))
+        there = unit * effect.curves(fit.value[place], at)[0]
+        rest = float(np.interp(0.0, law + there, at)) if np.all(np.diff(law + there) > 0.0) else 0.0
         at = np.linspace(at[0] - min(rest, 0.0), at[-1] - max(rest, 0.0), len(at))
         law = pendulum.torque(at + rest) / pendulum.angular_frequency**2
         moved = np.array([np.interp(at + rest, model_at, one) for one in np.eye(len(at))]).T

@@ -488,7 +488,7 @@ def _curves(drawn: Mapping[str, Any]) -> Iterator[Panel]:
     label = f"{name[:1].upper()}{name[1:]}" + (f" ({pretty_unit(short)})" if short else "")
     about = {"xlabel": argument, "xmargin": 0.01}
     own = about | {"ylabel": "\n".join(textwrap.wrap(label, 26))}
-    title = textwrap.fill(drawn["summary"] or drawn["name"], 70)
+    title = textwrap.fill(drawn["summary"] or drawn["name"], 58)
     own["title"] = title[:1].upper() + title[1:]
     yield Panel(marks, own, key=2 * (len(marks) > 3), lift=1.1 + 0.09 * title.count("\n"))
     if "local_exponent" in drawn:
