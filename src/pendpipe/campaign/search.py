@@ -329,7 +329,7 @@ def _found(fit: JointFit, scan: _Scan) -> Found | None:
 
 
 def _beside_each_other(answer: CampaignSearch, level: float) -> CampaignSearch:
-    """Weigh each effect beside all others; one that they make needless, or a better one, goes in.
+    """Weigh each effect beside all others; drop what is not needed, take what is better.
 
     The order in which effects were added is none of nature's.
     """

@@ -331,7 +331,7 @@ class Cause:
 
 
 def causes_of(found: Sequence[FoundEffect]) -> list[Cause]:
-    """Return what is said of each effect: three names together at most, the likeliest first."""
+    """Return what is said of each effect: three names together at most, the most likely first."""
     room, said = _MOST_NAMES, dict[int, Cause]()
     for effect in sorted(found, key=lambda each: -class_of(each)[0][0]):
         said[id(effect)] = cause = _cause(effect, room)
