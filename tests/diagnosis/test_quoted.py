@@ -203,7 +203,7 @@ def test_q_is_told_where_the_motion_from_other_values_turns_more_often() -> None
 def softening() -> Diagnosis:
     """A torque that softens by x|x|: others take its place, and differ in the small swings."""
     effect = by_identifier("amplitude-linear-stiffness")
-    readings = Model(TIME_S, INTERVAL_S, (effect,)).reading(np.append(TRUTH, [-0.2]))
+    readings = Model(TIME_S, INTERVAL_S, (effect,)).reading(np.append(TRUTH, [-0.5]))
     return diagnose_recording(recording(readings, 2), restoring="linear")
 
 
@@ -255,7 +255,7 @@ def test_a_set_of_effects_whose_fit_is_stuck_is_no_description(
 
 @pytest.mark.slow
 def test_what_chance_excludes_is_no_description_beside_one_that_leaves_noise() -> None:
-    """With 6 % for "none of these"; the bare law lies many errors of the descriptions away."""
+    """With 5 % for "none of these"; the bare law lies many errors of the descriptions away."""
     outcome = softening()
     found = outcome.search
     assert found.steps[0].weights[-1] > LISTED

@@ -440,12 +440,12 @@ def _worth_refitting(found: Sequence[Lead], phase_lost: bool, most: int, wide: b
     best = _rank(leads[0])
     part = 0.9 if phase_lost else _SCORE_MARGIN_AT_BOUND if wide else _SCORE_MARGIN
     near = [lead for lead in leads if _rank(lead) > best - NEAR - part * best]
-    if phase_lost:
-        near = near[: most + 2]
-    else:
-        # Curves lead in many misfits; they don't count in the number of named effects.
-        names = [lead for lead in near if lead.effect.kind != "unnamed"][:most]
-        near = [lead for lead in near if lead.effect.kind == "unnamed" or lead in names]
+    # Several forms of one effect count as one. Curves lead in many misfits; but for a lost phase
+    # they don't count beside names.
+    told = [lead for lead in near if phase_lost or lead.effect.kind != "unnamed"]
+    first = list(dict.fromkeys(lead.effect.identifier for lead in told))
+    first = first[: most + 2 if phase_lost else most]
+    near = [lead for lead in near if lead not in told or lead.effect.identifier in first]
     # Always refitted: parameters that the user holds (few), and where the phase is lost bearing
     # friction and drag, which every pendulum has.
     asked = [
