@@ -265,6 +265,18 @@ def test_what_chance_excludes_is_no_description_beside_one_that_leaves_noise() -
     assert abs(bare / (2.0 * math.pi) - FREQUENCY_HZ) > 5.0 * given.sd
 
 
+def test_where_no_description_has_a_motion_the_search_s_own_is_quoted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Five effects beside a gross misfit may share so much that each set has less than 5 %."""
+    found = diagnosed("frequency-drift").search
+    monkeypatch.setattr("pendpipe.diagnosis.quoted._known", lambda _: {})
+    monkeypatch.setattr("pendpipe.diagnosis.quoted._fitted", lambda *_: None)
+    (alone,) = descriptions_of(found)
+    assert alone.probability == 1.0
+    assert alone.fit.value == pytest.approx(found.fit.value)
+
+
 def test_a_number_is_the_mean_of_the_descriptions_and_its_variance_holds_their_spread() -> None:
     outcome = diagnosed("frequency-drift")
     numbers = [

@@ -60,7 +60,8 @@ _Chosen = tuple[_Choice, ...]
 def descriptions_of(found: Hypothesis) -> list[Description]:
     """Fit each description of a probability of 5 % and more, the most probable first.
 
-    Where some leave only noise, these alone. Of a recording that lacks nothing it is the fit.
+    Where some leave only noise, these alone. Of a recording that lacks nothing it is the fit, and
+    where none of them has a motion it is the search's own.
     """
     choices = [_choices(step) for step in found.steps]
     sets = [
@@ -79,6 +80,8 @@ def descriptions_of(found: Hypothesis) -> list[Description]:
         fit = known.get(key) or _fitted(found, chosen, [known[other] for other in near])
         if fit is not None:
             described.append(Description(probability, with_errors(fit, found.data, found.noise)))
+    if not described:
+        return [Description(1.0, with_errors(found.fit, found.data, found.noise))]
     return [each for each in described if each.fit.scatter is None] or described
 
 
