@@ -101,7 +101,7 @@ def test_a_torque_of_two_terms_is_told_by_its_coefficients(
     )
     curve = kind(Model(TIME_S, INTERVAL_S).evaluate(TRUTH).span)
     fit = refine(Model(TIME_S, INTERVAL_S, (curve,)), data, noise, np.append(TRUTH, [0.0, 0.0]))
-    told = curve_told(fit, curve, noise, unit)
+    told = curve_told(fit, curve, drawn_of(fit, curve, noise), unit)
     for name, truth in terms.items():
         found = told["polynomial"][name]
         assert abs(found.value - truth) < 3.0 * found.sd
@@ -121,7 +121,7 @@ def test_what_is_only_noise_is_told_nowhere() -> None:
     curve = restoring_curve(fit.at.span)
     model = fit.model.adding(curve)
     found = refine(model, data, noise, np.append(fit.value, np.zeros(curve.sizes)))
-    assert curve_told(found, curve, noise, "rad")["summary"] == ""
+    assert curve_told(found, curve, drawn_of(found, curve, noise), "rad")["summary"] == ""
 
 
 @pytest.mark.parametrize(("name", "drawn"), [("sensor-cubic", True), ("tone-pickup", False)])

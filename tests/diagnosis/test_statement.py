@@ -23,7 +23,7 @@ from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.rivals import near_harmonic_by_chance
 from pendpipe.diagnosis.seen import Seen
 from pendpipe.diagnosis.summary import Change, Summary, numbers_of, test_of as measurement_of
-from pendpipe.diagnosis.values import constants_of, curve_values
+from pendpipe.diagnosis.values import constants_of, curve_values, drawn_of
 from pendpipe.dynamics.any_law import Motion
 from pendpipe.dynamics.eq8 import OMEGA, TIME, A, B, C
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
@@ -553,7 +553,7 @@ def fitted(kind: type[Curve], cubic: float) -> tuple[Fit, Curve, Noise]:
 def test_a_loss_curve_is_the_missing_loss() -> None:
     """A loss rate of k y^2, beyond the a y + b + c/y that Eq. 14 takes of it."""
     fit, effect, noise = fitted(damping_curve, CUBIC)
-    found = curve_values(fit, effect, noise)
+    found = curve_values(fit, effect, drawn_of(fit, effect, noise))
     at = found["at"]
     law = np.column_stack([at, np.ones_like(at), 1.0 / at])
     expected = CUBIC * at**2
@@ -602,7 +602,7 @@ def test_a_curve_says_where_and_how_large_it_is(
     readings = model.adding(curve).reading(start) + white(3, rms=faint)
     data, noise = prepared(readings, rms=faint)
     fit = refine(model.adding(curve), data, noise, start)
-    told = curve_told(fit, curve, noise, unit)
+    told = curve_told(fit, curve, drawn_of(fit, curve, noise), unit)
     assert told["summary"].startswith(says)
     assert bool(told["summary"]) == bool(says)
     at = told["at"]
@@ -646,7 +646,7 @@ def test_what_acts_on_the_motion_of_a_gyroscope_has_the_units_of_an_angle() -> N
 
 def test_a_drive_has_two_curves() -> None:
     fit, effect, noise = fitted(drive_curve, 0.0)
-    found = curve_values(fit, effect, noise, "m")
+    found = curve_values(fit, effect, drawn_of(fit, effect, noise), "m")
     assert len(found["value"]) == len(found["quadrature"]) == len(found["at"])
     # Nothing was driven: nothing is seen.
     assert np.all(np.abs(found["value"]) <= 4.0 * found["sd"] + 1e-12)

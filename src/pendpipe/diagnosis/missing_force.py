@@ -19,7 +19,6 @@ from pendpipe.answer import percent
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.detect import detect, prepare
 from pendpipe.diagnosis.hypothesis import Hypothesis, Step, undrawn
-from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, loses_phase, with_errors
 from pendpipe.diagnosis.rivals import Rival, refit_leads
 from pendpipe.diagnosis.values import Drawn, curve_values, drawn_of
@@ -43,7 +42,8 @@ def force_of(found: Hypothesis, step: Step) -> dict[str, Any] | None:
     winner = step.winner
     effect = winner.effect
     if isinstance(effect, Curve):
-        return curve_told(found.fit, effect, found.noise, found.data.unit)
+        shown = drawn_of(found.fit, effect, found.noise)
+        return curve_told(found.fit, effect, shown, found.data.unit)
     likely = zip(step.weights[1:-1], step.mates, strict=True)
     drawn = [mate for _, mate in sorted(likely, key=lambda each: -each[0]) if mate.drawn]
     drawn += sorted((each for each in step.rivals if each.drawn), key=lambda each: -each.evidence)
@@ -56,8 +56,8 @@ def force_of(found: Hypothesis, step: Step) -> dict[str, Any] | None:
     curve = drawn[0].effect
     assert isinstance(curve, Curve)
     fit = with_errors(drawn[0].fit, found.data, found.noise)
-    told = curve_told(fit, curve, found.noise, found.data.unit)
-    named = seen_as(found.fit, fit, drawn_of(fit, curve, found.noise))
+    shown = drawn_of(fit, curve, found.noise)
+    told, named = curve_told(fit, curve, shown, found.data.unit), seen_as(found.fit, fit, shown)
     return {**told, "named": named, "named_as": effect.name}
 
 
@@ -115,7 +115,7 @@ def _work(power: FloatArray, motion: Motion) -> FloatArray:
     return np.diff(motion.clock.integral(power)[:, [0, -1]], axis=1)
 
 
-def curve_told(fit: Fit, effect: Curve, noise: Noise, unit: str) -> dict[str, Any]:
+def curve_told(fit: Fit, effect: Curve, drawn: Drawn, unit: str) -> dict[str, Any]:
     """Return a fitted curve as `curve_values` does, with its ``name`` and a clause, ``summary``.
 
     The clause says where and how large it is: of the points beyond their 95 % band on one side,
@@ -123,7 +123,7 @@ def curve_told(fit: Fit, effect: Curve, noise: Noise, unit: str) -> dict[str, An
     over the angle, that within the least of these; of a loss which part of the whole loss there it
     is. Where none of them stands out over all knots it is empty.
     """
-    found, drawn = curve_values(fit, effect, noise, unit), drawn_of(fit, effect, noise)
+    found = curve_values(fit, effect, drawn, unit)
     axes = (found[name].partition(", ") for name in ("argument", "ordinate"))
     (along, _, per), (_, _, across) = axes
     told, most, whole = "", 0.0, found["at"]

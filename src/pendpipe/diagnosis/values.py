@@ -287,39 +287,6 @@ _LAWS: Final = 1.0
 """Variance of what of a curve the law has: that of what is usual."""
 
 
-def curve_values(fit: Fit, effect: Curve, noise: Noise, unit: str = "rad") -> dict[str, Any]:
-    """Return a fitted curve with its error band.
-
-    Parameters
-    ----------
-    fit
-        The extended model, the curve in it.
-    effect
-        The curve.
-    noise
-        Of the readings.
-    unit
-        Of the readings: ``"rad"``, ``"rad/s"``, or ``"m"`` for a displacement.
-
-    Returns
-    -------
-    dict
-        ``argument`` and ``ordinate`` (each with its unit after a comma), ``at``, ``value``
-        and ``sd``, shape (k,). A drive has ``quadrature`` and ``quadrature_sd`` besides; a
-        loss by amplitude ``local_exponent`` and ``local_exponent_sd``.
-    """
-    drawn = drawn_of(fit, effect, noise)
-    argument, ordinate = effect.axes(unit)
-    found: dict[str, Any] = {"argument": argument, "ordinate": ordinate, "at": drawn.at}
-    for name, (value, sd) in drawn.curves().items():
-        prefix = f"{name}_" if name != "value" else ""
-        found |= {name: value, f"{prefix}sd": sd}
-    if isinstance(effect, damping_curve):
-        exponent = _with_errors(fit, lambda value: _local_exponent(fit, effect, value, drawn.at))
-        found["local_exponent"], found["local_exponent_sd"] = exponent
-    return found
-
-
 class Drawn(NamedTuple):
     """A fitted curve as it is drawn.
 
@@ -353,6 +320,38 @@ class Drawn(NamedTuple):
         each = zip(part @ self.value, _errors(np.asarray(part), self.covariance), strict=True)
         rows = np.array(list(each)).reshape(len(self.names), -1, 2)
         return {name: (row[:, 0], row[:, 1]) for name, row in zip(self.names, rows, strict=True)}
+
+
+def curve_values(fit: Fit, effect: Curve, drawn: Drawn, unit: str = "rad") -> dict[str, Any]:
+    """Return a fitted curve with its error band.
+
+    Parameters
+    ----------
+    fit
+        The extended model, the curve in it.
+    effect
+        The curve.
+    drawn
+        Of these (`drawn_of`).
+    unit
+        Of the readings: ``"rad"``, ``"rad/s"``, or ``"m"`` for a displacement.
+
+    Returns
+    -------
+    dict
+        ``argument`` and ``ordinate`` (each with its unit after a comma), ``at``, ``value``
+        and ``sd``, shape (k,). A drive has ``quadrature`` and ``quadrature_sd`` besides; a
+        loss by amplitude ``local_exponent`` and ``local_exponent_sd``.
+    """
+    argument, ordinate = effect.axes(unit)
+    found: dict[str, Any] = {"argument": argument, "ordinate": ordinate, "at": drawn.at}
+    for name, (value, sd) in drawn.curves().items():
+        prefix = f"{name}_" if name != "value" else ""
+        found |= {name: value, f"{prefix}sd": sd}
+    if isinstance(effect, damping_curve):
+        exponent = _with_errors(fit, lambda value: _local_exponent(fit, effect, value, drawn.at))
+        found["local_exponent"], found["local_exponent_sd"] = exponent
+    return found
 
 
 def drawn_of(fit: Fit, effect: Curve, noise: Noise) -> Drawn:
