@@ -17,6 +17,8 @@ from pendpipe.files import plain
 from pendpipe_challenge.motion import Motion
 from pendpipe_challenge.torques import of_rates
 
+from ..recordings import white
+
 INPUTS = Path(__file__).parents[3] / "shared" / "inputs4"
 SHARED = pytest.mark.skipif(not INPUTS.exists(), reason="../shared is not here")
 
@@ -37,8 +39,7 @@ def decay(name: str, seed: int = 1, lasts_s: float = 90.0) -> FitResult:
     """The fit of a decay by Eq. 8, which the law's torque or loss leaves."""
     time = np.arange(0.1, lasts_s, 0.02)
     angle = Motion(BASE | LAWS[name], FIRST).run(np.r_[0.0, time]).angle_rad[1:]
-    noise = 2e-4 * np.random.default_rng(seed).standard_normal(len(time))
-    return pp.fit(pp.Recording(time, displacement_m=angle + noise))
+    return pp.fit(pp.Recording(time, displacement_m=angle + white(seed, len(time), 2e-4)))
 
 
 @cache
@@ -79,8 +80,7 @@ def test_a_period_that_drifts_with_time_is_its_mean(relaxed: float, seed: int) -
     late = 0.003 * (np.expm1(-relaxed * passed) / math.expm1(-relaxed) if relaxed else passed)
     clock = time + np.cumsum(0.02 * late)
     angle = Motion(BASE, FIRST).run(np.r_[0.0, time]).angle_rad[1:]
-    noise = 2e-4 * np.random.default_rng(seed).standard_normal(len(time))
-    fit = pp.fit(pp.Recording(clock, displacement_m=angle + noise))
+    fit = pp.fit(pp.Recording(clock, displacement_m=angle + white(seed, len(time), 2e-4)))
     assert fit.refuted
     mean = 2.0 * math.pi / OMEGA * float(np.ptp(clock) / np.ptp(time))
     assert abs(fit["period"].value - mean) < 3.0 * fit["period"].sd < 0.005 * mean
@@ -92,8 +92,11 @@ def test_a_bent_scale_is_in_the_error_of_q() -> None:
     for bent in (0.0, -0.1):
         time = np.arange(0.1, 90.0, 0.02)
         angle = Motion(BASE | LAWS["x + 0.1 x|x|"], FIRST).run(np.r_[0.0, time]).angle_rad[1:]
-        noise = 2e-4 * np.random.default_rng(3).standard_normal(len(time))
-        fit = pp.fit(pp.Recording(time, displacement_m=angle * (1.0 + bent * angle**2) + noise))
+        fit = pp.fit(
+            pp.Recording(
+                time, displacement_m=angle * (1.0 + bent * angle**2) + white(3, len(time), 2e-4)
+            )
+        )
         assert fit.refuted
         for each in fit.quality_factors:
             found = each.quality_factor

@@ -26,6 +26,8 @@ from pendpipe.dynamics import Eq8, Release, sample, turning_points
 from pendpipe.errors import InputError
 from pendpipe.physics import Fluid, Rod, Sphere
 
+from ..recordings import white
+
 # The light says what the misfit does to the numbers, and not how loud it is.
 
 OMEGA, LOSS = 6.0, 0.03
@@ -40,8 +42,9 @@ def viscous(time_s: FloatArray, phase: FloatArray | None = None) -> FloatArray:
 
 
 def fitted(values: FloatArray, rms: float = 1e-4, **options: Any) -> FitResult:
-    noise = rms * np.random.default_rng(5).standard_normal(len(values))
-    recording = pp.Recording(time_s=TIME[: len(values)], angle_rad=values + noise)
+    recording = pp.Recording(
+        time_s=TIME[: len(values)], angle_rad=values + white(5, len(values), rms)
+    )
     return pp.fit(recording, restoring="linear", **options)
 
 
@@ -152,8 +155,9 @@ def test_small_and_noisy_swings_of_the_law_itself_are_green() -> None:
     """Sixteen decays whose turning points show Q to 3 to 10 %: chance lights nothing."""
     lights = []
     for seed in range(16):
-        noise = 2e-3 * np.random.default_rng(seed).standard_normal(len(TIME))
-        recording = pp.Recording(time_s=TIME, angle_rad=0.1 * viscous(TIME) / 0.3 + noise)
+        recording = pp.Recording(
+            time_s=TIME, angle_rad=0.1 * viscous(TIME) / 0.3 + white(seed, len(TIME), 2e-3)
+        )
         lights.append(pp.fit(recording).light)
     assert lights.count("green") >= 15
 
@@ -200,8 +204,11 @@ def test_the_amplitude_falls_to_a_half_and_to_1_e_when_the_fit_says(name: str) -
     """Of six known decays the turning points themselves, without noise, tell when."""
     law, first = KNOWN[name]
     time = np.arange(0.0, 100.0, 0.02)
-    noise = 1e-4 * np.random.default_rng(3).standard_normal(len(time))
-    fit = pp.fit(pp.Recording(time, angle_rad=sample(law, Release(-0.1, first), time) + noise))
+    fit = pp.fit(
+        pp.Recording(
+            time, angle_rad=sample(law, Release(-0.1, first), time) + white(3, len(time), 1e-4)
+        )
+    )
     found = fit.damping()
     own = turning_points(law, Release(-0.1, first), until_s=600.0)
     when = make_interp_spline(-np.log(np.abs(own.angle_rad)), own.time_s, k=3)
@@ -247,8 +254,9 @@ def test_a_scale_that_may_be_off_enters_amplitude_a_and_c_and_the_period_by_sin_
 def decay(lasts_s: float, noise_rad: float) -> pp.Recording:
     """Viscous: 0.3 rad, omega 6 1/s, b 0.03 1/s."""
     time_s = np.arange(0.0, lasts_s, 0.02)
-    noise = noise_rad * np.random.default_rng(2).standard_normal(len(time_s))
-    angle_rad = 0.3 * np.exp(-0.03 * time_s) * np.cos(6.0 * time_s) + noise
+    angle_rad = 0.3 * np.exp(-0.03 * time_s) * np.cos(6.0 * time_s) + white(
+        2, len(time_s), noise_rad
+    )
     return pp.Recording(time_s=time_s, angle_rad=angle_rad)
 
 
@@ -276,8 +284,11 @@ def test_a_share_has_its_error_or_its_limit(part: float) -> None:
     """Viscous loss beside dry friction: however small it is, what is seen is not called unseen."""
     law = Eq8(OMEGA, viscous=0.03 * part, coulomb=0.2 * 0.03 * (1.0 - part))
     time = np.arange(0.0, 45.0, 0.02)
-    noise = 1e-4 * np.random.default_rng(3).standard_normal(len(time))
-    fit = pp.fit(pp.Recording(time, displacement_m=sample(law, Release(-0.1, 0.3), time) + noise))
+    fit = pp.fit(
+        pp.Recording(
+            time, displacement_m=sample(law, Release(-0.1, 0.3), time) + white(3, len(time), 1e-4)
+        )
+    )
     large, printed = fit.quality_factors[0], str(fit)
     share = large.losses["b"]
     assert share.value > 2.0 * share.sd

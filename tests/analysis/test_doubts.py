@@ -10,6 +10,8 @@ import pendpipe as pp
 from pendpipe.arrays import FloatArray
 from pendpipe.facts import KINDS, Fact
 
+from ..recordings import white
+
 TIME = np.arange(3000) / 50.0
 RECORDING = pp.Recording(
     time_s=TIME, displacement_m=0.1 * np.exp(-0.02 * TIME) * np.cos(2 * np.pi * TIME / 1.3) + 1e-7
@@ -72,8 +74,7 @@ def test_two_readings_a_cycle_are_never_green(tmp_path: Path, per_cycle: float) 
     [({"length_m": 42.0}, "length in m"), ({"length_m": 0.42}, None), ({"gravity": 9.81}, None)],
 )
 def test_a_length_in_the_wrong_unit_is_asked_about(given: dict[str, float], said: str) -> None:
-    noise = 1e-4 * np.random.default_rng(1).standard_normal(len(TIME))
-    angle = 0.1 * np.exp(-0.02 * TIME) * np.cos(2 * np.pi * TIME / 1.3) + noise
+    angle = 0.1 * np.exp(-0.02 * TIME) * np.cos(2 * np.pi * TIME / 1.3) + white(1, len(TIME), 1e-4)
     fit = pp.fit(pp.Recording(time_s=TIME, angle_rad=angle), restoring="linear", **given)  # type: ignore[arg-type]
     assert fit.light == ("amber" if said else "green")
     assert (said or "green") in (fit.light_reason if said else fit.light)

@@ -21,6 +21,8 @@ from pendpipe.estimate import Estimate
 from pendpipe.physics.decay import amplitude
 from pendpipe.readings import only_falls
 
+from ..recordings import white
+
 # The paper's route: Eq. 14 and Eq. 8's frequency from turning points.
 
 OMEGA = 2.0 * math.pi * 0.516
@@ -361,8 +363,7 @@ def test_below_a_q_of_three_no_cycle_is_left(quality: float, light: str) -> None
 def test_a_strongly_damped_swing_is_solved_exactly_and_has_no_q() -> None:
     """All readings give T0 and the losses of Eq. 8 at a Q of 1.8: they need no cycle."""
     law, time = Eq8(5.0, 1.7, 0.0, 1.25, 0.0, "sine"), np.arange(0.0, 8.0, 0.01)
-    noise = 1e-4 * np.random.default_rng(1).standard_normal(len(time))
-    angle = sample(law, Release(-0.05, 1.0), time) + noise
+    angle = sample(law, Release(-0.05, 1.0), time) + white(1, len(time), 1e-4)
     fit = pp.fit(pp.Recording(time_s=time, angle_rad=angle))
     assert (fit.method, fit.light) == ("waveform", "amber")
     assert "Q" not in fit.quotable

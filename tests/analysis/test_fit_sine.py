@@ -30,6 +30,7 @@ from pendpipe.physics.lengthening import elliptic
 from pendpipe.recording import Recording
 from pendpipe.solve import covariance
 
+from ..recordings import white
 from .test_one_fit import SHARED, pendulum, recorded
 
 OMEGA = 5.0
@@ -205,8 +206,7 @@ def test_an_angle_swings_by_sin_x_where_its_readings_cannot_tell() -> None:
     periods = []
     for seed in (1, 2):
         values = sample(law, Release(-0.2, 0.05), time)
-        noise = 5e-4 * np.random.default_rng(seed).standard_normal(len(time))
-        result = fit_recording(Recording(time, values + noise, "angle_rad"))
+        result = fit_recording(Recording(time, values + white(seed, len(time), 5e-4), "angle_rad"))
         assert result.restoring == "sine"
         assert abs(result.form.torque_odds or math.inf) < math.log(1000.0)
         assert result.form.other_frequency is not None
@@ -241,8 +241,9 @@ def test_what_is_held_is_held_with_sin_x() -> None:
 def test_a_position_swings_as_l_sin_x(length: Estimate | None) -> None:
     omega, time = math.sqrt(9.80665 / 0.6), np.arange(0.0, 40.0, 0.01)
     angle = sample(Eq8(omega, viscous=0.01, restoring="sine"), Release(-0.2, 0.5), time)
-    noise = 1e-4 * np.random.default_rng(3).standard_normal(len(time))
-    recording = Recording(time, 0.6 * np.sin(angle) + 0.02 + noise, "displacement_m")
+    recording = Recording(
+        time, 0.6 * np.sin(angle) + 0.02 + white(3, len(time), 1e-4), "displacement_m"
+    )
     result = fit_recording(recording, restoring="sine", length=length)
     assert (result.light, result["amplitude"].unit) == ("green", "rad")
     assert abs(result["frequency"].value - 0.5 * omega / math.pi) < 4.0 * result["frequency"].sd
@@ -285,8 +286,9 @@ def test_who_gives_the_length_has_said_that_it_is_a_pendulum(unit: str) -> None:
 def test_swings_too_small_to_tell_their_size_say_so() -> None:
     omega, time = math.sqrt(9.81 / 0.6), np.arange(0.0, 60.0, 0.02)
     angle = sample(Eq8(omega, viscous=0.01, restoring="sine"), Release(-0.2, 0.02), time)
-    noise = 1e-3 * np.random.default_rng(3).standard_normal(len(time))
-    recording = Recording(time, 4.0 * np.sin(angle) + noise, "reading", metadata={"unit": "m/s^2"})
+    recording = Recording(
+        time, 4.0 * np.sin(angle) + white(3, len(time), 1e-3), "reading", metadata={"unit": "m/s^2"}
+    )
     fit = pp.fit(recording, length_m=0.6)
     assert fit.restoring == "linear"
     assert "of these swings" in str(fit)
@@ -299,8 +301,7 @@ def test_a_length_by_another_g_is_no_cubic_torque() -> None:
     omega, time = math.sqrt(9.81 / 0.6), np.arange(0.0, 120.0, 0.02)
     law = Eq8(omega, 0.004, 0.002, 0.003, restoring="sine")
     position = 0.6 * np.sin(sample(law, Release(-0.2, 0.6), time))
-    noise = 5e-5 * np.random.default_rng(1).standard_normal(len(time))
-    recording = Recording(time, position + noise, "displacement_m")
+    recording = Recording(time, position + white(1, len(time), 5e-5), "displacement_m")
     assert pp.diagnose(recording, restoring="sine").verdict == "consistent"
     assert pp.diagnose(recording, length_m=0.6).verdict == "consistent"
     # Its turning points may have been measured before: a campaign's stages do so.
@@ -315,8 +316,7 @@ def test_a_rate_is_that_of_a_pendulum(amplitude: float) -> None:
     time, step = np.arange(0.0, 60.0, 0.01), 1e-6
     release = Release(-0.2, amplitude)
     rate = sample(law, release, time + step) - sample(law, release, time - step)
-    noise = 1e-3 * np.random.default_rng(3).standard_normal(len(time))
-    values = rate / (2.0 * step) + 0.01 + noise
+    values = rate / (2.0 * step) + 0.01 + white(3, len(time), 1e-3)
     recording = Recording(time, values, "reading", metadata={"unit": "rad/s"})
     result = fit_recording(recording)
     assert (result.restoring, result.light, result["amplitude"].unit) == ("sine", "green", "rad")

@@ -25,6 +25,8 @@ from pendpipe.api import fit
 from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording
 
+from ..recordings import white
+
 # A free decay is found where the pendulum swings by itself, and nowhere else.
 
 Floats = NDArray[np.float64]
@@ -160,8 +162,7 @@ def test_the_scatter_of_the_last_half_cycles_is_no_drive() -> None:
     time = np.arange(3000) / 7.4
     amplitude = 0.064 * np.exp(-8e-4 * time) / (1.0 + 0.05 * (1.0 - np.exp(-8e-4 * time)))
     for seed in range(40):
-        noise = 4e-4 * np.random.default_rng(seed).standard_normal(len(time))
-        values = amplitude * np.cos(3.857 * time + 0.157 * seed) + noise
+        values = amplitude * np.cos(3.857 * time + 0.157 * seed) + white(seed, len(time), 4e-4)
         found = find_free_decay(Recording(time, values, "angle_rad"))
         assert found.start_s < 3.3
         assert "driven: the amplitude is held up" not in reasons(found)
@@ -184,8 +185,7 @@ def test_mains_hum_hides_no_decay(hum_hz: float) -> None:
     time_s = np.arange(0.0, 40.0, 1e-3)
     swing = np.exp(-0.02 * time_s) * np.cos(2.0 * np.pi * 1.37 * time_s)
     hum = 0.2 * np.sin(2.0 * np.pi * hum_hz * time_s)
-    noise = 0.005 * np.random.default_rng(3).standard_normal(len(time_s))
-    fitted = pendpipe.fit(Recording(time_s, swing + hum + noise, "volts"))
+    fitted = pendpipe.fit(Recording(time_s, swing + hum + white(3, len(time_s), 0.005), "volts"))
     assert not fitted.cuts
     assert fitted["frequency"].value == pytest.approx(1.37, rel=1e-4)
     low, high = fitted["b"].bounds95
@@ -281,8 +281,7 @@ def test_dense_readings_change_nothing(wild: bool) -> None:
 
     def decay(rate: float) -> FreeDecay:
         time = np.arange(int(30.0 * rate)) / rate - 2.0
-        noise = 1e-3 * np.random.default_rng(5).standard_normal(len(time))
-        values = 0.3 * np.exp(-0.03 * time) * np.cos(OMEGA * time) + noise
+        values = 0.3 * np.exp(-0.03 * time) * np.cos(OMEGA * time) + white(5, len(time), 1e-3)
         values[len(time) // 3] += 50.0 * wild
         return find_free_decay(Recording(time, values, "angle_rad"))
 
@@ -422,8 +421,7 @@ def test_a_beat_that_first_grows_is_not_held_up_by_a_drive(phase: float) -> None
     early = np.cos(2.0 * np.pi * 0.70823 * time)
     late = np.cos(2.0 * np.pi * 0.7351 * time - phase)
     values = np.exp(-0.0235 * time) * (107.0 * early + 64.0 * late)
-    noise = 0.3 * np.random.default_rng(1).standard_normal(len(time))
-    read = np.round(500.0 + values + noise)
+    read = np.round(500.0 + values + white(1, len(time), 0.3))
     motion = Recording(time, read, "reading", metadata={"unit": "1"}, resolution=1.0)
     fit = pendpipe.fit(motion)
     assert fit.light_reason.startswith("two modes beat: 0.7082")
@@ -520,8 +518,7 @@ def test_a_decay_on_a_zero_that_relaxes_by_more_than_the_swing_is_found() -> Non
     time = np.arange(700) * 0.002
     zero = 1.6 + 0.9 * np.exp(-time / 0.8)
     swing = 0.55 * np.exp(-time / 1.2) * np.cos(2.0 * np.pi * time / 0.31)
-    noise = 5e-3 * np.random.default_rng(2).standard_normal(len(time))
-    found = find_free_decay(Recording(time, zero + swing + noise, "angle_rad"))
+    found = find_free_decay(Recording(time, zero + swing + white(2, len(time), 5e-3), "angle_rad"))
     assert found.half_cycles >= 7
     assert found.half_period_s == pytest.approx(0.155, rel=0.03)
 

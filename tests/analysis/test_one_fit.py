@@ -28,6 +28,7 @@ from pendpipe.recording import Recording, write_plain
 from pendpipe.report.class_table import Fitted, record
 
 from ..effects.integration import swung
+from ..recordings import white
 
 # One law, one fit, one test of it: the numbers of clean recordings at any rate, noise and loss.
 
@@ -36,9 +37,7 @@ ONE_HERTZ = 2.0 * math.pi
 
 def clean(law: Eq8, amplitude: float, time_s: FloatArray, noise: float, seed: int = 1) -> Any:
     """A recording of the law with white noise."""
-    white = np.random.default_rng(seed).standard_normal(len(time_s))
-    values = sample(law, Release(-0.2, amplitude, 0.002), time_s) + noise * white
-    return pp.Recording(time_s, angle_rad=values)
+    return recorded(sample(law, Release(-0.2, amplitude, 0.002), time_s), time_s, noise, seed)
 
 
 def pull(result: Any, name: str, truth: float) -> float:
@@ -157,8 +156,7 @@ def test_a_perfect_recording_is_refuted_at_the_level_of_all_questions_together()
     motion = sample(law, Release(-0.3, 0.068), time)
     p_values, lights = [], []
     for seed in range(60):
-        noise = 1e-4 * np.random.default_rng(seed).standard_normal(len(time))
-        result = pp.fit(pp.Recording(time, angle_rad=motion + noise))
+        result = pp.fit(pp.Recording(time, angle_rad=motion + white(seed, len(time), 1e-4)))
         p_values.append(result.fit_p_value)
         lights.append(result.light)
     assert "red" not in lights
@@ -210,8 +208,7 @@ def test_a_zero_that_drifts_by_a_line_is_followed(count: int) -> None:
     """1 V on -0.03 V/s: the zero moves by three swings."""
     time = np.arange(count) * (100.0 / count)
     motion = sample(Eq8(ONE_HERTZ, viscous=ONE_HERTZ / 386.0), Release(-0.1, 1.0), time)
-    noise = 1e-3 * np.random.default_rng(0).standard_normal(count)
-    result = pp.fit(pp.Recording(time, volts=motion - 0.03 * time + noise))
+    result = pp.fit(pp.Recording(time, volts=motion - 0.03 * time + white(0, count, 1e-3)))
     assert result.light == "green"
     assert result.zero_drift.unit == "V/s"
     assert abs(result.zero_drift.value + 0.03) < 4.0 * result.zero_drift.sd
@@ -294,8 +291,7 @@ def pendulum(
 
 
 def recorded(values: FloatArray, time_s: FloatArray, rms: float, seed: int = 1) -> Recording:
-    noise = rms * np.random.default_rng(seed).standard_normal(len(values))
-    return Recording(time_s, values + noise, "angle_rad")
+    return Recording(time_s, values + white(seed, len(values), rms), "angle_rad")
 
 
 def true_loss(amplitude: float, **losses: float) -> float:

@@ -22,6 +22,8 @@ from pendpipe.dynamics import Eq8, Release, sample, turning_points
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.recording import Quantity, Recording
 
+from ..recordings import white
+
 # Turning points measured from all readings, against those of the engine.
 
 OMEGA = 2.0 * math.pi * 0.516
@@ -262,8 +264,9 @@ def test_circular_error(amplitude: float, allowed: float) -> None:
         method="DOP853",
     )
     time = np.arange(8000) * 0.005
-    noise = 1e-4 * np.random.default_rng(2).standard_normal(8000)
-    points = find_turning_points(Recording(time, run.sol(time)[0] + noise, "angle_rad"))
+    points = find_turning_points(
+        Recording(time, run.sol(time)[0] + white(2, 8000, 1e-4), "angle_rad")
+    )
     nearest = np.abs(run.t_events[0][:, None] - points.time_s).argmin(axis=0)
     truth = np.abs(run.y_events[0][nearest, 0])
     assert len(points) >= 30
@@ -330,9 +333,8 @@ def test_a_torsion_pendulum_and_what_is_no_angle_swing_beyond_pi(quantity: Quant
 def test_too_few_readings_in_a_cycle_are_refused_in_a_line(in_a_cycle: float) -> None:
     time = np.arange(400) / in_a_cycle
     angle = 0.2 * np.exp(-np.pi / 200.0 * time) * np.cos(2.0 * np.pi * time + 0.3)
-    noise = 1e-4 * np.random.default_rng(5).standard_normal(len(time))
     with pytest.raises(NotAnalysableError, match=r"too few readings|three half cycles|no motion"):
-        find_turning_points(Recording(time, angle + noise, "angle_rad"))
+        find_turning_points(Recording(time, angle + white(5, len(time), 1e-4), "angle_rad"))
 
 
 SWING = Eq8(2.0 * math.pi / 1.352, hysteretic=0.01, viscous=0.01, coulomb=1e-9)
@@ -411,8 +413,7 @@ def long_record(quality: float, seconds: float = 3000.0) -> tuple[Samples, float
     rate = math.pi / (2.0 * quality)
     time = np.arange(int(seconds * 106)) / 106.0
     motion = 0.068 * np.exp(-rate * time) * np.cos(math.pi * time + 0.3)
-    noise = NOISE * np.random.default_rng(1).standard_normal(len(time))
-    return Samples(time, motion + noise + 2e-3, "rad", None, NOISE), rate
+    return Samples(time, motion + white(1, len(time), NOISE) + 2e-3, "rad", None, NOISE), rate
 
 
 def exact_errors(points: TurningPoints, rate: float) -> tuple[FloatArray, FloatArray]:

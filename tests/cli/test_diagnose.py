@@ -15,6 +15,7 @@ from pendpipe.files import write_json
 from pendpipe.recording import Recording, write_plain
 
 from ..effects.integration import swung
+from ..recordings import white
 
 FREQUENCY_HZ, LINEAR = 0.9, 0.012
 NOISE_RAD = 1e-4
@@ -25,9 +26,10 @@ def pendulum(folder: Path, *, sine: bool, amplitude: float = 0.25) -> Path:
     """Write a decay of x'' = -omega^2 x - 2 b x' (or with sin x), with white noise."""
     torque = math.sin if sine else float
     angle = swung(TIME_S, amplitude, 2.0 * math.pi * FREQUENCY_HZ, LINEAR, torque=torque)[0]
-    noise = NOISE_RAD * np.random.default_rng(5).standard_normal(len(TIME_S))
     path = folder / f"{'sine' if sine else 'linear'}.csv"
-    write_plain(path, Recording(TIME_S, 0.01 + angle + noise, "angle_rad"))
+    write_plain(
+        path, Recording(TIME_S, 0.01 + angle + white(5, len(TIME_S), NOISE_RAD), "angle_rad")
+    )
     return path
 
 

@@ -32,6 +32,8 @@ from pendpipe.process import _AHEAD
 from pendpipe.readings import motion_of
 from pendpipe.recording import Recording, read_plain, write_plain
 
+from ..recordings import white
+
 # The lines of the README, the pages and the notebook do what they say.
 
 README = Path(__file__).parents[2] / "README.md"
@@ -41,8 +43,7 @@ README = Path(__file__).parents[2] / "README.md"
 def test_the_lines_of_the_readme_answer(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     mpl.use("Agg")
     time_s = np.arange(3000) / 50.0
-    noise = 1e-4 * np.random.default_rng(1).standard_normal(3000)
-    angle_rad = 0.1 * np.exp(-0.01 * time_s) * np.cos(4.0 * time_s) + noise
+    angle_rad = 0.1 * np.exp(-0.01 * time_s) * np.cos(4.0 * time_s) + white(1, 3000, 1e-4)
     lines = README.read_text().split("```python\n")[1].split("```")[0]
     names = {"time_s": time_s, "angle_rad": angle_rad}
     exec(lines, names)
@@ -96,8 +97,7 @@ def test_the_commands_of_the_pages_run(page: Path, tmp_path: Path) -> None:
     shutil.copytree(README.parent / "examples", tmp_path / "examples")
     (tmp_path / "data").mkdir()
     time_s = np.arange(600) / 20.0
-    noise = 1e-3 * np.random.default_rng(1).standard_normal(600)
-    angle_rad = 0.1 * np.exp(-0.02 * time_s) * np.cos(4.0 * time_s) + noise
+    angle_rad = 0.1 * np.exp(-0.02 * time_s) * np.cos(4.0 * time_s) + white(1, 600, 1e-3)
     for name in ("swing.csv", "data/rod.csv", "data/string.csv"):
         write_plain(tmp_path / name, pp.Recording(time_s, angle_rad, "angle_rad"))
     angles = "\n".join(f"{0.4 * step:g},{0.1 * step:g}" for step in range(-4, 5))
@@ -140,9 +140,8 @@ def test_every_cell_of_the_notebook_runs(monkeypatch: pytest.MonkeyPatch) -> Non
 def decay(number: int) -> pp.Recording:
     """A decay of some 70 swings whose damping rate names it."""
     time_s = np.arange(2048) / 30.0
-    noise = 1e-4 * np.random.default_rng(number).standard_normal(len(time_s))
     swing = 0.1 * np.exp(-0.004 * number * time_s) * np.cos(6.0 * time_s)
-    return pp.Recording(time_s=time_s, angle_rad=swing + noise)
+    return pp.Recording(time_s=time_s, angle_rad=swing + white(number, len(time_s), 1e-4))
 
 
 REST = pp.Recording(time_s=np.arange(500) / 30.0, angle_rad=np.zeros(500))
@@ -227,8 +226,7 @@ def angle(time_s: FloatArray) -> FloatArray:
 
 @pytest.fixture(scope="module")
 def fit() -> FitResult:
-    noise = NOISE * np.random.default_rng(3).standard_normal(len(TIME))
-    return pp.fit(TIME, angle(TIME) + noise, restoring="linear")
+    return pp.fit(TIME, angle(TIME) + white(3, len(TIME), NOISE), restoring="linear")
 
 
 def test_arrays_degrees_and_a_dataframe_give_the_same_fit(fit: FitResult) -> None:

@@ -15,13 +15,17 @@ from pendpipe.dynamics import Eq8, Release, sample, turning_points
 from pendpipe.errors import InputError
 from pendpipe.prediction import curves_of, decay_from, phase_of
 
+from ..recordings import white
+
 TIME = np.arange(0.0, 60.0, 0.02)
 
 
 def recorded(law: Eq8, release: float, seed: int = 0) -> pp.Recording:
     """A decay of a law with noise of a thousandth of the release."""
-    noise = 1e-3 * release * np.random.default_rng(seed).standard_normal(TIME.size)
-    return pp.Recording(time_s=TIME, angle_rad=sample(law, Release(0.0, release), TIME) + noise)
+    return pp.Recording(
+        time_s=TIME,
+        angle_rad=sample(law, Release(0.0, release), TIME) + white(seed, TIME.size, 1e-3 * release),
+    )
 
 
 SPRING = Eq8(5.0, viscous=0.05)

@@ -108,8 +108,9 @@ def test_at_the_nodes_of_a_beat_no_rows_are_lost() -> None:
     """There the phase turns by half a cycle; the modes are as large to 1 %, and read to 1."""
     time_s = np.round(np.arange(2070) * 0.0507, 3)
     low, high = (np.cos(2.0 * np.pi * f * time_s) for f in (0.70823, 0.7351))
-    noise = 0.3 * np.random.default_rng(1).standard_normal(len(time_s))
-    values = np.round(500.0 + 107.0 * np.exp(-0.0236 * time_s) * (low + 0.99 * high) + noise)
+    values = np.round(
+        500.0 + 107.0 * np.exp(-0.0236 * time_s) * (low + 0.99 * high) + white(1, len(time_s), 0.3)
+    )
     record = Recording(time_s, values, "reading", metadata={"unit": "1"}, resolution=1.0)
     found = diagnose_recording(record)
     assert found.effects[0].identifier == "second-mode"
@@ -132,8 +133,9 @@ def test_two_coupled_pendulums_are_two_modes_at_their_frequencies() -> None:
     low, high = omega, np.sqrt(omega**2 + 2.0 * kappa)
     envelope = 0.06 * np.exp(-loss * time_s)
     angle_rad = envelope * (np.cos(low * time_s) + np.cos(high * time_s))
-    noise = 3e-4 * np.random.default_rng(4).standard_normal(len(time_s))
-    found = diagnose_recording(Recording(time_s, angle_rad + noise, "angle_rad"))
+    found = diagnose_recording(
+        Recording(time_s, angle_rad + white(4, len(time_s), 3e-4), "angle_rad")
+    )
     assert [each.identifier for each in found.effects] == ["second-mode"]
     assert found.effects[0].probability > 0.95
     own, other = (
@@ -152,8 +154,7 @@ def test_a_pendulum_seen_from_the_side_shows_sin_x_and_no_bent_sensor() -> None:
     """In pixels, 300 of which are its length."""
     time_s = np.arange(0.0, 40.0, 0.02)
     angle = swung(time_s, 0.4, 4.1, 0.004, 0.015)[0]
-    noise = 1e-3 * np.random.default_rng(3).standard_normal(len(time_s))
-    values = 300.0 * (0.1 + np.sin(angle) + noise)
+    values = 300.0 * (0.1 + np.sin(angle) + white(3, len(time_s), 1e-3))
     answer = diagnose_recording(Recording(time_s, values, "reading", metadata={"unit": "pixels"}))
     names = [each.identifier for each in answer.effects]
     assert names[0] == "circular-error"
@@ -167,8 +168,7 @@ def test_a_brake_leaves_few_cycles_that_show_sin_x(torque: type) -> None:
     # Q = 10: the misfit is a line as wide as the loss, which is no noise of the readings.
     time_s = np.arange(0.0, 6.0, 0.01)
     angle = swung(time_s, 0.42, 4.6, 0.23, torque=torque)[0]
-    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(time_s))
-    answer = diagnose_recording(Recording(time_s, angle + noise, "angle_rad"))
+    answer = diagnose_recording(Recording(time_s, angle + white(1, len(time_s), 1e-3), "angle_rad"))
     assert [each.identifier for each in answer.effects] == ["circular-error"] * (torque is np.sin)
 
 

@@ -364,8 +364,7 @@ def clocked(swing: Swing, rows: IntArray, sizes: FloatArray, seed: int) -> Sampl
     late = np.zeros(len(stamps))
     late[rows] = sizes / RATE_HZ
     angle = np.interp(stamps + np.cumsum(late) + 1.0, swing.time_s, swing.angle)
-    noise = 1e-4 * np.random.default_rng(seed).standard_normal(len(stamps))
-    return Samples(stamps + 1.0, angle + noise, "rad", None, 1e-4)
+    return Samples(stamps + 1.0, angle + white(seed, len(stamps), 1e-4), "rad", None, 1e-4)
 
 
 @pytest.mark.parametrize("whole", [True, False])

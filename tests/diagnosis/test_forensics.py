@@ -40,7 +40,7 @@ from .faults import (
     rounded,
     speed,
 )
-from .records import FREQUENCY_HZ, hypothesis_of, null_fit, task_of
+from .records import FREQUENCY_HZ, hypothesis_of, null_fit, task_of, white
 
 # Each fault of the measurement is found, measured, and not taken for another.
 
@@ -508,8 +508,11 @@ def swing(time_s: FloatArray) -> FloatArray:
 
 
 def second_test(angle: FloatArray, seed: int) -> Confirmation:
-    noise = 2e-4 * np.random.default_rng(seed).standard_normal(len(angle))
-    return loss_confirmed(Samples(STAMPS, angle + noise, "rad", None, 2e-4), AT + 0.02, PERIOD_S)
+    return loss_confirmed(
+        Samples(STAMPS, angle + white(seed, len(angle), 2e-4), "rad", None, 2e-4),
+        AT + 0.02,
+        PERIOD_S,
+    )
 
 
 @pytest.mark.parametrize("lost_s", [0.03, -0.05, 0.07])

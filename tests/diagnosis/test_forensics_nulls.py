@@ -128,9 +128,8 @@ def test_rounding_does_not_imply_thin_tails() -> None:
 
 def ruled_by_rounding(seed: int, extra: FloatArray | float = 0.0) -> tuple[Fitted, float]:
     """A tenth of a step of noise, estimated as in a search; and the finding, in steps."""
-    noise = 0.1 * STEP_16 * np.random.default_rng(seed).standard_normal(AIR.count)
     clean = CLEAN.setdefault(AIR, AIR.model().reading(AIR.values()))
-    record = fitted(AIR, rounded(clean + noise, STEP_16) + extra)
+    record = fitted(AIR, rounded(clean + white(seed, AIR.count, 0.1 * STEP_16), STEP_16) + extra)
     fit, data, judged = settled(record.fit, record.data, record.noise, ())
     assert data.lattice is not None
     record = replace(record, fit=fit, data=data, noise=judged)

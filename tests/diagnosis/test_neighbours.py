@@ -211,8 +211,9 @@ def test_noise_is_not_described() -> None:
 def test_a_torque_with_the_square_of_the_swing_is_no_second_plane() -> None:
     time_s, kappa = np.arange(0.0, 40.0, 0.025), -0.0191
     angle = swung(time_s, 0.68, 4.54, 0.009, torque=lambda x: math.sin(x) + kappa * x * abs(x))[0]
-    noise = 5e-4 * np.random.default_rng(1).standard_normal(len(time_s))
-    outcome = diagnose_recording(Recording(time_s, angle + noise, "angle_rad"))
+    outcome = diagnose_recording(
+        Recording(time_s, angle + white(1, len(time_s), 5e-4), "angle_rad")
+    )
     names = [each.identifier for each in outcome.effects]
     assert names == ["circular-error", "amplitude-linear-stiffness"]
     found = outcome.effects[1].parameters["kappa"]

@@ -369,8 +369,7 @@ def test_red_noise_is_not_reported_as_a_drift() -> None:
     spectrum = 1.0 + np.where(frequency < 0.05, 0.05 / np.maximum(frequency, frequency[1]), 0.0)
     reported = 0
     for seed in range(5):
-        cosines = np.sqrt(spectrum) * np.random.default_rng(seed).standard_normal(len(TIME_S))
-        noise = NOISE_RAD * idct(cosines, norm="ortho")
+        noise = NOISE_RAD * idct(white(seed, len(TIME_S), np.sqrt(spectrum)), norm="ortho")
         found = diagnose_recording(Recording(TIME_S, CLEAN + noise, "angle_rad"))
         reported += any(effect.identifier in SLOW for effect in found.effects)
     assert binom.sf(reported - 1, 5, 0.01) > 1e-3

@@ -385,8 +385,7 @@ def test_an_instant_is_found_from_the_nearest_row(
     effect = by_identifier(identifier)
     truth = np.append(TRUTH, [size, instant])
     model = Model(LONG_S, 0.05)
-    noise_values = NOISE_RAD * np.random.default_rng(4).standard_normal(len(LONG_S))
-    readings = model.adding(effect).reading(truth) + noise_values
+    readings = model.adding(effect).reading(truth) + white(4, len(LONG_S), NOISE_RAD)
     data = gather(
         LONG_S, readings, step=None, unit="rad", counts=False, period_s=1.1, noise_rms=NOISE_RAD
     )

@@ -278,8 +278,9 @@ def test_a_position_is_diagnosed_as_l_sin_x() -> None:
     """Read as x it has another torque; the angle of its fit lacks nothing."""
     omega, time_s = 5.0, np.arange(0.0, 60.0, 0.01)
     law = Eq8(omega, 0.02, 0.004, 0.006, 1e-3, restoring="sine")
-    noise = 1e-5 * np.random.default_rng(1).standard_normal(len(time_s))
-    position = 9.80665 / omega**2 * np.sin(sample(law, Release(-0.2, 0.5), time_s)) + noise
+    position = 9.80665 / omega**2 * np.sin(sample(law, Release(-0.2, 0.5), time_s)) + white(
+        1, len(time_s), 1e-5
+    )
     recording = pp.Recording(time_s, position, "displacement_m")
     found = pp.diagnose(recording, restoring="sine")
     assert (found.verdict, found.restoring) == ("consistent", "sine")
@@ -364,8 +365,9 @@ def test_q_beside_a_zero_that_creeps_is_that_of_the_decay() -> None:
     b, omega, time_s = 0.0334, 3.7, np.arange(1500) / 25.0
     angle = 0.3 * np.exp(-b * time_s) * np.cos(omega * time_s)
     creeping = angle + 0.25 * (1.0 - np.exp(-time_s / 20.0))
-    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(time_s))
-    found = diagnose_recording(Recording(time_s, creeping + noise, "angle_rad"), restoring="linear")
+    found = diagnose_recording(
+        Recording(time_s, creeping + white(1, len(time_s), 1e-3), "angle_rad"), restoring="linear"
+    )
     shown = [each for each in found.summary.consequence if each.quantity == "Q"]
     assert len(shown) == 3
     for each in shown:

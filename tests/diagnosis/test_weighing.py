@@ -42,6 +42,7 @@ from .records import (
     other_engine,
     prepared,
     recording,
+    white,
 )
 
 # The rivals that share the probability of an effect: those that the final noise allows.
@@ -229,8 +230,7 @@ def test_of_a_long_record_blocks_of_cycles_tell_all(monkeypatch: pytest.MonkeyPa
     long = Pendulum(quality_factor=1500.0, quadratic=0.0, coulomb=0.0, count=30_000)
     kicked = Model(long.times(), 1.0 / long.rate_hz, effects=(by_identifier("impulse"),))
     values = np.append(long.values(), [2e-3, 700.0])
-    noise = 1e-3 * np.random.default_rng(18).standard_normal(long.count)
-    record = fitted(long, kicked.reading(values) + noise)
+    record = fitted(long, kicked.reading(values) + white(18, long.count, 1e-3))
     effects = [e for e in applicable(CATALOGUE, record.fit, "eq8", "rad") if not e.spectral]
     found = {}
     for name, most in (("part", 16_000), ("whole", 10**9)):

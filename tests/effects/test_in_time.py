@@ -20,6 +20,7 @@ from pendpipe.effects.model import Model, pendulum_of
 from pendpipe.effects.two_modes import two_modes
 from pendpipe.recording import Recording
 
+from ..recordings import white
 from .lock_in import lock_in
 from .pendulums import OMEGA, baseline, evaluated, plain, reading, times
 
@@ -333,8 +334,11 @@ def test_frequencies_losses_and_amplitudes_are_within_their_errors() -> None:
     pulls = []
     keep = (MODES_TIME < 30.0) | (MODES_TIME > 33.0)
     for seed in range(20):
-        noise = 0.02 * np.random.default_rng(seed).standard_normal(len(MODES_TIME))
-        modes = two_modes(MODES_TIME[keep], (0.1 + motion(MODES_TIME) + noise)[keep], 0.61)
+        modes = two_modes(
+            MODES_TIME[keep],
+            (0.1 + motion(MODES_TIME) + white(seed, len(MODES_TIME), 0.02))[keep],
+            0.61,
+        )
         assert modes is not None
         for mode, truth in zip(modes, TRUTH, strict=True):
             found = (mode.frequency, mode.loss, mode.amplitude)
@@ -355,8 +359,9 @@ def test_one_pendulum_is_not_two_modes() -> None:
 
 def test_a_mode_without_loss_is_driven() -> None:
     free = 0.3 * np.exp(-0.05 * MODES_TIME) * np.cos(5.0 * MODES_TIME)
-    noise = 1e-3 * np.random.default_rng(2).standard_normal(len(MODES_TIME))
-    modes = two_modes(MODES_TIME, free + 0.2 * np.cos(5.3 * MODES_TIME) + noise, 0.62)
+    modes = two_modes(
+        MODES_TIME, free + 0.2 * np.cos(5.3 * MODES_TIME) + white(2, len(MODES_TIME), 1e-3), 0.62
+    )
     assert modes is not None
     assert [mode.driven for mode in modes] == [False, True]
 
@@ -377,8 +382,9 @@ def test_a_beat_may_begin_at_its_node_or_at_its_top(phase: float) -> None:
     time = np.arange(700) * 0.0507
     first = 0.1 * np.exp(-0.018 * time) * np.cos(2.0 * np.pi * 0.7075 * time)
     second = 0.09 * np.exp(-0.018 * time) * np.cos(2.0 * np.pi * 0.7345 * time + phase)
-    noise = 8e-4 * np.random.default_rng(3).standard_normal(len(time))
-    points, _ = measure_recording(Recording(time, first + second + noise, "angle_rad"), "the test")
+    points, _ = measure_recording(
+        Recording(time, first + second + white(3, len(time), 8e-4), "angle_rad"), "the test"
+    )
     assert any(note.startswith("two modes beat: 0.707") for note in points.notes)
 
 

@@ -33,6 +33,7 @@ from pendpipe.figures.style import save
 from pendpipe.recording import Recording, read_plain
 
 from ..effects.integration import swung
+from ..recordings import white
 
 # Figures 7 and 8 and each record's decay, and what they work out for themselves.
 
@@ -267,8 +268,7 @@ TIME_S = np.arange(1500) / 15.0
 def outcome() -> Any:
     """The diagnosis of a pendulum taken for a spring, integrated by scipy."""
     angle = swung(TIME_S, AMPLITUDE, OMEGA, LINEAR)[0]
-    noise = NOISE_RAD * np.random.default_rng(5).standard_normal(len(TIME_S))
-    record = Recording(TIME_S, angle + noise, "angle_rad")
+    record = Recording(TIME_S, angle + white(5, len(TIME_S), NOISE_RAD), "angle_rad")
     return diagnose_recording(record, restoring="linear")
 
 
@@ -315,8 +315,9 @@ def test_the_envelope_follows_a_zero_that_drifts() -> None:
     time_s = np.arange(1500) / 25.0
     creep = 0.25 * (1.0 - np.exp(-time_s / 20.0))
     swing = 0.3 * np.exp(-0.0334 * time_s)
-    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(time_s))
-    recording = Recording(time_s, swing * np.cos(3.7 * time_s) + creep + noise, "angle_rad")
+    recording = Recording(
+        time_s, swing * np.cos(3.7 * time_s) + creep + white(1, len(time_s), 1e-3), "angle_rad"
+    )
     upper = diagnosis.draw_decay(shown(diagnose(recording, restoring="linear"))).axes[0]
     inside = (time_s > 5.0) & (time_s < 55.0)
     for line, expected in zip(upper.lines[-2:], (creep + swing, creep - swing), strict=True):
@@ -420,8 +421,9 @@ def test_the_figure_of_the_decay_is_small_at_any_length(tmp_path: Path) -> None:
     """Each of 9,000 readings as a path of its own would take 1.3 MB."""
     time_s = np.arange(9000) / 15.0
     swing = 0.1 * np.exp(-time_s / 200.0) * np.cos(OMEGA * time_s)
-    noise = NOISE_RAD * np.random.default_rng(6).standard_normal(len(time_s))
-    long = shown(diagnose_recording(Recording(time_s, swing + noise, "angle_rad")))
+    long = shown(
+        diagnose_recording(Recording(time_s, swing + white(6, len(time_s), NOISE_RAD), "angle_rad"))
+    )
     assert len(long.data) > 8000
     svg, _ = save(diagnosis.draw_decay(long), tmp_path / "decay")
     assert svg.stat().st_size < 400_000

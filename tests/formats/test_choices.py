@@ -36,6 +36,7 @@ from pendpipe.formats.text import column_of_clock_times
 from pendpipe.formats.words import Role
 from pendpipe.recording import sample_rate
 
+from ..recordings import white
 from .cases import ANGLE, DEGREES, RATE, TIME, each, read_as, same, swing, text, with_lines
 
 # What is chosen of a file: columns, runs, spans and units, by the reader and by its user.
@@ -86,8 +87,7 @@ def test_runs_side_by_side_do_not_mix_and_are_offered_by_name(tmp_path: Path) ->
 
 
 def test_of_runs_side_by_side_the_last_is_read_where_it_alone_swings(tmp_path: Path) -> None:
-    still = 1e-3 * np.random.default_rng(5).standard_normal(len(TIME))
-    rows = each("{:.4f};{:.6f};{:.4f};{:.6f}\n", TIME, still, TIME + 0.5, ANGLE)
+    rows = each("{:.4f};{:.6f};{:.4f};{:.6f}\n", TIME, white(5, len(TIME), 1e-3), TIME + 0.5, ANGLE)
     recording = read_as(tmp_path, "t1;theta1;t2;theta2\n" + rows)
     same(recording)
     assert recording.time_s[0] == pytest.approx(0.5)

@@ -12,6 +12,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.formats import ReadOptions, inspect, read
 from pendpipe.formats.lost import without_marks
 
+from ..recordings import white
 from .cases import (
     ANGLE,
     DEGREES,
@@ -819,8 +820,11 @@ def test_a_swing_is_read_from_a_table_with(tmp_path: Path, case: str) -> None:
 def decay(cycle: float, quality: float, middle: float = 0.0, count: int = 1200) -> FloatArray:
     """A free decay of amplitude 1, with a thousandth of noise; `cycle` readings a cycle."""
     turn = 2.0 * np.pi * np.arange(count) / cycle
-    noise = 1e-3 * np.random.default_rng(int(10 * cycle + quality)).standard_normal(count)
-    return np.asarray(middle + np.exp(-0.5 * turn / quality) * np.cos(turn + 0.3) + noise)
+    return np.asarray(
+        middle
+        + np.exp(-0.5 * turn / quality) * np.cos(turn + 0.3)
+        + white(int(10 * cycle + quality), count, 1e-3)
+    )
 
 
 def lost(values: FloatArray) -> list[int]:

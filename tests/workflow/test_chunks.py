@@ -23,6 +23,8 @@ from pendpipe.configuration.load import Campaign, Record, load_campaign, read_co
 from pendpipe.stages.archive import gathered, made_in
 from pendpipe.stages.chunks import STAGES, Stage, chunks_of, refused, split, tidy
 
+from ..recordings import white
+
 RECORDS = ("one", "two", "three", "four", "five")
 ORDER = ("acquire", "calibrate", "turning-points", "fit")
 
@@ -49,8 +51,9 @@ def test_an_added_record_changes_one_chunk(words: set[str], batch: int, added: s
 
 def write_decay(path: Path, seed: int) -> None:
     time_s = np.arange(1200) / 60.0
-    noise = 1e-4 * np.random.default_rng(seed).standard_normal(len(time_s))
-    angle = 0.05 * np.exp(-time_s / (8.0 + seed)) * np.cos(2.0 * np.pi * time_s) + noise
+    angle = 0.05 * np.exp(-time_s / (8.0 + seed)) * np.cos(2.0 * np.pi * time_s) + white(
+        seed, len(time_s), 1e-4
+    )
     rows = zip(time_s.tolist(), angle.tolist(), strict=True)
     text = "time_s,angle_rad\n" + "".join(f"{t:.6f},{y:.7f}\n" for t, y in rows)
     path.write_text(text, encoding="utf-8")
