@@ -492,24 +492,23 @@ def test_random_delays_leave_the_rate_within_its_error(late_s: float) -> None:
     assert np.std(pulls) < 1.3
 
 
-def test_a_device_that_is_wrong_by_a_factor_is_believed_the_clock() -> None:
-    scans = np.arange(1.0, 501.0)
-    found = measure_rate(scans / 120.0, scans, 60.0)
-    assert found.chosen == "measured"
-    assert found.rate_hz == pytest.approx(120.0)
-
-
-def test_a_quartz_is_believed_before_the_time_stamps() -> None:
-    """10 parts in a million cannot be seen in five seconds."""
-    scans = np.arange(1.0, 501.0)
-    assert measure_rate(scans / (100.0 * (1 + 1e-5)), scans, 100.0).rate_hz == 100.0
-
-
-def test_too_few_arrivals_measure_nothing() -> None:
-    scans = np.arange(1.0, 36.0)
-    found = measure_rate(scans / 100.0, scans, 90.0)
-    assert np.isnan(found.measured_hz)
-    assert found.rate_hz == 90.0
+@pytest.mark.parametrize(
+    ("count", "told_hz", "true_hz", "used_hz"),
+    [
+        (500, 60.0, 120.0, 120.0),
+        # A quartz is believed before the stamps: 10 parts in a million can't be seen in 5 s.
+        (500, 100.0, 100.0 * (1 + 1e-5), 100.0),
+        # Too few arrivals measure nothing.
+        (35, 90.0, 100.0, 90.0),
+    ],
+)
+def test_the_stamps_are_believed_where_they_know_more_than_the_device(
+    count: int, told_hz: float, true_hz: float, used_hz: float
+) -> None:
+    scans = np.arange(1.0, count + 1.0)
+    found = measure_rate(scans / true_hz, scans, told_hz)
+    assert found.rate_hz == pytest.approx(used_hz, rel=1e-9)
+    assert np.isnan(found.measured_hz) == (count < 36)
 
 
 def steady(scans: FloatArray, rate_hz: float = 100.0) -> FloatArray:

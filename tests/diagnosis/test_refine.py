@@ -312,11 +312,11 @@ def values(rates: dict[str, float]) -> FloatArray:
     return found
 
 
-def held(rates: dict[str, float], parts: list[str]) -> Fit:
+def held(rates: dict[str, float], parts: list[str], *indices: int) -> Fit:
     """A fit that holds parts of b at what they are."""
     data, noise = prepared(other_engine(values(rates)) + white(4))
     model = Model(TIME_S, INTERVAL_S, parts={part: rates[part] for part in parts})
-    return refine(model, data, noise, values(rates))
+    return refine(model, data, noise, values(rates), held=indices)
 
 
 def by_part(fit: Fit, part: str) -> FloatArray:
@@ -335,8 +335,11 @@ def by_part(fit: Fit, part: str) -> FloatArray:
 
 
 @pytest.mark.parametrize("part", [HYSTERETIC, VISCOUS])
-def test_beside_a_held_other_part_it_is_that_part_s_derivative(part: str) -> None:
-    fit = held(RATES, [HYSTERETIC, VISCOUS])
+@pytest.mark.parametrize("alone", [False, True])
+def test_beside_a_held_other_part_it_is_that_part_s_derivative(part: str, alone: bool) -> None:
+    """Where the other part is nothing, it is all of b."""
+    nothing = dict.fromkeys(RATES, 0.0) | {part: 1e-2}
+    fit = held(nothing, [part], B) if alone else held(RATES, [HYSTERETIC, VISCOUS])
     expected = by_part(fit, part)
     found = ReleasedParameter(NAMES[part]).sensitivity(fit)[:-1]
     assert found == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
@@ -351,17 +354,6 @@ def test_beside_a_fitted_other_part_it_adds_what_that_one_lacks(part: str) -> No
     spanned = np.column_stack([fit.jacobian[:-1, B], own])
     left = both - spanned @ np.linalg.lstsq(spanned, both, rcond=None)[0]
     assert np.abs(left).max() < 1e-4 * np.abs(both).max()
-
-
-@pytest.mark.parametrize("part", [HYSTERETIC, VISCOUS])
-def test_where_the_other_part_is_nothing_it_is_all_of_b(part: str) -> None:
-    rates = dict.fromkeys(RATES, 0.0) | {part: 1e-2}
-    data, noise = prepared(other_engine(values(rates)) + white(4))
-    model = Model(TIME_S, INTERVAL_S, parts={part: rates[part]})
-    fit = refine(model, data, noise, values(rates), held=[B])
-    expected = by_part(fit, part)
-    found = ReleasedParameter(NAMES[part]).sensitivity(fit)[:-1]
-    assert found == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
 
 
 # Between the instants of a scan: the fit must end where one from the truth does.

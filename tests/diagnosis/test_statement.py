@@ -169,32 +169,50 @@ def test_what_has_no_name_is_told_by_what_its_candidates_share_and_a_test_of_it(
     assert measure in summary.decide_by
 
 
+def drifting(own: float, rival: str, p: float) -> FoundEffect:
+    """A clock that drifts by a known rate, and its rival."""
+    drift = named("clock-drift", rate=Estimate(1.66e-4, 1.1e-5, "1/s"))
+    return replace(drift, probability=own, indistinguishable=(Mate(rival, p),))
+
+
+STRAIGHT = Estimate(STRAIGHT_S, 0.0, "s")
+SECOND_MODE = {
+    "q_cosine": Estimate(3e-3, 1e-4, "rad"),
+    "q_sine": Estimate(4e-3, 1e-4, "rad"),
+    "f_2": Estimate(1.5, 0.01, "Hz"),
+    "tau_2": Estimate(0.0, 970000.0, "s"),
+}
+
+
 @pytest.mark.parametrize(
-    ("own", "rival", "p", "missing"),
+    ("effect", "missing"),
     [
-        (0.8, "frequency-drift", 0.1, ("drifting clock (rate 1.66(11) × 10⁻⁴ s⁻¹; 80 %)",)),
-        (0.1, "frequency-drift", 0.85, ("drifting frequency (85 %)",)),
-        (0.5, "frequency-drift", 0.4, ("drifting clock or drifting frequency (90 % together)",)),
-        (0.1, "unnamed-restoring", 0.8, ("a restoring torque of unknown form (80 %)",)),
+        (drifting(0.8, "frequency-drift", 0.1), "drifting clock (rate 1.66(11) × 10⁻⁴ s⁻¹; 80 %)"),
+        # Where a rival leads the class, what was fitted says nothing.
+        (drifting(0.1, "frequency-drift", 0.85), "drifting frequency (85 %)"),
         (
-            0.6,
-            "frequency-drift",
-            0.04,
-            ("probably drifting clock (rate 1.66(11) × 10⁻⁴ s⁻¹; 60 %)",),
+            drifting(0.5, "frequency-drift", 0.4),
+            "drifting clock or drifting frequency (90 % together)",
+        ),
+        (drifting(0.1, "unnamed-restoring", 0.8), "a restoring torque of unknown form (80 %)"),
+        (
+            drifting(0.6, "frequency-drift", 0.04),
+            "probably drifting clock (rate 1.66(11) × 10⁻⁴ s⁻¹; 60 %)",
+        ),
+        # They have words and units and differ from zero; a drift that is straight has no time.
+        (
+            named("second-mode", **SECOND_MODE),
+            "second mode (amplitude 0.00500(10) rad, frequency 1.500(10) Hz; 90 %)",
+        ),
+        (
+            named("offset-drift", rate=Estimate(1e-5, 1e-7, "rad/s"), tau=STRAIGHT),
+            "drifting offset (rate 1.000(10) × 10⁻⁵ rad/s; 90 %)",
         ),
     ],
 )
 @pytest.mark.structure
-def test_numbers_are_those_of_what_is_named(
-    own: float, rival: str, p: float, missing: tuple[str, ...]
-) -> None:
-    """Where a rival leads the class, the parameters of the effect that was fitted say nothing."""
-    fitted = replace(
-        named("clock-drift", rate=Estimate(1.66e-4, 1.1e-5, "1/s")),
-        probability=own,
-        indistinguishable=(Mate(rival, p),),
-    )
-    assert diagnosis(fitted).summary.missing == missing
+def test_numbers_are_those_of_what_is_named(effect: FoundEffect, missing: str) -> None:
+    assert diagnosis(effect).summary.missing == (missing,)
 
 
 @pytest.mark.structure
@@ -458,22 +476,6 @@ def test_the_table_shows_the_numbers_as_fitted_and_with_what_is_missing() -> Non
     assert "1.098901(28) s" in new
 
 
-@pytest.mark.structure
-def test_parameters_have_words_and_units_and_differ_from_zero() -> None:
-    effect = replace(
-        likely("second-mode", 0.9),
-        parameters={
-            "q_cosine": Estimate(3e-3, 1e-4, "rad"),
-            "q_sine": Estimate(4e-3, 1e-4, "rad"),
-            "f_2": Estimate(1.5, 0.01, "Hz"),
-            "tau_2": Estimate(0.0, 970000.0, "s"),
-        },
-    )
-    assert diagnosis(effect).summary.missing == (
-        "second mode (amplitude 0.00500(10) rad, frequency 1.500(10) Hz; 90 %)",
-    )
-
-
 @pytest.mark.parametrize(
     "effect", [each for each in CATALOGUE if each.parameters], ids=lambda each: each.identifier
 )
@@ -492,15 +494,6 @@ def test_every_number_of_an_effect_is_printed_in_words_with_error_and_unit(effec
     words = [each.word for each in effect.parameters if not each.name.endswith("_sine")]
     assert len(set(words)) == len(words)
     assert printed.count(", ") == len(words) - 1
-
-
-@pytest.mark.structure
-def test_a_drift_that_is_straight_says_no_time_constant() -> None:
-    straight = Estimate(STRAIGHT_S, 0.0, "s")
-    drift = named("offset-drift", rate=Estimate(1e-5, 1e-7, "rad/s"), tau=straight)
-    assert diagnosis(drift).summary.missing == (
-        "drifting offset (rate 1.000(10) × 10⁻⁵ rad/s; 90 %)",
-    )
 
 
 @pytest.mark.slow
