@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 from unittest.mock import Mock
 
 import numpy as np
@@ -461,24 +460,21 @@ def test_the_table_of_a_campaign_is_that_without_a_foreign_record(
         read_configuration(path) | {"records": str(ROOT / "config/records.tsv")}, path
     )
 
-    def separated(percent: float, without: str = "") -> dict[str, Any]:
-        readings = odd_record(record, percent, 3)
-        results = [
-            RecordResult(row, fit_of(*reading), {"volts_per_radian": None})
-            for row, *reading in zip(campaign.records, *readings, strict=True)
-            if row.record != without
-        ]
-        out = left_out(campaign, results)
-        # As a campaign's diagnosis writes it.
-        far = [{"record": name, "sigma": float(said.split()[-2])} for name, said in out.items()]
-        write_json(diagnosis := tmp_path / "campaign_diagnosis.json", {"left_out": far})
-        assert left_out(campaign, results, diagnosis) == out
-        return separate_campaign(campaign, results, out)
-
-    found, sound = separated(100.0), separated(100.0, without=record)
-    (reason,) = found["left_out"].values()
+    results = [
+        RecordResult(row, fit_of(*reading), {"volts_per_radian": None})
+        for row, *reading in zip(campaign.records, *odd_record(record, 100.0, 3), strict=True)
+    ]
+    out = left_out(campaign, results)
+    ((name, reason),) = out.items()
+    assert name == record
     assert reason.startswith(f"off the others: {record} +")
-    assert sound["left_out"] == {}
+    # As a campaign's diagnosis writes it.
+    far = {"record": record, "sigma": float(reason.split()[-2])}
+    write_json(diagnosis := tmp_path / "campaign_diagnosis.json", {"left_out": [far]})
+    assert left_out(campaign, results, diagnosis) == out
+    found = separate_campaign(campaign, results, out)
+    sound = separate_campaign(campaign, [one for one in results if one.record.record != record], {})
+    assert found["left_out"] == out
     for name in ("hysteretic_coefficient", "loss_torque", "benchmark"):
         assert found[name] == sound[name] is not None
     quality = {entry["record"]: entry.get("quality_factor_viscous") for entry in found["records"]}

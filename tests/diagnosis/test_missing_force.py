@@ -124,6 +124,7 @@ def test_what_is_only_noise_is_told_nowhere() -> None:
     assert curve_told(found, curve, drawn_of(found, curve, noise), "rad")["summary"] == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "drawn"), [("sensor-cubic", True), ("tone-pickup", False)])
 def test_every_effect_but_a_line_has_its_curve(name: str, drawn: bool) -> None:
     (effect,) = diagnosed(name).effects

@@ -228,6 +228,7 @@ def test_a_misplaced_pivot_is_a_rival_of_the_quadratic_sensor_that_it_looks_like
         assert {"sensor-quadratic", "camera-geometry"} <= found
 
 
+@pytest.mark.slow
 def test_a_rare_name_that_looks_like_nothing_that_was_found_is_no_rival() -> None:
     outcome = diagnosed("equilibrium-step")
     rare = {effect.identifier for effect in CATALOGUE if effect.rare}
@@ -277,6 +278,7 @@ def test_a_name_is_tried_on_credit_if_it_takes_a_good_part_of_the_misfit(
 # Prediction of blocks that a model was not fitted to.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", tuple(VALUES))
 def test_the_right_effect_predicts_better(name: str) -> None:
     found = diagnosed(name).held_out
@@ -314,6 +316,7 @@ def test_an_effect_that_is_not_there_predicts_no_better(name: str) -> None:
     assert found.gain < 3.0 * found.gain_sd + 1.0
 
 
+@pytest.mark.slow
 def test_a_law_that_only_noise_asked_for_predicted_worse_and_a_right_one_does_not() -> None:
     """A line fitted to noise loses about a unit of ln p for its two sizes."""
     fit, data, noise = null_fit()

@@ -207,6 +207,7 @@ def softening() -> Diagnosis:
     return diagnose_recording(recording(readings, 2), restoring="linear")
 
 
+@pytest.mark.slow
 def test_each_description_has_the_effects_of_its_name_and_its_probability() -> None:
     outcome = diagnosed("frequency-drift")
     found = outcome.search
@@ -265,6 +266,7 @@ def test_what_chance_excludes_is_no_description_beside_one_that_leaves_noise() -
     assert abs(bare / (2.0 * math.pi) - FREQUENCY_HZ) > 5.0 * given.sd
 
 
+@pytest.mark.slow
 def test_where_no_description_has_a_motion_the_search_s_own_is_quoted(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -277,6 +279,7 @@ def test_where_no_description_has_a_motion_the_search_s_own_is_quoted(
     assert alone.fit.value == pytest.approx(found.fit.value)
 
 
+@pytest.mark.slow
 def test_a_number_is_the_mean_of_the_descriptions_and_its_variance_holds_their_spread() -> None:
     outcome = diagnosed("frequency-drift")
     numbers = [
@@ -293,6 +296,7 @@ def test_a_number_is_the_mean_of_the_descriptions_and_its_variance_holds_their_s
         assert given.sd**2 == pytest.approx(p @ (sds**2 + (values - mean) ** 2) / p.sum())
 
 
+@pytest.mark.slow
 def test_a_fault_of_the_measurement_alone_leaves_one_description_without_it() -> None:
     """Beside lost samples the fit is as wrong as its times."""
     outcome = diagnosed("dropped-samples")

@@ -151,6 +151,7 @@ def test_gaps_of_the_whole_recording_are_told_though_the_decay_has_none() -> Non
     assert f"a gap of {TIME_S[0] - rest[-1]:.4g} s" in gap
 
 
+@pytest.mark.slow
 def test_the_seed_decides_the_draws_and_nothing_else() -> None:
     record = recording(other_engine(TRUTH), 1)
     again, other = (

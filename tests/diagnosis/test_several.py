@@ -71,6 +71,7 @@ def test_three_releases_share_their_values_and_lack_nothing() -> None:
     assert_shared_values_are_true(found)
 
 
+@pytest.mark.slow
 def test_shared_values_are_better_known_than_in_the_best_recording() -> None:
     found = together("nothing")
     best = min(each.improved.parameters["c"].sd for each in found.alone)
@@ -84,6 +85,7 @@ def test_a_torque_that_is_known_is_that_of_all() -> None:
     assert springs.verdict == "consistent"
 
 
+@pytest.mark.slow
 def test_each_release_is_predicted_from_the_others_within_its_band() -> None:
     found = together("nothing")
     for each in found.to_dict()["recordings"]:

@@ -268,6 +268,7 @@ def test_a_pure_number_has_no_unit() -> None:
     assert "s = 0.0100 ± 0.0010; " in details(step)[1]
 
 
+@pytest.mark.slow
 def test_lost_samples_are_reported_as_the_delay_of_later_readings() -> None:
     """Three readings are missing: what follows was read three intervals later."""
     (effect,) = diagnosed("dropped-samples").effects
@@ -655,6 +656,7 @@ def location_of(name: str) -> Location:
     return diagnosed(name).effects[0].location
 
 
+@pytest.mark.slow
 def test_a_step_lies_at_its_instant() -> None:
     """Within two 95 % intervals, each less than the record's fiftieth."""
     found = location_of("equilibrium-step")
@@ -665,6 +667,7 @@ def test_a_step_lies_at_its_instant() -> None:
     assert "s" in found.summary
 
 
+@pytest.mark.slow
 def test_a_tone_lies_at_its_frequency() -> None:
     found = location_of("tone-pickup")
     assert found.frequency_hz == pytest.approx((TONE_HZ,), abs=0.05 / TIME_S[-1])
@@ -701,6 +704,7 @@ def test_a_square_in_the_sensor_lies_in_the_second_harmonic_and_a_cube_in_the_th
         assert max(found.harmonics) == harmonic
 
 
+@pytest.mark.slow
 def test_a_curved_sensor_shows_at_large_amplitudes_that_is_early() -> None:
     found = location_of("sensor-cubic")
     amplitude = diagnosed("sensor-cubic").search.fit.at.sampled.amplitude
@@ -709,6 +713,7 @@ def test_a_curved_sensor_shows_at_large_amplitudes_that_is_early() -> None:
     assert found.time_s[0] < 5.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["circular-error", "frequency-drift", "sensor-quadratic"])
 def test_intervals_lie_within_the_record(name: str) -> None:
     found = location_of(name)
