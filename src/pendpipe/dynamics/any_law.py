@@ -517,6 +517,19 @@ class Sampled:
         """Interpolate what is known at the motion's nodes, shape (..., rows, order + 1)."""
         return interpolated(values, self._first, self._weights)
 
+    def moved(self, by_log: FloatArray, by_time: FloatArray) -> Sampled:
+        """Return a motion with slightly other ln r and t at fixed phase, at the same times."""
+        motion = self.motion
+        moved = replace(
+            motion, log_amplitude=motion.log_amplitude + by_log, time_s=motion.time_s + by_time
+        )
+        phase = self.phase - motion.angular_frequency * self.at_nodes(by_time)
+        amplitude = self.amplitude * np.exp(self.at_nodes(by_log))
+        cosine, sine = np.cos(phase), np.sin(phase)
+        return replace(
+            self, motion=moved, phase=phase, amplitude=amplitude, cosine=cosine, sine=sine
+        )
+
     def change(self, by_log: FloatArray, by_time: FloatArray) -> FloatArray:
         """Change of the angle, rad, from changes of ln r and of t at fixed phase."""
         return np.asarray(

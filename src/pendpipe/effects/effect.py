@@ -195,6 +195,9 @@ class Effect:
     """Parameters of the baseline without which it is nothing (a drag's form needs a drag)."""
     inside: ClassVar[tuple[str, ...]] = ()
     """Baselines that hold it already."""
+    carried: ClassVar[bool] = False
+    """Whether what it adds to the readings is a motion that the pendulum's own carries with it, so
+    that derivatives by the pendulum's values follow it."""
     local: ClassVar[bool] = False
     """Whether it happens at an instant."""
     spectral: ClassVar[bool] = False

@@ -511,19 +511,28 @@ def _jacobian(at: Evaluated) -> FloatArray:
     model, value, pendulum = at.model, at.value, at.span.pendulum
     sampled, tangent = at.sampled, at.tangent
     columns = np.empty((len(at.reading), model.size))
-    for index in (A, B, C, SHARE):
-        columns[:, index] = sampled.change(*tangent.of_force(_by_loss(at, index)))
-    columns[:, OMEGA] = _by_omega(at)
-    _, _, by_log, by_time = at.start
+    changes = {index: tangent.of_force(_by_loss(at, index)) for index in (A, B, C, SHARE)}
+    changes[OMEGA] = _by_omega(at)
+    for index, change in changes.items():
+        columns[:, index] = sampled.change(*change)
+    if model.seen == "rate":
+        # At the same amplitude and phase it is larger.
+        columns[:, OMEGA] += sampled.angle / float(value[OMEGA])
+    node_log, node_time, by_log, by_time = at.start
     columns[:, START] = (sampled.angle * by_log - sampled.velocity * by_time) / value[START]
     columns[:, TIME] = -sampled.velocity
     columns[:, OFFSET] = 1.0
+    if carried := [(effect, value[place]) for effect, place in model.places() if effect.carried]:
+        changes[START] = node_log / value[START], node_time / value[START]
+        changes[TIME] = np.zeros_like(node_log), np.ones_like(node_time)
+        for index, change in changes.items():
+            columns[:, index] += _carried(carried, sampled, pendulum, *change)
     for effect, place in model.places():
         if isinstance(effect, Curve):
             # It is linear in its values.
             small = effect.small(at.span)
-            changes = [(np.zeros(effect.count), row) for row in small * np.eye(effect.count)]
-            columns[:, place] = responses(effect, changes, at, pendulum).T / small
+            pairs = [(np.zeros(effect.count), row) for row in small * np.eye(effect.count)]
+            columns[:, place] = responses(effect, pairs, at, pendulum).T / small
             continue
         for index in range(effect.count):
             columns[:, place.start + index] = _derivative(effect, value[place], index, at, pendulum)
@@ -539,7 +548,30 @@ def _by_loss(at: Evaluated, index: int) -> FloatArray:
     return np.asarray(change / (moved[index] - value[index]))
 
 
-def _by_omega(at: Evaluated) -> FloatArray:
+def _carried(
+    effects: Sequence[tuple[Effect, FloatArray]],
+    sampled: Sampled,
+    pendulum: Pendulum,
+    by_log: FloatArray,
+    by_time: FloatArray,
+) -> FloatArray:
+    """Derivative of what effects add to the readings, as the motion that carries them changes."""
+    largest = max(np.abs(by_log).max(), pendulum.angular_frequency * np.abs(by_time).max())
+    step = _CARRIED / max(float(largest), 1e-300)
+    moved = sampled.moved(step * by_log, step * by_time)
+    change = np.zeros_like(sampled.phase)
+    for effect, values in effects:
+        for sign, motion in ((1.0, moved), (-1.0, sampled)):
+            change += sign * np.asarray(effect.reading(motion, pendulum, values))
+    return change / step
+
+
+_CARRIED: Final = 1e-4
+"""Step in ln r or in phase: between what rounds off, 1e-11 of it, and its square."""
+
+
+def _by_omega(at: Evaluated) -> tuple[FloatArray, FloatArray]:
+    """Change of ln r and of t at fixed phase by omega."""
     model, value = at.model, at.value
     motion, step = at.tangent.motion, 1e-6 * value[OMEGA]
     moved = value.copy()
@@ -550,11 +582,7 @@ def _by_omega(at: Evaluated) -> FloatArray:
     new = rates(model.law(moved), other)
     old = at.tangent.rates
     loss, pace = (new.loss - old.loss) / step, (new.pace - old.pace) / step
-    change = at.sampled.change(*at.tangent.of_rates(loss, pace))
-    if model.seen == "rate":
-        # At the same amplitude and phase it is larger.
-        change += at.sampled.angle / float(value[OMEGA])
-    return change
+    return at.tangent.of_rates(loss, pace)
 
 
 def _derivative(

@@ -8,6 +8,11 @@ what averaging over a cycle leaves, and psi the phase at small amplitude,
 
 the circular error of both planes together, the turn of the ellipse by 3/8 of its area, the product
 of its half axes (Olsson 1978), and the detuning delta of the second axis. Both lose alike.
+
+The next power comes from Birkhoff's normal form. With N = (|a|^2 + |b|^2)/2 and the area
+L = Im(a* b), H = N - N^2/16 - N^3/256 + 3/16 L^2 + 9/256 N L^2 is that of the plane pendulum for
+L = 0 and of the cone, whose omega^2 is 1/cos(theta), for L = N; rates are its derivatives. An
+amplitude R in one plane is N = R^2/2 (1 - 5/96 R^2).
 """
 
 import math
@@ -26,16 +31,18 @@ _FEWEST: Final = 10
 """Windows, each of a period or more: two planes have eight numbers."""
 
 
-def _stepped(a: Any, b: Any, reached: Any, detuned: Any) -> tuple[Any, Any]:
-    """Follow both planes over a step in which omega r^2 integrates to `reached`.
+def _stepped(a: Any, b: Any, reached: Any, square: Any, detuned: Any) -> tuple[Any, Any]:
+    """Follow both planes over a step: omega r^2 integrates to `reached`, and r^2 is `square`.
 
     Both halves of the detuning about the rest, whose turns are by Cayley's transform: unitary, and
     the same for numbers and for arrays.
     """
     b = b * detuned
-    energy = a.real**2 + a.imag**2 + b.real**2 + b.imag**2 - 1.0
+    energy = a.real**2 + a.imag**2 + b.real**2 + b.imag**2
     area = a.imag * b.real - a.real * b.imag
-    turn, late = 0.1875 * area * reached, -0.03125j * energy * reached
+    slower = energy - 1.0 + square * (3.0 / 64.0 * (energy**2 - 1.0) - 9.0 / 16.0 * area**2)
+    turn = 3.0 / 16.0 * area * reached * (1.0 + 3.0 / 32.0 * square * energy)
+    late = -1j / 32.0 * slower * reached
     scale = (1.0 + late) / (1.0 - late) / (1.0 + turn * turn)
     cosine, sine = scale * (1.0 - turn * turn), scale * (2.0 * turn)
     return cosine * a - sine * b, (sine * a + cosine * b) * detuned
@@ -55,7 +62,7 @@ def _begun(other: Any) -> tuple[Any, Any, Any, Any]:
 
 
 def planes(
-    time_s: FloatArray, reached: FloatArray, other: complex, detuning: float
+    time_s: FloatArray, reached: FloatArray, square: FloatArray, other: complex, detuning: float
 ) -> tuple[AnyArray, AnyArray]:
     """Return the complex amplitudes in the plane that is seen, and across, over the first mode's.
 
@@ -65,6 +72,8 @@ def planes(
         Since the first reading, s, shape (n,).
     reached
         The integral of omega r^2 until then, r being the first mode's amplitude as it is seen.
+    square
+        r^2 at those times, rad^2.
     other
         The second mode's part of what is seen at the first reading, over the first one's.
     detuning
@@ -76,10 +85,11 @@ def planes(
     count = min(8 + math.ceil(turns / _TURN), 20_000)
     at = np.linspace(0.0, last_s, count + 1)
     parts = np.diff(np.interp(at, time_s, reached)).tolist()
+    squares = np.interp(0.5 * (at[1:] + at[:-1]), time_s, square).tolist()
     detuned = complex(np.exp(0.5j * detuning * last_s / count))
     along, across = [a], [b]
-    for part in parts:
-        a, b = _stepped(a, b, part, detuned)
+    for part, now in zip(parts, squares, strict=True):
+        a, b = _stepped(a, b, part, now, detuned)
         along.append(a)
         across.append(b)
     both = np.array([along, across])
@@ -91,16 +101,24 @@ def planes(
 def waveform(amplitude: FloatArray, phase: FloatArray, u: AnyArray, w: AnyArray) -> FloatArray:
     """Return the angle that is seen, less that of one plane alone, to the third power of r.
 
-    Seen is arctan(x/|z|) = x + x^3/6 + x y^2/2 of the horizontal displacements, whose third
-    harmonic is -3/64 r^3 Re[(u^2 + w^2)(u, w) e^(3 i phi)]. r e^(i psi) = x - i x'/omega of sin x
-    is an even turn phi, and its amplitude, only nearly.
+    The horizontal displacements are those of Birkhoff's normal form, of the actions, and
+    -r^2/16 (|u|^2 + |w|^2)(u, w) - r^2/32 (u^2 + w^2)(u*, w*) at the same frequency, and
+    -3/64 r^3 (u^2 + w^2)(u, w) e^(3 i phi); seen is arctan(x/|z|) = x + x^3/6 + x y^2/2 of them.
     """
     square = amplitude**2
-    phi = phase + square / 32.0 * np.sin(2.0 * phase)
-    wave = amplitude * (1.0 + square / 16.0 * np.sin(phase) ** 2) * np.exp(1j * phi)
-    oblique = 0.25 * w * (u.real * w.real + u.imag * w.imag)
+    turning = 1.0 + square / 24.0 * (1.0 - np.cos(phase) ** 4)
+    square = square * turning**2
+    phi = phase + square / 24.0 * np.sin(2.0 * phase) + square / 192.0 * np.sin(4.0 * phase)
+    wave = amplitude * turning * (1.0 - 5.0 / 192.0 * square) * np.exp(1j * phi)
     third = -3.0 / 64.0 * (u * u + w * w) * u + u**3 / 24.0 + u * w * w / 8.0 + 1.0 / 192.0
-    return np.asarray(((u - 1.0 + square * oblique) * wave + third * wave**3).real)
+    first = u - 1.0 + square / 32.0 * (_further(u, w) - 1.0)
+    return np.asarray((first * wave + third * wave**3).real)
+
+
+def _further(u: AnyArray, w: AnyArray) -> AnyArray:
+    """Return what the cube of the amplitude adds to the fundamental that is seen, over r^3/32."""
+    size = u.real**2 + u.imag**2 + 6.0 * (w.real**2 + w.imag**2)
+    return np.asarray(size * u + 3.0 * w * w * u.conj())
 
 
 def _cubic(values: AnyArray, place: FloatArray) -> AnyArray:
@@ -134,12 +152,12 @@ class Planes(NamedTuple):
 
 _TRIED: Final = tuple(
     (size * np.exp(1j * angle), turned)
-    for size in (0.1, 0.4, 0.9)
+    for size in (0.03, 0.1, 0.3, 0.9)
     for angle in (0.0, 0.5, -0.5, 1.8, -1.8)
     for turned in (0.0, 2.0, -2.0, 6.0, -6.0, 15.0, -15.0)
 )
 """Second modes, and their detuning over the record, rad, from which the search begins."""
-_FIRST, _THEN, _BEST = 6, 15, 8
+_FIRST, _THEN, _BEST = 6, 15, 30
 """Steps of all, and of the best of them."""
 
 
@@ -169,8 +187,9 @@ def two_planes(time_s: FloatArray, values: FloatArray, omega: float) -> Planes |
         half = np.exp(0.5j * turned[..., 0] / count)
         found = np.empty(level.shape, dtype=np.complex128)
         for k in range(count):
-            x, y = _stepped(x, y, part[..., k], np.sqrt(half) if k == 0 else half)
-            found[..., k] = seen * x - hidden * y
+            x, y = _stepped(x, y, part[..., k], square[..., k], np.sqrt(half) if k == 0 else half)
+            u, w = seen * x - hidden * y, hidden * x + seen * y
+            found[..., k] = u + square[..., k] / 32.0 * _further(u, w)
         turn = phase + faster * at - np.cumsum(part, axis=-1) / 16.0
         return np.asarray(found * level * np.exp(1j * turn))
 

@@ -161,6 +161,7 @@ def _in_two_planes(
         Parameter("detuning", "Hz", -1e3, 1e3, word="detuning"),
     ),
     sizes=2,
+    carried=True,
     example=(1e-3, 5e-4, 0.02),
     discriminating_test="add a second sensor across the first, or record longer: beats must repeat",
     shapes=_detunings,
@@ -189,7 +190,7 @@ def plane_coupling(
         )
     reached = sampled.at_nodes(motion.clock.integral(motion.amplitude**2))
     ratio = motion.upwards * share / first
-    both = planes(time, reached - reached[0], ratio, turned)
+    both = planes(time, reached - reached[0], sampled.amplitude**2, ratio, turned)
     return motion.upwards * waveform(sampled.amplitude, sampled.phase, *both)
 
 
