@@ -490,9 +490,9 @@ def _numbers(
     left, noise = goodness.left, goodness.noise_rms
     own = covariance(normal, held, None if left is None else _beyond_noise(fitted, left, noise))
     (amplitude, phase), jacobian = _first_turning_point(fitted, start_s)
-    frequency = 0.5 * value[OMEGA] / math.pi
-    numbers = np.array([*value[:3], frequency, amplitude, phase, value[OFFSET]])
-    ends = intervals95(value, normal, gradient, fitted.problem.bounds, range(3), held, own)
+    numbers = np.array([*value[:3], value[OMEGA] / math.tau, amplitude, phase, value[OFFSET]])
+    known = (held, own) if left is None else (held,)
+    ends = intervals95(value, normal, gradient, fitted.problem.bounds, range(3), *known)
     return numbers, jacobian @ own @ jacobian.T, ends, math.sqrt(own[DRIFT, DRIFT])
 
 
