@@ -119,3 +119,21 @@ def answer_of(capsys: pytest.CaptureFixture[str]) -> Callable[..., Any]:
         return capsys.readouterr()
 
     return answer
+
+
+@pytest.fixture
+def refusal_of(capsys: pytest.CaptureFixture[str]) -> Callable[[list[str]], str]:
+    """The one line with which a call ends, and status 2; what is indented reports progress."""
+
+    def refusal(words: list[str]) -> str:
+        from pendpipe.cli import main
+
+        try:
+            status = main(words)
+        except SystemExit as ended:
+            status = int(str(ended.code))
+        said = [line for line in capsys.readouterr().err.splitlines() if line[:2] != "  "]
+        assert (status, len(said)) == (2, 1), said
+        return said[0]
+
+    return refusal

@@ -71,17 +71,10 @@ def test_all_a_newcomer_needs(
     ],
 )
 def test_a_users_fault_is_one_line_and_status_two(
-    words: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    words: str, message: str, tmp_path: Path, refusal_of: Any
 ) -> None:
     out = tmp_path / "never.csv"
-    try:
-        status = main(["acquire", *words.format(out).split()])
-    except SystemExit as end:  # argparse refuses a flag
-        status = end.code
-    assert status == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert error.count("\n") == 1
+    assert message in refusal_of(["acquire", *words.format(out).split()])
     assert not out.exists()
 
 
@@ -117,10 +110,7 @@ def test_a_second_call_records_beside_the_first(tmp_path: Path) -> None:
 
 
 def test_a_csv_that_could_not_be_written_is_made_at_the_next_call(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    answer_of: Any,
-    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path, refusal_of: Any, answer_of: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "decay.csv"
 
@@ -129,10 +119,7 @@ def test_a_csv_that_could_not_be_written_is_made_at_the_next_call(
 
     with monkeypatch.context() as patch:
         patch.setattr("pendpipe.formats.writing.write", full)
-        assert main([*QUICK.split(), str(out)]) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    assert "No space left on device" in error
+        assert "No space left on device" in refusal_of([*QUICK.split(), str(out)])
     kept = read_raw(tmp_path / "decay.raw").data
     # Nothing is recorded now, although another length is asked for.
     assert (
@@ -148,11 +135,11 @@ def test_a_csv_that_could_not_be_written_is_made_at_the_next_call(
 
 
 def test_a_place_where_nothing_can_be_written_is_refused_before_the_recording(
-    tmp_path: Path, answer_of: Any
+    tmp_path: Path, refusal_of: Any
 ) -> None:
     for out in (tmp_path, tmp_path / "a-file/decay.csv", Path("/dev/null/decay.csv")):
         (tmp_path / "a-file").touch()
-        assert answer_of([*QUICK.split(), str(out)], 2).err.count("\n") == 1
+        refusal_of([*QUICK.split(), str(out)])
     assert not raw_files(tmp_path)
 
 

@@ -537,14 +537,12 @@ def test_command_reads_degrees_and_decimal_commas(tmp_path: Path) -> None:
     ],
 )
 def test_a_bad_table_is_one_line_and_status_2(
-    content: str | None, fault: str, tmp_path: Path, answer_of: Any
+    content: str | None, fault: str, tmp_path: Path, refusal_of: Any
 ) -> None:
     table, out = tmp_path / "t.csv", tmp_path / "o.json"
     if content is not None:
         table.write_text(content)
-    line = answer_of(["calibrate", str(table), "--out", str(out)], 2).err
-    assert fault in line
-    assert line.count("\n") == 1
+    assert fault in refusal_of(["calibrate", str(table), "--out", str(out)])
     assert not out.exists()
 
 

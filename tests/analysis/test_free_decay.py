@@ -26,6 +26,7 @@ from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording
 
 from ..recordings import white
+from ..refusals import refused
 
 # A free decay is found where the pendulum swings by itself, and nowhere else.
 
@@ -269,10 +270,8 @@ def test_a_recording_of_nothing_else_is_kept_whole(values: Floats) -> None:
 def test_what_is_no_decay_is_refused_in_one_line(
     parts: list[Floats], noise: float, said: str
 ) -> None:
-    with pytest.raises(NotAnalysableError) as caught:
+    with refused(said):
         find_free_decay(recording(parts, noise=noise))
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("wild", [False, True])
@@ -380,19 +379,23 @@ def test_a_pendulum_that_goes_over_the_top_is_cut_there_and_so_it_is_said() -> N
     )
 
 
-def test_a_decay_in_loud_noise_is_seen_by_all_its_readings() -> None:
-    """8 % at Q = 1650, the amplitude 7.8 times the noise of a reading."""
-    time = np.arange(12000) / RATE
-    values = 0.1 * np.exp(-0.08 * time / time[-1]) * np.cos(OMEGA * time)
-    assert find_free_decay(recording([values], noise=0.1 / 7.8)).half_cycles > 180
-
-
-@pytest.mark.parametrize("wander", [0.0, 0.3])
-def test_many_half_cycles_are_a_decay_though_each_hardly_stands_out(wander: float) -> None:
-    """As those of a cheap accelerometer, 4.5 times the noise of a reading."""
-    time = np.arange(2000) / RATE
-    values = 0.1 * np.exp(-0.03 * time) * np.cos(OMEGA * time) + wander * time / time[-1]
-    assert find_free_decay(recording([values], noise=0.1 / 4.5)).half_cycles > 25
+@pytest.mark.parametrize(
+    ("count", "rate", "over_noise", "wander", "seen"),
+    [
+        # 8 % at Q = 1650.
+        (12000, 0.08 / 119.99, 7.8, 0.0, 180),
+        # As those of a cheap accelerometer, each of which hardly stands out.
+        (2000, 0.03, 4.5, 0.0, 25),
+        (2000, 0.03, 4.5, 0.3, 25),
+    ],
+)
+def test_a_decay_in_loud_noise_is_seen_by_all_its_readings(
+    count: int, rate: float, over_noise: float, wander: float, seen: int
+) -> None:
+    time = np.arange(count) / RATE
+    values = 0.1 * np.exp(-rate * time) * np.cos(OMEGA * time) + wander * time / time[-1]
+    found = find_free_decay(recording([values], noise=0.1 / over_noise))
+    assert found.half_cycles > seen
 
 
 def beat(losses: tuple[float, float], *, rest: bool) -> Recording:

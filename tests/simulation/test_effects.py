@@ -14,6 +14,7 @@ from pendpipe.recording import Recording
 from pendpipe.simulation.model import Model, read_model, simulate
 
 from ..effects.pendulums import VALUES
+from ..refusals import refused
 
 FORENSIC: dict[str, dict[str, float]] = {
     "broadband-drive": {"acceleration_density": 1e-8},
@@ -193,11 +194,8 @@ def test_a_soft_limit_bends_either_side_alike(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(more: str, message: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError) as caught:
+    with refused(message, "m.toml"):
         simulate(model(tmp_path, more), place="m.toml")
-    assert message in str(caught.value)
-    assert "m.toml" in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def quiet(text: str) -> str:
@@ -231,11 +229,8 @@ def test_an_effect_that_could_do_nothing_is_no_silent_null(
     more: str, text: str, message: str, tmp_path: Path
 ) -> None:
     """Else a recording would say that it has an effect, and would have none (or only the last)."""
-    with pytest.raises(InputError) as caught:
+    with refused(message, "m.toml"):
         simulate(model(tmp_path, more, text), place="m.toml")
-    assert message in str(caught.value)
-    assert "m.toml" in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_the_sensors_noise_can_be_coloured_too(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 import copy
 import json
-import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -36,6 +35,8 @@ from pendpipe.recording import Recording, write_plain
 from pendpipe.stages.archive import pack
 from pendpipe.stages.results import RecordResult, placed
 from pendpipe.stages.separate import common_relative_sd
+
+from ..refusals import refused
 
 # The configuration refuses what it does not know, and says what was meant.
 
@@ -122,10 +123,8 @@ def test_what_cannot_be_is_said_in_one_line(
     content: dict[str, Any], change: Callable[[dict[str, Any]], Any], said: str
 ) -> None:
     change(content)
-    with pytest.raises(InputError) as caught:
+    with refused(said):
         load_campaign(content, "config.yaml")
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("celsius", ["68", "-0.5", "293.15"])
@@ -153,10 +152,9 @@ def test_a_file_that_is_no_configuration_is_named_in_one_line(
 ) -> None:
     path = tmp_path / "config.yaml"
     path.write_bytes(written)
-    with pytest.raises(InputError, match=r"config\.yaml") as caught:
+    with refused("", str(path)):
         read_configuration(path)
-    assert "\n" not in str(caught.value)
-    with pytest.raises(InputError, match=r"can't be read \(Is a directory\)"):
+    with refused("can't be read (Is a directory)"):
         read_configuration(tmp_path)
 
 
@@ -206,9 +204,9 @@ def table(folder: Path, *rows: str, header: str = "\t".join(COLUMNS)) -> Path:
 def test_a_faulty_table_is_refused_with_its_line(
     tmp_path: Path, rows: list[str], header: str, said: str
 ) -> None:
-    with pytest.raises(InputError, match=r"records\.tsv") as caught:
-        read_records(table(tmp_path, *rows, header=header))
-    assert said in str(caught.value)
+    faulty = table(tmp_path, *rows, header=header)
+    with refused(said, str(faulty)):
+        read_records(faulty)
 
 
 @pytest.mark.parametrize("stop_s", ["2.9", "3", "3.1"])
@@ -560,10 +558,8 @@ def test_a_number_in_another_unit_is_asked_about(key: str, value: object, said: 
         part = part[section]
     assert abs(float(part[last])) < abs(float(value))  # type: ignore[arg-type]
     part[last] = value
-    with pytest.raises(InputError, match=re.escape(said)) as caught:
+    with refused(said, f"config.yaml, {key}: "):
         load_campaign(content, "config.yaml")
-    assert str(caught.value).startswith(f"config.yaml, {key}: ")
-    assert "\n" not in str(caught.value)
 
 
 def test_a_number_below_its_bound_has_no_other_unit() -> None:
