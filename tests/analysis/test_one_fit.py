@@ -333,16 +333,20 @@ def test_the_loss_of_a_law_is_that_of_the_cycle_about_the_amplitude(
     assert loss_of(law, amplitude) == pytest.approx(loss, rel=1e-6)
 
 
+def seen_points(law: Eq8, angle_sd: float, count: int, off: FloatArray | float) -> TurningPoints:
+    """Turning points of a law, whose angles are off, and claim an error."""
+    motion, ones = turning_points(law, Release(0.0, 0.5), count=count), np.ones(count)
+    angle = motion.angle_rad + off
+    return TurningPoints(
+        np.arange(count), motion.time_s, 1e-4 * ones, angle, angle_sd * ones, 0.0 * ones
+    )
+
+
 def test_the_decrement_that_is_seen_is_as_sure_as_it_says() -> None:
     law = Eq8(OMEGA, 0.1, 0.0, 0.02, 0.002)
-    motion = turning_points(law, Release(0.0, 0.5), count=40)
     random, pulls = np.random.default_rng(3), []
-    sd = np.full(40, 2e-3)
     for _ in range(300):
-        noisy = motion.angle_rad + sd * random.standard_normal(40)
-        points = TurningPoints(
-            np.arange(40), motion.time_s, 1e-4 * np.ones(40), noisy, sd, np.zeros(40)
-        )
+        points = seen_points(law, 2e-3, 40, 2e-3 * random.standard_normal(40))
         for check in check_decrement(points, law):
             pulls.append((check.seen - check.fitted) / check.seen_sd)
             assert not check.contradicts or abs(pulls[-1]) > 2.0
@@ -351,26 +355,17 @@ def test_the_decrement_that_is_seen_is_as_sure_as_it_says() -> None:
 
 
 def test_an_error_of_the_level_is_no_loss() -> None:
-    motion = turning_points(Eq8(OMEGA, viscous=0.05), Release(0.0, 0.5), count=10)
-    angle = motion.angle_rad + 0.02
-    points = TurningPoints(
-        np.arange(10), motion.time_s, 1e-4 * np.ones(10), angle, 1e-4 * np.ones(10), np.zeros(10)
-    )
+    points = seen_points(Eq8(OMEGA, viscous=0.05), 1e-4, 10, 0.02)
     amplitude, loss, *_ = seen_loss(points)
     assert loss == pytest.approx(0.05, rel=0.02)
-    assert amplitude == pytest.approx(0.5 * math.exp(-0.05 * np.mean(motion.time_s)), rel=0.01)
+    assert amplitude == pytest.approx(0.5 * math.exp(-0.05 * np.mean(points.time_s)), rel=0.01)
 
 
 def test_the_level_is_not_sought_in_turning_points_of_one_side() -> None:
     """Where the others hardly stand out: there any level would do, and any amplitude."""
-    motion = turning_points(Eq8(OMEGA, viscous=0.02), Release(0.0, 0.5), count=10)
-    sd = np.full(10, 0.05)
-    angle = motion.angle_rad + 0.05 * np.random.default_rng(3).standard_normal(10)
-    points = TurningPoints(
-        np.arange(10), motion.time_s, 1e-4 * np.ones(10), angle, sd, np.zeros(10)
-    )
+    points = seen_points(Eq8(OMEGA, viscous=0.02), 0.05, 10, white(3, 10, 0.05))
     amplitude, _, loss_sd, *_ = seen_loss(points.chosen(points.side > 0))
-    assert amplitude == pytest.approx(0.5 * math.exp(-0.02 * np.mean(motion.time_s)), rel=0.15)
+    assert amplitude == pytest.approx(0.5 * math.exp(-0.02 * np.mean(points.time_s)), rel=0.15)
     assert loss_sd > 0.02
 
 

@@ -21,24 +21,67 @@ from pendpipe.effects.two_modes import two_modes
 from pendpipe.recording import Recording
 
 from ..recordings import white
-from .lock_in import lock_in
+from .lock_in import Lines, lock_in
 from .pendulums import OMEGA, baseline, evaluated, plain, reading, times
 
 # What changes slowly, suddenly, or periodically.
 
 TIME = times(60.0, 0.04)
 CYCLE = 2.0 * math.pi / OMEGA
+Law = Callable[[float], float]
 
 
-def test_a_drifting_frequency_runs_ahead_with_the_square_of_time() -> None:
-    """The phase is w (t + eps t^2/2)."""
-    eps = 1e-4
-    found = evaluated("frequency-drift", (eps, STRAIGHT_S), baseline(b=0.01), TIME).reading
-    for start in (0.0, 20.0, 45.0):
-        window = lock_in(TIME, found, OMEGA, start, start + 8.0 * CYCLE)
-        assert window.angular_frequency / OMEGA - 1.0 == pytest.approx(
-            eps * window.time_s, rel=0.02, abs=2e-5 * eps * 60.0 + 1e-6
-        )
+def crept(tau: float, exponential: float) -> Law:
+    """The level follows s ln(1 + t/tau), or s (1 - e^(-t/tau))."""
+    return lambda t: 1.0 - math.exp(-t / tau) if exponential else math.log1p(t / tau)
+
+
+@pytest.mark.parametrize(
+    ("identifier", "values", "b", "cycles", "seen", "law", "within"),
+    [
+        # The phase is w (t + eps t^2/2).
+        (
+            *("frequency-drift", (1e-4, STRAIGHT_S), 0.01, 8),
+            *(lambda seen: seen.angular_frequency / OMEGA - 1.0, lambda t: 1e-4 * t),
+            {"rel": 0.02, "abs": 1.12e-6},
+        ),
+        *(
+            (
+                *("equilibrium-creep", (2e-3, 10.0, kind), 0.01, 4),
+                *(lambda seen: seen.level / 2e-3, crept(10.0, kind), {"rel": 0.01}),
+            )
+            for kind in (0.0, 1.0)
+        ),
+        # The lock-in's amplitude swings by q about r at the detuning.
+        (
+            *("plane-coupling", (2e-3, 0.0, 1.0 / 30.0), 0.0, 4),
+            *(lambda seen: seen.amplitude - 0.15, lambda t: 2e-3 * math.cos(math.tau * t / 30.0)),
+            {"abs": 0.06 * 2e-3},
+        ),
+        # By x'' + w^2 (1 + h sin 2wt) x = 0 it grows as exp(h w t/4), or falls (Mathieu).
+        *(
+            (
+                *("parametric-drive", (0.0, pump, OMEGA / math.pi), 0.0, 8),
+                lambda seen: math.log(seen.amplitude / 0.15),
+                *(lambda t, pump=pump: 0.25 * pump * OMEGA * t, {"rel": 0.03}),
+            )
+            for pump in (2e-3, -2e-3)
+        ),
+    ],
+)
+def test_what_changes_slowly_is_seen_window_by_window(
+    identifier: str,
+    values: tuple[float, ...],
+    b: float,
+    cycles: int,
+    seen: Callable[[Lines], float],
+    law: Law,
+    within: dict[str, float],
+) -> None:
+    found = reading(identifier, values, baseline(b=b), TIME)
+    for start in np.arange(5.0, 50.0, 5.0):
+        window = lock_in(TIME, found, OMEGA, start, start + cycles * CYCLE)
+        assert seen(window) == pytest.approx(law(window.time_s), **within)
 
 
 def test_a_motion_that_starts_after_the_first_readings_has_none_for_them() -> None:
@@ -57,18 +100,6 @@ def test_a_frequency_jumps() -> None:
     after = lock_in(TIME, found, OMEGA, 32.0, 32.0 + 8.0 * CYCLE)
     change = after.angular_frequency / before.angular_frequency - 1.0
     assert change == pytest.approx(3e-4, rel=0.01)
-
-
-@pytest.mark.parametrize("exponential", [0.0, 1.0])
-def test_the_equilibrium_creeps(exponential: float) -> None:
-    """The level follows s ln(1 + t/tau), or s (1 - e^(-t/tau))."""
-    size, tau = 2e-3, 10.0
-    found = reading("equilibrium-creep", (size, tau, exponential), baseline(b=0.01), TIME)
-    for start in (5.0, 20.0, 45.0):
-        window = lock_in(TIME, found, OMEGA, start, start + 4.0 * CYCLE)
-        late = window.time_s / tau
-        law = 1.0 - math.exp(-late) if exponential else math.log1p(late)
-        assert window.level == pytest.approx(size * law, rel=0.01)
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.7, 1.6, 2.9, 4.4])
@@ -130,27 +161,6 @@ def test_a_second_mode_rings_down_on_top() -> None:
     turn = 2.0 * math.pi * 4.3 * TIME
     expected = (1e-3 * np.cos(turn) + 5e-4 * np.sin(turn)) * np.exp(-TIME / 6.0)
     np.testing.assert_allclose(found - plain(base, TIME), expected, 0.0, 1e-12)
-
-
-def test_a_second_plane_beats() -> None:
-    """The lock-in's amplitude swings by q about r at the detuning."""
-    q, detuning = 2e-3, 1.0 / 30.0
-    found = reading("plane-coupling", (q, 0.0, detuning), baseline(), TIME)
-    for start in np.arange(0.0, 50.0, 5.0):
-        window = lock_in(TIME, found, OMEGA, start, start + 4.0 * CYCLE)
-        beat = math.cos(2.0 * math.pi * detuning * window.time_s)
-        assert window.amplitude - 0.15 == pytest.approx(q * beat, abs=0.06 * q)
-
-
-@pytest.mark.parametrize("pump", [2e-3, -2e-3])
-def test_a_parametric_drive_at_twice_the_frequency_pumps(pump: float) -> None:
-    """By x'' + w^2 (1 + h sin 2wt) x = 0 it grows as exp(h w t/4), or falls (Mathieu)."""
-    twice = 2.0 * OMEGA / (2.0 * math.pi)
-    found = reading("parametric-drive", (0.0, pump, twice), baseline(), TIME)
-    for start in (0.0, 20.0, 45.0):
-        window = lock_in(TIME, found, OMEGA, start, start + 8.0 * CYCLE)
-        growth = math.log(window.amplitude / 0.15)
-        assert growth == pytest.approx(0.25 * pump * OMEGA * window.time_s, rel=0.03)
 
 
 def test_history_starts_from_rest() -> None:
@@ -399,22 +409,18 @@ def model_with(*parts: str) -> Model:
     return Model(HELD_TIME_S, 1.0 / 15.0, parts={part: RATE[part] for part in parts})
 
 
-@pytest.mark.parametrize("part", [HYSTERETIC, VISCOUS])
+@pytest.mark.parametrize("parts", [[HYSTERETIC], [VISCOUS], [HYSTERETIC, VISCOUS]])
 @pytest.mark.parametrize("factor", [1.0, 1.5, 4.0])
-def test_a_held_part_stays_whatever_the_whole_is(part: str, factor: float) -> None:
+def test_a_held_part_stays_whatever_the_whole_is_and_two_make_the_whole(
+    parts: list[str], factor: float
+) -> None:
     value = VALUE.copy()
     value[B] *= factor
-    pendulum = pendulum_of(model_with(part).settled(value))
-    assert getattr(pendulum, part) == pytest.approx(RATE[part], rel=1e-12)
-    assert pendulum.linear == pytest.approx(value[B], rel=1e-12)
-
-
-def test_two_held_parts_make_the_whole() -> None:
-    value = VALUE.copy()
-    value[[B, SHARE]] = 0.1, 0.9
-    pendulum = pendulum_of(model_with(HYSTERETIC, VISCOUS).settled(value))
-    assert pendulum.hysteretic == pytest.approx(RATE[HYSTERETIC], rel=1e-12)
-    assert pendulum.viscous == pytest.approx(RATE[VISCOUS], rel=1e-12)
+    pendulum = pendulum_of(model_with(*parts).settled(value))
+    for part in parts:
+        assert getattr(pendulum, part) == pytest.approx(RATE[part], rel=1e-12)
+    whole = value[B] if len(parts) == 1 else sum(RATE.values())
+    assert pendulum.linear == pytest.approx(whole, rel=1e-12)
 
 
 @pytest.mark.parametrize("part", [HYSTERETIC, VISCOUS])

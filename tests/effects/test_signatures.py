@@ -333,23 +333,23 @@ BASE = baseline(b=0.005)
 OWN = plain(BASE, MIDDLE_TIME)
 
 
-def test_a_quadratic_sensor_shifts_the_mean_with_its_second_harmonic() -> None:
-    """Both s_2 y^2/2, and no change of the frequency."""
-    found = lock_in(
-        MIDDLE_TIME, reading("sensor-quadratic", (0.1,), baseline(), MIDDLE_TIME), OMEGA, 0.0, 22.0
-    )
-    assert found.level == pytest.approx(0.1 * 0.15**2 / 2.0, rel=1e-3)
-    assert found.lines[2].real == pytest.approx(0.1 * 0.15**2 / 2.0, rel=1e-3)
-    assert found.angular_frequency == pytest.approx(OMEGA, rel=1e-8)
-
-
-def test_a_cubic_sensor_has_a_third_harmonic_and_no_frequency_shift() -> None:
-    """s_3 y^3/4 in phase; the first grows by 3 s_3 y^2/4 of itself."""
-    found = lock_in(
-        MIDDLE_TIME, reading("sensor-cubic", (0.5,), baseline(), MIDDLE_TIME), OMEGA, 0.0, 22.0
-    )
-    assert found.lines[3].real == pytest.approx(0.5 * 0.15**3 / 4.0, rel=1e-3)
-    assert found.amplitude == pytest.approx(0.15 * (1.0 + 0.75 * 0.5 * 0.15**2), rel=1e-5)
+@pytest.mark.parametrize(
+    ("identifier", "size", "level", "harmonic", "line", "first"),
+    [
+        # Both s_2 y^2/2.
+        ("sensor-quadratic", 0.1, 0.1 * 0.15**2 / 2.0, 2, 0.1 * 0.15**2 / 2.0, 0.15),
+        # s_3 y^3/4 in phase; the first grows by 3 s_3 y^2/4 of itself.
+        ("sensor-cubic", 0.5, 0.0, 3, 0.5 * 0.15**3 / 4.0, 0.15 * (1.0 + 0.375 * 0.15**2)),
+    ],
+)
+def test_a_bent_sensor_has_a_harmonic_and_no_frequency_shift(
+    identifier: str, size: float, level: float, harmonic: int, line: float, first: float
+) -> None:
+    seen = reading(identifier, (size,), baseline(), MIDDLE_TIME)
+    found = lock_in(MIDDLE_TIME, seen, OMEGA, 0.0, 22.0)
+    assert found.level == pytest.approx(level, rel=1e-3, abs=1e-9)
+    assert found.lines[harmonic].real == pytest.approx(line, rel=1e-3)
+    assert found.amplitude == pytest.approx(first, rel=1e-5)
     assert found.angular_frequency == pytest.approx(OMEGA, rel=1e-8)
 
 
@@ -468,20 +468,24 @@ def test_the_rate_of_a_clock_that_warms_up_is_the_relaxed_drift() -> None:
     np.testing.assert_allclose(gained, rate * tau * (1.0 - np.exp(-middle / tau)), 1e-5, 1e-8)
 
 
-def test_dropped_samples_are_the_readings_that_follow() -> None:
-    """Seven samples lost after the hundredth: from there on, the readings seven later."""
+@pytest.mark.parametrize(
+    ("identifier", "size", "later", "more", "within"),
+    [
+        # Seven samples lost after the hundredth: from there on, the readings seven later.
+        ("dropped-samples", 7 * 0.02, 7, 0.0, 1e-7),
+        # A jump of the equilibrium changes amplitude and phase as well; one of the reading not.
+        ("offset-step", 1e-3, 0, 1e-3, 1e-12),
+    ],
+)
+def test_lost_samples_and_a_jump_of_the_reading_leave_the_motion_as_it_is(
+    identifier: str, size: float, later: int, more: float, within: float
+) -> None:
     instant = float(0.5 * (MIDDLE_TIME[100] + MIDDLE_TIME[101]))
-    found = reading("dropped-samples", (7 * 0.02, instant), BASE, MIDDLE_TIME)
+    found = reading(identifier, (size, instant), BASE, MIDDLE_TIME)
     np.testing.assert_allclose(found[:101], OWN[:101], 0.0, 1e-9)
-    np.testing.assert_allclose(found[101:-7], OWN[108:], 0.0, 1e-7)
-
-
-def test_a_jump_of_the_reading_leaves_the_motion_as_it_is() -> None:
-    """A jump of the equilibrium changes amplitude and phase as well."""
-    instant = float(0.5 * (MIDDLE_TIME[100] + MIDDLE_TIME[101]))
-    found = reading("offset-step", (1e-3, instant), BASE, MIDDLE_TIME)
-    np.testing.assert_allclose(found[:101], OWN[:101], 0.0, 1e-12)
-    np.testing.assert_allclose(found[101:], OWN[101:] + 1e-3, 0.0, 1e-12)
+    np.testing.assert_allclose(
+        found[101 : len(OWN) - later], OWN[101 + later :] + more, 0.0, within
+    )
 
 
 # Readings that fall behind at the ends of the range.

@@ -464,25 +464,24 @@ def hysteretic(quality: float) -> Callable[[float, float], float]:
     return lambda x, v: float(universal_acceleration(x, v, HALF_HERTZ, losses, 1.0))
 
 
-@pytest.mark.parametrize("quality", [2.0, 10.0, 50.0])
-def test_viscous_half_cycle(quality: float) -> None:
-    duration, ratio = half_cycle(
-        lambda x, v: float(viscous_acceleration(x, v, HALF_HERTZ, quality))
-    )
-    frequency = float(viscous_frequency_ratio(quality))
-    assert np.pi / (HALF_HERTZ * duration) == pytest.approx(frequency, rel=1e-10)
-    beta = float(damping_coefficient(HALF_HERTZ, quality))
-    assert -np.log(ratio) == pytest.approx(beta * duration, rel=1e-9)
+def viscous(quality: float) -> Callable[[float, float], float]:
+    return lambda x, v: float(viscous_acceleration(x, v, HALF_HERTZ, quality))
 
 
 @pytest.mark.parametrize("quality", [2.0, 10.0, 50.0])
-def test_hysteretic_half_cycle(quality: float) -> None:
-    duration, ratio = half_cycle(hysteretic(quality))
-    assert np.pi / (HALF_HERTZ * duration) == pytest.approx(
-        float(hysteretic_frequency_ratio(quality)), rel=1e-10
-    )
-    decrement = float(logarithmic_decrement(hysteretic_decrement_quality(quality))) / 2.0
-    assert -np.log(ratio) == pytest.approx(decrement, rel=1e-10)
+@pytest.mark.parametrize("loss", [viscous, hysteretic])
+def test_a_half_cycle_by_integration(
+    loss: Callable[[float], Callable[[float, float], float]], quality: float
+) -> None:
+    duration, ratio = half_cycle(loss(quality))
+    if loss is viscous:
+        frequency = viscous_frequency_ratio(quality)
+        decrement = damping_coefficient(HALF_HERTZ, quality) * duration
+    else:
+        frequency = hysteretic_frequency_ratio(quality)
+        decrement = logarithmic_decrement(hysteretic_decrement_quality(quality)) / 2.0
+    assert np.pi / (HALF_HERTZ * duration) == pytest.approx(float(frequency), rel=1e-10)
+    assert -np.log(ratio) == pytest.approx(float(decrement), rel=1e-9)
 
 
 def test_frequency_shifts_at_the_smallest_q_met() -> None:

@@ -448,22 +448,10 @@ def test_walls_inside_the_sphere_are_refused() -> None:
 MOMENT, STEADY, HISTORY, TORQUE = 0.0988, 7.3e-5, 3.0e-3, 1.04
 
 
-def test_root_is_that_of_an_independent_solver() -> None:
+@pytest.mark.parametrize(("torque", "exponent"), [(0.0, 0.0), (0.02, 0.0), (0.02, -2.0)])
+def test_root_is_that_of_an_independent_solver(torque: float, exponent: float) -> None:
+    """Solid friction is inside the root."""
     mpmath.mp.dps = 30
-
-    def equation(s: mpmath.mpc) -> mpmath.mpc:
-        return MOMENT * s**2 + STEADY * s + HISTORY * s ** mpmath.mpf("1.5") + TORQUE
-
-    exact = mpmath.findroot(equation, mpmath.mpc(0, mpmath.sqrt(TORQUE / MOMENT)))
-    root = physics.free_decay_root(MOMENT, STEADY, HISTORY, TORQUE)
-    assert root.real == pytest.approx(float(exact.real), rel=1e-13)
-    assert root.imag == pytest.approx(float(exact.imag), rel=1e-13)
-
-
-@pytest.mark.parametrize("exponent", [0.0, -2.0])
-def test_solid_friction_is_inside_the_root(exponent: float) -> None:
-    mpmath.mp.dps = 30
-    torque = 0.02
 
     def equation(real: mpmath.mpf, imaginary: mpmath.mpf) -> list[mpmath.mpf]:
         s = mpmath.mpc(real, imaginary)
@@ -472,7 +460,8 @@ def test_solid_friction_is_inside_the_root(exponent: float) -> None:
         return [left.real, left.imag]
 
     exact = mpmath.findroot(equation, (-0.02, mpmath.sqrt(TORQUE / MOMENT)))
-    root = physics.free_decay_root(MOMENT, STEADY, HISTORY, TORQUE, torque, exponent)
+    solid = (torque, exponent) if torque else ()
+    root = physics.free_decay_root(MOMENT, STEADY, HISTORY, TORQUE, *solid)
     assert root.real == pytest.approx(float(exact[0]), rel=1e-12)
     assert root.imag == pytest.approx(float(exact[1]), rel=1e-12)
 
