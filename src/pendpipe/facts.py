@@ -13,28 +13,33 @@ How = Literal["stated", "shown", "guessed"]
 
 
 class Kind(NamedTuple):
-    """A kind of fact: the option that overrides it, and the numbers of a fit that it changes."""
+    """A kind of fact.
+
+    The option that overrides it, the numbers of a fit that it changes, and how often the test that
+    shows it is wrong: the upper end of what ``python -m benchmarks.facts`` prints.
+    """
 
     option: str
     changes: tuple[str, ...] = ()
+    wrong: float | None = None
 
 
 KINDS: Final[Mapping[str, Kind]] = {
-    "layout": Kind("--delimiter, --decimal"),
-    "rows": Kind("--start, --stop"),
-    "time column": Kind("--column", ("period", "Q")),
-    "unit of time": Kind("--unit s:", ("period",)),
-    "clock": Kind("--sample-rate", ("period",)),
-    "reading": Kind("--column", ("period", "Q")),
-    "unit": Kind("--unit"),
+    "layout": Kind("--delimiter, --decimal", wrong=0.004),
+    "rows": Kind("--start, --stop", wrong=0.004),
+    "time column": Kind("--column", ("period", "Q"), 0.004),
+    "unit of time": Kind("--unit s:", ("period",), 0.02),
+    "clock": Kind("--sample-rate", ("period",), 0.004),
+    "reading": Kind("--column", ("period", "Q"), 0.03),
+    "unit": Kind("--unit", wrong=0.01),
     "sensor constant": Kind("--volts-per-radian"),
-    "turns": Kind("--unit"),
-    "pivot": Kind("--column x for the position itself"),
-    "amplitudes": Kind("--column", ("Q",)),
-    "pull": Kind("--column", ("period",)),
-    "drive": Kind("--start, --stop"),
-    "lost readings": Kind("--start, --stop"),
-    "saturation": Kind("--start, --stop"),
+    "turns": Kind("--unit", wrong=0.004),
+    "pivot": Kind("--column x for the position itself", wrong=0.02),
+    "amplitudes": Kind("--column", ("Q",), 0.006),
+    "pull": Kind("--column", ("period",), 0.03),
+    "drive": Kind("--start, --stop", wrong=0.04),
+    "lost readings": Kind("--start, --stop", wrong=0.01),
+    "saturation": Kind("--start, --stop", wrong=0.004),
 }
 """Every kind, in the order in which a file is understood."""
 
@@ -57,8 +62,6 @@ class Fact:
         ``"stated"``, ``"shown"`` or ``"guessed"``.
     said
         The clause that the user reads; ``""`` of what goes without saying.
-    error_rate
-        How often the test that shows it is wrong; ``None`` of what is stated or guessed.
     option
         What overrides it; by default that of its kind.
 
@@ -72,12 +75,16 @@ class Fact:
     value: str
     how: How
     said: str = ""
-    error_rate: float | None = None
     option: str = ""
 
     def __post_init__(self) -> None:
         if not self.option:
             object.__setattr__(self, "option", KINDS[self.kind].option)
+
+    @property
+    def error_rate(self) -> float | None:
+        """How often the test that shows it is wrong; ``None`` of what is stated or guessed."""
+        return KINDS[self.kind].wrong if self.how == "shown" else None
 
     @property
     def changes(self) -> tuple[str, ...]:
@@ -104,7 +111,7 @@ class Fact:
 
     def as_json(self) -> dict[str, Any]:
         """Return the object that ``inspect --json`` prints."""
-        return asdict(self)
+        return asdict(self) | {"error_rate": self.error_rate}
 
 
 def guesses(facts: Iterable[Fact]) -> tuple[str, ...]:

@@ -66,7 +66,7 @@ def amplitudes_in(label: str, time: FloatArray | None, values: FloatArray) -> Fa
     if even and alternate(values):
         said += ", or two readings a cycle, which show neither period nor loss"
         return Fact("amplitudes", label, "guessed", said)
-    return Fact("amplitudes", label, "shown", said, _SWINGS)
+    return Fact("amplitudes", label, "shown", said)
 
 
 def _refuse_pull(recording: Recording, place: str | Path) -> None:
@@ -147,7 +147,7 @@ def pull_along_string(values: FloatArray) -> Fact | None:
         "the readings hang about 9.8 m/s^2, as a pull along the string does, which swings twice"
         " in a period of the pendulum"
     )
-    return Fact("pull", "9.8 m/s^2", "shown", said, _ALONG)
+    return Fact("pull", "9.8 m/s^2", "shown", said)
 
 
 _LEVEL: Final = 0.03
@@ -158,8 +158,6 @@ _BY_HAND: Final = 100
 """Turning points that somebody has noted; a converter takes more readings."""
 _EVEN: Final = 0.01
 """Of an interval, within which those of a converter lie; of what people note down, few do."""
-_SWINGS: Final = 0.01
-"""How often a recording of a swing only falls: none of 190 files of others does."""
 
 
 def alternate(values: FloatArray) -> bool:

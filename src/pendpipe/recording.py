@@ -192,8 +192,7 @@ class Recording:
     @property
     def unit_is_stated(self) -> bool:
         """Whether the unit is known, and not guessed."""
-        known = self.fact("unit")
-        return known is None or known.how != "guessed"
+        return "unit" not in {fact.kind for fact in self.facts if fact.how == "guessed"}
 
     @property
     def weak_guesses(self) -> tuple[str, ...]:

@@ -87,7 +87,8 @@ _AWAY: Final = 0.1
 """Of the radius, by which a pivot lies off (0, 0): three of `_KNOWN`."""
 _FEWEST: Final = 50
 _BETTER: Final = 30.0
-"""F of two parameters and 47 positions beyond three, which chance exceeds 4 times in 10^9."""
+"""F of one or two parameters and 47 positions beyond three, which chance exceeds 2 times in 10^6,
+or 4 in 10^9."""
 _LENGTHS: Final = (1.0, 0.01, 1e-3, 0.0254)
 """Metres of the units in which positions are given."""
 
@@ -111,8 +112,9 @@ def _better_circle(x: FloatArray, y: FloatArray) -> FloatArray | None:
 def pivot_of(x: FloatArray, y: FloatArray) -> FloatArray | None:
     """Find the pivot of positions on a circle that is clearly not about (0, 0).
 
-    None where they lie on none, its centre is uncertain by 3 % of its radius, or within a tenth
-    of it of (0, 0), and where the swing is below a tenth of a radian.
+    None where they lie on none, by an F test as well on a straight line, its centre is uncertain by
+    3 % of its radius, or within a tenth of it of (0, 0), and where the swing is below a tenth of a
+    radian.
     """
     if (fit := _circle_of(x, y)) is None:
         return None
@@ -121,8 +123,9 @@ def pivot_of(x: FloatArray, y: FloatArray) -> FloatArray | None:
     mean = float(radius.mean())
     hangs = high.min() > 0.05 * mean and wide.max() > 0.1 * mean
     away = math.hypot(*centre) / mean
-    # The farther from (0, 0), the less the circle need show.
-    clear = np.std(radius) < min(max(0.3, 1.5 * away), 0.5) * np.std(arm[:, 1])
+    # Of a straight line circles of any size are about as good.
+    straight = float(np.linalg.eigvalsh(np.cov(arm.T, bias=True))[0])
+    clear = (straight / float(np.var(radius)) - 1.0) * (len(arm) - 3) > _BETTER
     return centre if known < _KNOWN and hangs and clear and away > _AWAY else None
 
 

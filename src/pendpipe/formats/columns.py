@@ -160,11 +160,10 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
     )
     if others:
         said = f"one of several runs is read; choose with --column: {others}"
-        facts.append(Fact("rows", "one run", "shown", said))
+        facts.append(Fact("rows", "one run", "stated", said))
     if time is not None:
         told = options.columns[0] is not None or time.role in ("time", "index")
-        rate = None if told else 0.5 ** min(len(time.values) - 2, 1000)
-        facts.insert(0, Fact("time column", time.label, "stated" if told else "shown", "", rate))
+        facts.insert(0, Fact("time column", time.label, "stated" if told else "shown"))
         if time.made:
             facts.insert(1, Fact("clock", "repaired", "shown", f"'{time.label}' {time.made}"))
     return Choice(time, counts, readings, channels, tuple(facts), found)

@@ -44,8 +44,6 @@ _NAMES: Final = {
 }
 _SIGN_WORDS: Final = {"\t": "tabs", ",": "commas", ";": "semicolons", " ": "blanks", "|": "bars"}
 _DECIMALS: Final = {"comma": ",", "point": ".", "dot": "."}
-_WRONG: Final = 0.01
-"""How often a table is read wrong without a word: none of 300 that are drawn, at 95 %."""
 _MOST_WAYS: Final = 5000
 """Ways to read a row of commas that are tried."""
 _BLANK: Final = re.compile(
@@ -169,7 +167,7 @@ class Layout:
         between = _SIGN_WORDS.get(self.delimiter, repr(self.delimiter))
         cells = f"columns separated by {between}" if self.width > 1 else "one column"
         said = cells + (", decimal commas" if self.decimal == "," or self.joined else "")
-        return Fact("layout", said, "shown", said, _WRONG)
+        return Fact("layout", said, "shown", said)
 
 
 def is_blank(cell: str) -> bool:

@@ -129,12 +129,13 @@ def steady(time_s: FloatArray, values: FloatArray, others: Sequence[Column]) -> 
     lasted, size = periods(time_s, values)
     if len(lasted) < _STEADY_CYCLES:
         return ""
-    # Two crossings to a period: each cycle is counted from both sides.
-    quarter = len(size) // 4
-    first, last = float(np.median(size[:quarter])), float(np.median(size[-quarter:]))
-    even = float(np.std(size)) < 0.1 * first
+    quarters = np.array([np.median(part) for part in np.array_split(size, 4)])
+    even = float(np.std(size)) < 0.1 * quarters[0]
     cycles = round(float(np.ptp(time_s)) / float(np.median(lasted)))
-    if even and abs(last / first - 1.0) < _STEADY:
+    losses = -np.diff(quarters)
+    # A free decay of high Q loses as much in each quarter.
+    falls = losses.min() > 0.5 * losses.mean() > 0.0
+    if even and abs(quarters[-1] / quarters[0] - 1.0) < _STEADY and not falls:
         return (
             f"its size stays the same within {100 * _STEADY:.0f} % over {cycles} cycles: a steady"
             f" or driven signal, {NOT_FREE}"

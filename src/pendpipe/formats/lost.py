@@ -15,8 +15,6 @@ _LEAST: Final = 0.05
 _SPARSE: Final = 0.3
 """Share of readings beyond both their neighbours by that much, from which all may be turning
 points: there are seven or fewer in a cycle."""
-_WRONG: Final = 0.004
-"""How often readings of a sound recording are taken as lost: 15 of 4000 drawn swings."""
 
 
 def lost_readings(
@@ -37,15 +35,14 @@ def lost_readings(
     values = without_spikes(without_marks(given)) if swings else without_marks(given)
     missing, facts = np.isnan(values), list[Fact]()
     lost = given[missing & ~np.isnan(given)] / factor
-    rate = _WRONG if lost.size else None
     if lost.size:
         marks = ", ".join(f"{mark:.6g}" for mark in np.unique(lost)[:3])
         said = f"{lost.size} reading(s) that stand out ({marks}): taken as lost"
-        facts.append(Fact("lost readings", marks, "shown", said, rate))
+        facts.append(Fact("lost readings", marks, "shown", said))
     if missing.any():
         said = f"{missing.sum()} row(s) without a reading, marked missing"
         how: How = "shown" if lost.size else "stated"
-        facts.append(Fact("lost readings", f"{missing.sum()}", how, said, rate))
+        facts.append(Fact("lost readings", f"{missing.sum()}", how, said))
     return values, facts
 
 

@@ -1,15 +1,9 @@
 """The fact of saturation: readings that stand at the end of the sensor's range."""
 
-from dataclasses import replace
-from typing import Final
-
 import numpy as np
 
 from pendpipe.arrays import FloatArray
-from pendpipe.facts import Fact
-
-_WRONG: Final = 0.001
-"""How often readings of a sound recording are called cut off: none of 4000 drawn swings."""
+from pendpipe.facts import Fact, How
 
 
 def saturation(
@@ -19,8 +13,8 @@ def saturation(
     if not (cut := clipped_samples(values, step, limits)):
         return None
     said = f"{cut} reading(s) at the end of the sensor's range: its turns are cut off"
-    shown = Fact("saturation", f"{cut} readings", "shown", said, _WRONG)
-    return shown if limits is None else replace(shown, how="stated", error_rate=None)
+    known: How = "shown" if limits is None else "stated"
+    return Fact("saturation", f"{cut} readings", known, said)
 
 
 @np.errstate(invalid="ignore", over="ignore")  # a span beyond all numbers; a NaN that signals

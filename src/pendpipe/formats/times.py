@@ -39,8 +39,6 @@ _LATE: Final = 3.0
 """Packets by which a stamp may be off the line: more is a pause."""
 _RATES: Final = 0.02
 """By which a rate that is given may differ from that of the stamps: pauses are in these."""
-_OTHER_PERIODS: Final = 0.01
-"""How often a swing lies outside: two of 190 files of others do, one a balance of 211 s."""
 
 
 _ROUNDED: Final = 0.02
@@ -88,11 +86,9 @@ class TimeBase:
     facts: list[Fact] = field(default_factory=list)
     metadata: dict[str, str] = field(default_factory=dict)
 
-    def say(
-        self, kind: str, value: str, said: str, how: How = "shown", rate: float | None = None
-    ) -> None:
+    def say(self, kind: str, value: str, said: str, how: How = "shown") -> None:
         """Add a fact."""
-        self.facts.append(Fact(kind, value, how, said, rate))
+        self.facts.append(Fact(kind, value, how, said))
 
     def keep(self, rows: slice | BoolArray | IntArray, said: str = "") -> None:
         """Keep some of the rows, or put them into another order, and say so."""
@@ -191,7 +187,7 @@ def _from_column(
         factor = table.interval_s / float(np.median(np.abs(np.diff(column.values[filled]))))
         factor, rate = 10.0 ** np.rint(np.log10(factor)), 1.0 / table.interval_s
         said = f"'{column.label}' ticks every {factor:g} s, by the header's {rate:g} Hz"
-        unit = Fact("unit of time", f"{factor:g} s", "shown", said, _OTHER_PERIODS)
+        unit = Fact("unit of time", f"{factor:g} s", "shown", said)
     rows = np.flatnonzero(filled)
     lines = None if table.lines is None or len(table.lines) < len(filled) else table.lines[rows]
     base = TimeBase(column.values[rows] * factor, rows, lines, [unit])
@@ -200,7 +196,7 @@ def _from_column(
         (len(filled) - len(rows) - few * len(bad), "with neither time nor reading"),
     ):
         if left:
-            base.say("rows", f"{left} left out", f"{left} row(s) {what} left out")
+            base.say("rows", f"{left} left out", f"{left} row(s) {what} left out", "stated")
     return _in_order(table, choice, base, factor, options)
 
 
@@ -237,7 +233,7 @@ def _time_unit(
         short = reading.wanders or factor * period < _LONGEST_S
         if largest * factor > _EPOCH and not ticks and short:
             said = f"'{column.label}' counts {name} since 1970"
-            return factor, Fact("unit of time", name, "shown", said, _OTHER_PERIODS)
+            return factor, Fact("unit of time", name, "shown", said)
     return _time_by_size(column, period, values)
 
 
@@ -263,12 +259,10 @@ def _time_by_size(column: Column, period: float, values: FloatArray) -> tuple[fl
         first, last = _DAYS
         dated = first < float(np.abs(values).max(initial=0.0)) < last
         said = f"'{column.label}' is taken to be in days, as spreadsheets count"
-        return 86400.0, Fact(
-            kind, "days", "shown" if dated else "guessed", said, _OTHER_PERIODS if dated else None
-        )
+        return 86400.0, Fact(kind, "days", "shown" if dated else "guessed", said)
     whole = bool(np.all(values[:1000] == np.rint(values[:1000])))
     if (fits == [1.0] and not (whole and period)) or not period:
-        return 1.0, Fact(kind, "s", "shown", said, _OTHER_PERIODS)
+        return 1.0, Fact(kind, "s", "shown", said)
     said += f": a period of {period:.4g} s" if period else ""
     return 1.0, Fact(kind, "s", "guessed", said, option="--unit ms: for milliseconds")
 
@@ -349,7 +343,6 @@ def _count_rows(_choice: Choice, base: TimeBase) -> None:
             f"time stamps are rounded and repeat{until}: rows are counted at"
             f" {1.0 / interval:.6g} Hz{lost}, which all stamps agree with: the rate is known to"
             f" {100.0 * exact / np.ptp(even):.1g} %",
-            rate=0.5 ** min(len(even), 1000),
         )
         base.time_s = np.append(even, base.time_s[rows:])
         return

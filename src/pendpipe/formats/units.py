@@ -56,7 +56,6 @@ class _Guess:
     unit: Unit
     why: str = ""
     how: How = "stated"
-    error_rate: float | None = None
 
 
 def readings(table: Table, choice: Choice, options: ReadOptions, base: TimeBase) -> Readings:
@@ -91,7 +90,7 @@ def readings(table: Table, choice: Choice, options: ReadOptions, base: TimeBase)
         values, notes = _over_the_turn(values)
     said = f"'{column.label}' {guess.why}" if guess.why else ""
     facts = (
-        Fact("unit", unit.name, guess.how, said, guess.error_rate),
+        Fact("unit", unit.name, guess.how, said),
         *(Fact("turns", "undone", "shown", note) for note in notes),
     )
     return Readings(values, _QUANTITIES[unit.kind], unit.factor, unit.name, facts)
@@ -146,13 +145,8 @@ def _unit(
     )
 
 
-_BY_SINE: Final = 0.002
-"""How often the period of what is in another unit lengthens so: the shares of sin x in units 6 or
-more apart are 39 or more, one of which is known to 0.2 where it agrees with 1."""
 _METRE_S: Final = 0.3
 """Off 2 s, within which g/omega^2 is 1 m to 30 %, as is no other of the usual units."""
-_BY_SIZE: Final = 0.01
-"""How often readings of another unit stay within a turn of 2 pi and jump by it."""
 _ASIDE: Final = 3.0
 """Degrees by which a camera hangs askew, as a rule: chance lies as near to a quarter turn once in
 fifteen times, so that a centre only lets guess."""
@@ -210,7 +204,7 @@ def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray
         or _by_period(column, time_s)
         or (_by_digits(finite) if column.role != "length" else None)
         or (
-            _Guess(_RADIAN, "jumps by 2 pi: it is in radians", "shown", _BY_SIZE)
+            _Guess(_RADIAN, "jumps by 2 pi: it is in radians", "shown")
             if jumps_of_a_turn(finite)
             else None
         )
@@ -244,7 +238,7 @@ def _by_period(column: Column, time_s: FloatArray) -> _Guess | None:
     usual = float(np.median(periods(time_s, column.values)[0]))
     if name == "radians" and column.role != "angle" and abs(usual - 2.0) < _METRE_S:
         return _Guess(_RADIAN, f"{why}, or in metres, with a string of 1 m", "guessed")
-    return _Guess(_ANGLES[name], why, "shown", _BY_SINE)
+    return _Guess(_ANGLES[name], why, "shown")
 
 
 def _by_digits(finite: FloatArray) -> _Guess | None:
@@ -257,8 +251,7 @@ def _by_digits(finite: FloatArray) -> _Guess | None:
     ):
         if digit := _printed_digit(finite, scale):
             why = f"converted to {other}, its values are multiples of {digit:.4g}"
-            chance = _NEAR ** min(len(finite), _DIGITS)
-            return _Guess(unit, f"is in {name} ({why})", "shown", chance)
+            return _Guess(unit, f"is in {name} ({why})", "shown")
     return None
 
 
@@ -287,7 +280,7 @@ def _by_rate(choice: Choice, column: Column, time_s: FloatArray) -> _Guess | Non
         for guess, name in ((_RADIAN, "radians"), (_DEGREE, "degrees")):
             if abs(unit.factor * abs(slope) / guess.factor - 1.0) < 0.25:
                 why = f"is taken to be in {name} (by '{other.label}' beside it)"
-                return _Guess(guess, why, "shown", _BY_SINE)
+                return _Guess(guess, why, "shown")
     return None
 
 
