@@ -76,6 +76,7 @@ def test_eq_14_is_recovered_in_every_regime(regime: str) -> None:
     assert fit.value[3] == pytest.approx(0.068, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_pulls_are_standard() -> None:
     time = np.arange(309) * (math.pi / OMEGA)
     exact = np.asarray(amplitude(time, 0.068, *REGIMES["all"]))

@@ -392,6 +392,7 @@ def test_the_height_in_the_tank_is_uncertain_and_matters_near_walls_only() -> No
     assert not changed[DESIGN.wet == 0.0].any()
 
 
+@pytest.mark.slow
 def test_a_diagnosis_starts_from_the_tank_that_is_told() -> None:
     """A campaign in that tank lacks nothing, and one far from all walls lacks it."""
     told_tank = default(walls=True)
@@ -450,7 +451,7 @@ def test_a_record_that_disagrees_is_named_and_no_cause(record: str, percent: flo
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("record", ["air-03", "water-high-7", "water-high-8"])
+@pytest.mark.parametrize("record", ["water-high-7", "water-high-8"])
 def test_the_table_of_a_campaign_is_that_without_a_foreign_record(
     record: str, tmp_path: Path
 ) -> None:

@@ -84,6 +84,7 @@ def test_air_that_is_off_leads_in_baily_s_rods() -> None:
     assert 14.6 * np.exp(size) == pytest.approx(8.68, rel=0.05)
 
 
+@pytest.mark.slow
 def test_in_dubuat_s_water_a_smaller_viscosity_explains_a_part() -> None:
     """The constant explains a part; of the small spheres n is lower than any viscosity allows."""
     stokes, today, small = ask(PUBLISHED / "dubuat-1786")[1]
@@ -175,6 +176,7 @@ def test_coulomb_s_discs_follow_from_the_largest() -> None:
     assert not asked.found.missing
 
 
+@pytest.mark.slow
 def test_bessel_s_k_is_calculated_anew_and_his_arcs_are_not_judged_unasked() -> None:
     (asked,) = ask(PUBLISHED / "bessel-1826")[1]
     np.testing.assert_allclose(asked.told[:3], [1.694, 1.755, 1.786], atol=5e-4)

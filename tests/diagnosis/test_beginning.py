@@ -91,6 +91,7 @@ def test_a_short_record_of_a_pendulum_is_a_pendulums_first() -> None:
     assert "cubic-stiffness" not in {each.identifier for each in found.missing}
 
 
+@pytest.mark.slow
 def test_time_stamps_are_corrected_after_sin_x_was_fitted_to_them() -> None:
     """1511 readings at even times, stamped late at random: a regular clock keeps 1500 of them."""
     time_s, values = INTERVAL_S * np.arange(1511), np.append(TRUTH, 1.0)

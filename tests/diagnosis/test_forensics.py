@@ -482,6 +482,7 @@ def judged(record: Fitted) -> dict[str, tuple[float, float]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_is_as_clear_in_other_units(fault: str, clean: FloatArray) -> None:
     slower, larger = 1.0 / 16.0, 64.0

@@ -131,6 +131,7 @@ def test_a_viscous_baseline_has_one_part_and_holds_it() -> None:
     assert outcome.baseline.parameters["b"].sd == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("given", [{"c": 1.0}, {"mass": 1.0}, {"b": -0.1}])
 def test_what_cannot_be_held_is_refused_in_one_line(given: dict[str, float]) -> None:
     """A friction that stops the pendulum at once, no parameter, and a gain of energy."""
@@ -176,6 +177,7 @@ def test_red_noise_beside_sin_x_is_noise() -> None:
     assert abs(b.value - TRUTH[B]) < 4.0 * b.sd
 
 
+@pytest.mark.slow
 def test_four_swings_at_uneven_times_are_answered() -> None:
     """A wheel with a strong brake, read by an instrument that skips rows."""
     random = np.random.default_rng(8)
@@ -249,6 +251,7 @@ def judged(recording: "pp.Recording") -> "tuple[pp.FitResult, dict]":  # type: i
     return pp.fit(recording), pp.diagnose(recording).to_dict()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("restoring", "effects"), [("sine", ()), ("linear", ("circular-error",))])
 def test_nothing_is_missing_from_a_pendulum_with_hysteretic_loss(
     restoring: Restoring, effects: tuple[str, ...]

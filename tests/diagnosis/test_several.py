@@ -78,6 +78,7 @@ def test_shared_values_are_better_known_than_in_the_best_recording() -> None:
     assert found.to_dict()["improved"]["parameters"]["c"]["sd"] < best
 
 
+@pytest.mark.slow
 def test_a_torque_that_is_known_is_that_of_all() -> None:
     pair = [swing(each, 7, restoring="linear").between(0.0, 40.0) for each in (0.05, 0.4)]
     springs = pp.diagnose(pair, volts_per_radian=1.0, together=True, restoring="linear")

@@ -58,6 +58,7 @@ def jumped() -> Diagnosis:
     return diagnose_recording(recording(model.reading(np.append(TRUTH, [JUMP_RAD, INSTANT_S])), 3))
 
 
+@pytest.mark.slow
 def test_a_jump_of_ten_times_the_noise_is_no_red_noise_and_has_no_rival() -> None:
     (effect,) = jumped().effects
     assert effect.identifier == "equilibrium-step"
@@ -80,6 +81,7 @@ def test_without_one_of_two_jumps_the_other_stays_where_it_is() -> None:
     assert weighing._others_in_place(alone, alone.steps[0].winner.effect) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [1, 2])
 def test_a_rival_is_compared_by_its_gain_with_the_final_noise(place: int) -> None:
     found = jumped().search

@@ -35,6 +35,7 @@ def of_names(words: set[str]) -> dict[str, Record]:
     return {word: Record(word, "file.csv") for word in words}
 
 
+@pytest.mark.slow
 @given(names, st.integers(1, 20), st.text("abcdefghij", min_size=1, max_size=6))
 def test_an_added_record_changes_one_chunk(words: set[str], batch: int, added: str) -> None:
     before, after = split(of_names(words), batch), split(of_names(words | {added}), batch)
