@@ -24,9 +24,8 @@ def free(
 
 def noisy(values: FloatArray, part: float, seed: int) -> FloatArray:
     """The same with noise of a part of its size."""
-    rng = np.random.default_rng(seed)
-    size = float(np.abs(values).max())
-    return np.asarray(values + part * size * rng.standard_normal(len(values)))
+    noise = np.random.default_rng(seed).standard_normal(len(values))
+    return np.asarray(values + part * np.abs(values).max() * noise)
 
 
 def written(folder: Path, content: str | bytes, name: str = "a.txt") -> Path:
@@ -157,5 +156,4 @@ def test_a_beat_loses_no_rows(
     """K56: where stamps are even, the turn of the phase at a node is no lost row."""
     path = written(tmp_path, beat(one, other, q, q2, part, 0.0))
     answer = str(pp.diagnose(path))
-    assert "dropped samples" not in answer
-    assert "lost" not in answer
+    assert not re.search("dropped samples|lost", answer)
