@@ -1,16 +1,12 @@
 """Names beside each other: rivals, neighbours, and cycles that were left out."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from pendpipe.analysis.turning_points.measure import prepare as prepare_samples
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.faults import _applied
-from pendpipe.diagnosis.found import Finding
 from pendpipe.diagnosis.held_out import completed, held_out, predicted_worse
 from pendpipe.diagnosis.hypothesis import CHOICE, FURTHER, Hypothesis, Step, price
 from pendpipe.diagnosis.noise import Noise
@@ -123,14 +119,6 @@ def test_each_further_name_has_its_price_and_sin_x_has_none() -> None:
     assert price(steps("impulse", "sensor-cubic", "gain-drift")) == one + 2.0 * FURTHER
 
 
-@pytest.mark.structure
-def test_a_name_that_leaves_noise_stays() -> None:
-    state = state_with(with_effects("sensor-quadratic") + white(5), "sensor-quadratic")
-    before = state.fit
-    state = simplified(state)
-    assert state.fit is before
-
-
 @pytest.mark.slow
 def test_no_name_for_a_part_of_a_misfit_is_confident() -> None:
     found = diagnose_recording(recording(with_effects("frequency-drift") + CHIRP, 5))
@@ -186,21 +174,6 @@ def test_what_is_left_is_drawn_by_the_curve_that_takes_most_of_it() -> None:
     assert remainder_of(drawn.fit, drawn.data, drawn.noise).excess < 0.2 * before.excess
 
 
-@pytest.mark.structure
-def test_what_is_left_is_described_where_only_sin_x_was_found() -> None:
-    """A line that sweeps, of which no curve makes much."""
-    sine = by_identifier("circular-error")
-    model, value = Model(TIME_S, INTERVAL_S, (sine,)), np.append(TRUTH, 1.0)
-    data, noise = prepared(model.reading(value) + 0.3 * CHIRP + white(6))
-    fit = refine(model, data, noise, value)
-    known = Step((Rival(sine, fit, 9.0, 9.0, 9.0),), 0.0, fit)
-    bare = refine(Model(TIME_S, INTERVAL_S), data, noise, TRUTH)
-    state = task_of().scanned(hypothesis_of(fit, data, noise, (), bare, steps=(known,)))
-    (drawn,) = describing(state, task_of())
-    assert drawn.lower > 0.0
-    assert drawn.steps[-1].winner.drawn
-
-
 def test_noise_is_not_described() -> None:
     fit, data, noise = null_fit()
     state = run_search(hypothesis_of(fit, data, noise, (), fit), task_of())
@@ -233,20 +206,6 @@ def test_a_rare_name_that_looks_like_nothing_that_was_found_is_no_rival() -> Non
     outcome = diagnosed("equilibrium-step")
     rare = {effect.identifier for effect in CATALOGUE if effect.rare}
     assert not rare & set.union(*classes_found(outcome))
-
-
-@pytest.mark.parametrize("names", [(), ("sensor-quadratic",)])
-@pytest.mark.parametrize("name", ["jitter", "broadband-drive", "clipping"])
-@pytest.mark.structure
-def test_a_random_cause_pays_the_price_of_a_name(name: str, names: tuple[str, ...]) -> None:
-    """Beside one name more than beside none; a fault that shows by itself pays nothing."""
-    readings = with_effects(*names) + white(5)
-    samples = prepare_samples(recording(readings, 6), "the test")
-    state = replace(state_with(readings, *names), samples=samples)
-    least = {"clipping": 0.0}.get(name, FURTHER if names else CHOICE)
-    for gain, told in ((least - 1.0, least == 0.0), (least + 1.0, True)):
-        after = _applied(Finding(name, 1e-9, gain), state, task_of(samples))
-        assert [fault.identifier for fault in (after.faults if after else ())] == [name] * told
 
 
 @pytest.mark.slow
