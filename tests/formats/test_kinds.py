@@ -9,6 +9,7 @@ import pytest
 
 import pendpipe as pp
 from pendpipe.arrays import FloatArray
+from pendpipe.errors import InputError
 from pendpipe.formats import read
 
 from .cases import text
@@ -157,3 +158,26 @@ def test_a_beat_loses_no_rows(
     path = written(tmp_path, beat(one, other, q, q2, part, 0.0))
     answer = str(pp.diagnose(path))
     assert not re.search("dropped samples|lost", answer)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("seed", "period", "quality", "cycles"),
+    [(8, 0.8, 60.0, 3.5), (5, 1.5, 25.0, 2.9), (7, 1.1, 90.0, 3.4)],
+)
+def test_of_a_few_swings_behind_a_minute_of_handling_nothing_is_quoted(
+    seed: int, period: float, quality: float, cycles: float
+) -> None:
+    """K57: fit and diagnosis say the same of what is left, and that most was cut."""
+    rng = np.random.default_rng(seed)
+    hand = np.convolve(rng.standard_normal(2400), np.hanning(30), "same")
+    hand *= 0.1 / np.std(hand)
+    swings = free(np.arange(int(40 * cycles)) * period / 40.0, period, quality, 0.25, 0.0)
+    x = np.concatenate([hand, np.linspace(hand[-1], 0.25, 30), swings, np.zeros(800)])
+    x += 2e-3 * rng.standard_normal(len(x))
+    recording = pp.Recording(time_s=np.arange(len(x)) * period / 40.0, angle_rad=x)
+    found = pp.fit(recording)
+    assert found.light_reason.startswith("most of it was cut")
+    assert "nothing of this fit can be quoted" in str(found)
+    with pytest.raises(InputError, match=r"most of it was cut.* nothing is said"):
+        pp.diagnose(recording)
