@@ -244,6 +244,16 @@ def test_no_sentence_has_four_names_and_its_probabilities_are_those_of_the_json(
             assert cause in sentence
 
 
+@pytest.mark.structure
+def test_one_curve_of_unknown_form_that_stands_for_several_effects_is_said_once() -> None:
+    one = likely("clock-drift", 0.1, ("unnamed-drive", 0.81))
+    other = likely("parametric-drive", 0.1, ("unnamed-drive", 0.56), ("clock-drift", 0.3))
+    summary = diagnosis(other, one).summary
+    assert summary.missing == ("a torque that depends on the time in an unknown way (81 %)",)
+    assert summary.certainty.count("a torque that depends on the time") == 1
+    assert not summary.candidates
+
+
 def test_what_eq_8_describes_needs_no_effect() -> None:
     text = undisturbed(0.4)
     assert text.startswith("Eq. 8 describes this recording")

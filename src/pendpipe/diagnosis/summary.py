@@ -236,15 +236,16 @@ def summarise(diagnosis: Outcome) -> Summary:
         whole = "; ".join(seen)
         return Summary(f"{said} ({p}){coloured}{zero}", sentence=sentence, seen=whole)
     causes = causes_of(found)
-    named = [cause.text for cause in causes if cause.text]
+    told = {cause.text: cause for cause in causes if cause.text}
+    named = list(told)
     candidates = [_candidate(each.effect) for each in causes if not each.text]
     changes = _changes(diagnosis)
     rest = diagnosis.remainder is not None and diagnosis.remainder.systematic
     family = family_of([each.effect for each in causes if not each.text])
     if named:
-        drawn = ["described by " * cause.described + cause.text for cause in causes if cause.text]
-        headline, lacks = f"missing: {'; '.join(drawn)}", _lacks(causes)
-        if rest or len(named) < len(found):
+        drawn = ["described by " * cause.described + text for text, cause in told.items()]
+        headline, lacks = f"missing: {'; '.join(drawn)}", _lacks(list(told.values()))
+        if rest or not all(cause.text for cause in causes):
             headline += ", and a misfit of unknown cause"
             left = _seen(diagnosis.left, "")
             more = f" ({left[0]})" if left else f" ({family})" if family else ""
@@ -331,11 +332,18 @@ class Cause:
 
 
 def causes_of(found: Sequence[FoundEffect]) -> list[Cause]:
-    """Return what is said of each effect: three names together at most, the most likely first."""
-    room, said = _MOST_NAMES, dict[int, Cause]()
+    """Return what is said of each effect: three names together at most, the most likely first.
+
+    Effects that one curve of unknown form is likeliest to stand for are one cause.
+    """
+    room, said, curves = _MOST_NAMES, dict[int, Cause](), dict[str, Cause]()
     for effect in sorted(found, key=lambda each: -class_of(each)[0][0]):
-        said[id(effect)] = cause = _cause(effect, room)
-        room -= len(cause.names)
+        cause = curves.get(class_of(effect)[0][2])
+        if cause is None:
+            cause = _cause(effect, room)
+            room -= len(cause.names)
+            curves |= {name: cause for name in cause.names if name in UNNAMED}
+        said[id(effect)] = replace(cause, effect=effect)
     return [said[id(effect)] for effect in found]
 
 
@@ -554,12 +562,12 @@ def _forces(found: Sequence[FoundEffect]) -> list[str]:
 
 
 def _certainty(diagnosis: Outcome, named: Sequence[str], *, rest: bool) -> str:
-    sure = [
-        f"{class_of(each)[0][1]} {percent(class_of(each)[0][0])}"
-        for each in diagnosis.missing
-        if class_of(each)[0][0] >= NAMED
-    ]
-    text = ", ".join(sure) if sure else "no cause above 50 %" if not named else ""
+    sure: dict[str, float] = {}
+    for p, name, _ in (class_of(each)[0] for each in diagnosis.missing):
+        if p >= NAMED:
+            sure[name] = max(p, sure.get(name, 0.0))
+    words = [f"{name} {percent(p)}" for name, p in sure.items()]
+    text = ", ".join(words) if words else "no cause above 50 %" if not named else ""
     held = diagnosis.held_out
     if held is not None and math.isfinite(held.gain):
         well = held.better if held.gain >= 0.0 else held.blocks - held.better
