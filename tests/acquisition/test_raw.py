@@ -1,6 +1,5 @@
 """Raw files: what was kept comes back, whatever happens to the recorder, its disk or the file."""
 
-import errno
 import io
 import json
 import os
@@ -219,39 +218,6 @@ resource = pytest.importorskip("resource", reason="this system has no limit on a
 
 def slow(time_s: FloatArray) -> FloatArray:
     return np.asarray(5.0 * np.sin(0.02 * time_s))
-
-
-class FullDisk:
-    """Takes so many bytes and no more."""
-
-    def __init__(self, room: int) -> None:
-        self.content = b""
-        self._room = room
-
-    def flush(self) -> None:
-        """Nothing is held back."""
-
-    def write(self, data: bytes) -> int:
-        piece = bytes(data[: self._room - len(self.content)])
-        if not piece:
-            raise OSError(errno.ENOSPC, "No space left on device")
-        self.content += piece
-        return len(piece)
-
-
-def test_a_full_disk_keeps_every_whole_frame() -> None:
-    disk = FullDisk(1200)
-    writer = RawWriter(disk, {"model": "DI-2108"})  # type: ignore[arg-type]
-    pieces = [bytes([number]) * 20 for number in range(40)]
-    with pytest.raises(OSError, match="No space left"):
-        for number, piece in enumerate(pieces):
-            writer.data(0.1 * number, piece)
-    raw = read_raw(disk.content)
-    assert b"".join(pieces).startswith(raw.data)
-    described = len(disk.content) - len(disk.content.partition(b"\n")[2])
-    frame = len(Frame(b"D", 0.0, b"").packed())
-    # The description is listed twice, the second time as a frame.
-    assert len(raw.data) // 20 == (1200 - 2 * described + 1 - frame) // (frame + 20)
 
 
 def test_a_full_file_system_is_one_line_and_what_was_kept_opens(tmp_path: Path) -> None:
