@@ -257,7 +257,7 @@ def damage_of(path: Path) -> Damage | None:
     if recorded or path.suffix == ".log" or (found and found.stated in ("", found.digest)):
         return None
     problem = "it is torn or altered" if path.stat().st_size else "it is empty"
-    return Damage(path, problem, sha256(path)[:8])
+    return Damage(path, problem, (sha256(path) or "")[:8])
 
 
 def sealed(text: str) -> str:
@@ -504,10 +504,11 @@ def digest(content: Any) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()
 
 
-def sha256(path: str | Path) -> str:
-    """Hash a file's content, for the provenance of what was made from it."""
-    with _named(path), Path(path).open("rb") as stream:
+def sha256(path: str | Path) -> str | None:
+    """Hash a file's content; None where it can't be read, as the job that reads it says."""
+    with suppress(OSError), Path(path).open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+    return None
 
 
 @contextmanager

@@ -1,9 +1,10 @@
 """Which code made a result: another version of pendpipe makes a campaign's results anew."""
 
-import hashlib
 from functools import cache
 from pathlib import Path
 from typing import Final
+
+from pendpipe.files import digest, sha256
 
 PACKAGE: Final = Path(__file__).parent
 _SOURCE: Final = {".py", ".html", ".css", ".js", ".txt", ".mplstyle"}
@@ -15,9 +16,6 @@ def code_version() -> str:
 
     All of it, so that no campaign holds results of two versions.
     """
-    digest = hashlib.sha256()
-    for path in sorted(PACKAGE.rglob("*")):
-        # The version counts commits: another one is no other code.
-        if path.suffix in _SOURCE and path.name != "_version.py":
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]
+    paths = sorted(path for path in PACKAGE.rglob("*") if path.suffix in _SOURCE)
+    # The version counts commits: another one is no other code.
+    return digest([sha256(path) for path in paths if path.name != "_version.py"])[:12]

@@ -14,6 +14,7 @@ from pendpipe.errors import InputError, refuse_if
 from pendpipe.files import SET_ASIDE, damage_of
 from pendpipe.options import flags
 from pendpipe.stages.archive import FOLDER
+from pendpipe.stages.refusal import is_stub
 
 TEMPORARY: Final = re.compile(r"\.(.+)\.[0-9a-f]{8}")
 """The name of a file that `pendpipe.files.replaced` had not finished."""
@@ -90,10 +91,9 @@ def examine(results: Path) -> list[Finding]:
         for project in dict.fromkeys((Path(), results.parent))
         for finding in _of_snakemake(project / ".snakemake")
     ]
-    if not results.is_dir():
-        if found:  # killed before the first result
-            return found
-        raise InputError(results, "there is no such folder", "name a folder of results")
+    # Killed before the first result it is a lock alone.
+    missing = not (found or results.is_dir())
+    refuse_if(missing, results, "there is no such folder", "name a folder of results")
     found += _of_files(results)
     refuse_if(
         not (found or any(results.rglob(f"{FOLDER}/*.zip"))),
@@ -127,10 +127,8 @@ def _undecoded(raw: Path) -> Iterator[Finding]:
     """A raw recording without its CSV."""
     in_campaign = raw.parent.name == "raw"
     table = raw.parent.parent / "recording.csv" if in_campaign else raw.with_suffix(".csv")
-    if table.is_file():
-        with table.open("rb") as stream:
-            if stream.read(10) != b"# refused:":
-                return
+    if table.is_file() and not is_stub(table):
+        return
     from pendpipe.acquisition.attempts import read_attempts
 
     call = "snakemake" if in_campaign else f"pendpipe acquire --recover {raw} --out {table}"

@@ -86,17 +86,10 @@ def _made(campaign: Campaign, stage: Stage, record: Record, folder: Path) -> dic
     if stage.name == "calibrate" and campaign.sensor:
         read["sensor.json"] = campaign.sensor
     return {
-        "settings": settings(campaign, stage, record, _sha256),
+        "settings": settings(campaign, stage, record, sha256),
         "code": code_version(),
-        "read": {name: found for name, path in read.items() if (found := _sha256(path))},
+        "read": {name: found for name, path in read.items() if (found := sha256(path))},
     }
-
-
-def _sha256(path: Path) -> str | None:
-    try:
-        return sha256(path)
-    except OSError:  # no such file: its own stage says so
-        return None
 
 
 def _of_record(

@@ -30,10 +30,7 @@ def pack(path: Path, folder: Path, files: Iterable[Path], made: Mapping[str, Mad
         archive.writestr(zipfile.ZipInfo(_INDEX), json.dumps(made, sort_keys=True))
         for file in sorted(files):
             entry = zipfile.ZipInfo(file.relative_to(folder).as_posix())
-            entry.compress_type, entry.file_size = zipfile.ZIP_DEFLATED, file.stat().st_size
-            entry._compresslevel = 1  # type: ignore[attr-defined]  # (Python 3.13 gives it a name.)
-            with file.open("rb") as source, archive.open(entry, "w") as target:
-                shutil.copyfileobj(source, target, 1 << 20)
+            archive.writestr(entry, file.read_bytes(), zipfile.ZIP_DEFLATED, compresslevel=1)
 
 
 @contextmanager

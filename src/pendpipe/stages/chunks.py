@@ -9,7 +9,7 @@ out of it: always in a campaign of up to `SMALL` records, else when they are ask
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -149,18 +149,13 @@ def split(records: dict[str, Record], batch: int) -> dict[str, tuple[Record, ...
     sums = {name: hashlib.sha256(name.encode()).digest() for name in records}
     bits = {name: f"{int.from_bytes(digest):0256b}" for name, digest in sums.items()}
 
-    def parts(names: list[str], prefix: str) -> Iterator[tuple[str, list[str]]]:
+    def parts(names: list[str], prefix: str) -> dict[str, tuple[Record, ...]]:
         if len(names) <= batch:
-            if names:
-                yield prefix or WHOLE, names
-            return
-        for bit in "01":
-            chosen = [name for name in names if bits[name][len(prefix)] == bit]
-            yield from parts(chosen, prefix + bit)
+            return {prefix or WHOLE: tuple(records[name] for name in names)} if names else {}
+        halves = [[name for name in names if bits[name][len(prefix)] == bit] for bit in "01"]
+        return parts(halves[0], f"{prefix}0") | parts(halves[1], f"{prefix}1")
 
-    return {
-        chunk: tuple(records[name] for name in names) for chunk, names in parts(list(records), "")
-    }
+    return parts([*records], "")
 
 
 def settings(campaign: Campaign, stage: Stage, record: Record, hash_of: jobs.Hash) -> str:

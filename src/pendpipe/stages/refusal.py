@@ -62,35 +62,22 @@ def run_stage(
     with writing(inputs=filter(None, (*inputs, *sources))):
         if refused is None:
             work()
-        else:
-            _work_or_refuse(stage, record, work, outputs, refused, sources)
-
-
-def _work_or_refuse(
-    stage: str,
-    record: str | None,
-    work: Callable[[], None],
-    outputs: Sequence[Path],
-    refused: Path,
-    sources: Iterable[Path],
-) -> None:
-    earlier = reason_of(refused, before=stage)
-    if earlier is not None:
-        _write_stubs(outputs, earlier)
-        print(f"pendpipe: {record} was refused before: {earlier}", file=sys.stderr)
-        return
-    refused.unlink(missing_ok=True)
-    try:
-        work()
-    except (DamagedError, UnwritableError):
-        raise
-    except InputError as error:
-        reason = within_results(error, refused, sources)
-        write_json(
-            refused, {"schema_version": 1, "record": record, "stage": stage, "reason": reason}
-        )
-        _write_stubs(outputs, reason)
-        print(f"pendpipe: {record} is refused: {error}", file=sys.stderr)
+            return
+        if earlier := reason_of(refused, before=stage):
+            _write_stubs(outputs, earlier)
+            print(f"pendpipe: {record} was refused before: {earlier}", file=sys.stderr)
+            return
+        refused.unlink(missing_ok=True)
+        try:
+            work()
+        except (DamagedError, UnwritableError):
+            raise
+        except InputError as error:
+            reason = within_results(error, refused, sources)
+            content = {"schema_version": 1, "record": record, "stage": stage, "reason": reason}
+            write_json(refused, content)
+            _write_stubs(outputs, reason)
+            print(f"pendpipe: {record} is refused: {error}", file=sys.stderr)
 
 
 def within_results(error: InputError, refused: Path | None, sources: Iterable[Path] = ()) -> str:

@@ -27,13 +27,10 @@ class Watch:
         self.damages: list[Damage] = []
 
     def sha256(self, path: Path) -> str | None:
-        """The hash of a user's file; None where it can't be read, as its own job says."""
+        """The hash of a user's file (`files.sha256`)."""
         entry, now = self._entry(str(path))
         if now and entry.get("seen") != now:
-            try:
-                entry |= {"sha256": sha256(path), "seen": now}
-            except OSError:
-                return None
+            entry |= {"sha256": sha256(path), "seen": now}
         return entry["sha256"] if now else None
 
     def history(self, *paths: str) -> str:
