@@ -193,11 +193,16 @@ def test_jitter_is_measured(sigma_t: float, step: float, clean: FloatArray) -> N
     assert np.mean(np.abs(pulls)) < 2.0
 
 
-def test_noise_that_dies_with_the_amplitude_is_no_jitter(clean: FloatArray) -> None:
+DYING = 1.0 + 1.5 * np.exp(-AIR.times() / 60.0)
+
+
+@pytest.mark.parametrize(("dying", "of_the_gain"), [(DYING, 0.0), (1.0, 2e-3)])
+def test_noise_that_dies_with_the_amplitude_and_that_of_the_gain_are_no_jitter(
+    dying: FloatArray | float, of_the_gain: float, clean: FloatArray
+) -> None:
     draw = generator()
-    envelope = 0.15 * np.exp(-AIR.times() / 60.0)
-    readings = clean + drawn_white(draw, AIR.count) * (1.0 + 10.0 * envelope)
-    assert "jitter" not in found(fitted(AIR, readings))
+    readings = clean * (1.0 + of_the_gain * draw.standard_normal(AIR.count))
+    assert "jitter" not in found(fitted(AIR, readings + dying * drawn_white(draw, AIR.count)))
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -208,12 +213,6 @@ def test_a_constant_amplitude_shows_no_jitter_and_stops_nothing(seed: int) -> No
     record = fitted(held, clean + drawn_white(generator(seed), held.count))
     finding = TESTS["jitter"](record.data, record.fit, record.noise, record.samples)
     assert finding.p_value > 1e-4
-
-
-def test_gain_noise_is_no_jitter(clean: FloatArray) -> None:
-    draw = generator()
-    readings = clean * (1.0 + 2e-3 * draw.standard_normal(AIR.count)) + drawn_white(draw, AIR.count)
-    assert "jitter" not in found(fitted(AIR, readings))
 
 
 def test_colour_is_measured(clean: FloatArray) -> None:

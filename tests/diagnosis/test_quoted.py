@@ -176,24 +176,22 @@ def test_q_of_a_description_is_that_of_its_losses(
         assert found.value == pytest.approx(by_losses, rel=within)
 
 
-def test_q_is_with_the_period_that_losses_do_not_lengthen() -> None:
-    """A viscous pendulum of Q = omega/(2 b) = 14 loses exp(-b t), 1/(8 Q^2) slower."""
-    b, model = 0.2, Model(TIME_S[:200], INTERVAL_S)
+@pytest.mark.parametrize(("readings", "amplitudes"), [(200, [0.1, 0.05, 0.02]), (300, [0.1])])
+def test_q_is_with_the_period_that_losses_do_not_lengthen(
+    readings: int, amplitudes: list[float]
+) -> None:
+    """A viscous pendulum of Q = omega/(2 b) = 14 loses exp(-b t), 1/(8 Q^2) slower.
+
+    Also where the motion from other values turns more often: a curve of the loss lets the last
+    swings fade later or earlier than the fit's own.
+    """
+    b, (longer, model) = 0.2, (Model(TIME_S[:count], INTERVAL_S) for count in (readings, 200))
     value = np.array([0.0, b, 0.0, 0.0, OMEGA_RAD_S, 0.15, -0.3, 0.0])
     data, noise = prepared(model.reading(value), TIME_S[:200])
     fit = refine(model, data, noise, value, rounds=0)
-    for found in quality_factors_of(fit, [0.1, 0.05, 0.02]).values():
-        assert found.value == pytest.approx(0.5 * OMEGA_RAD_S / b, rel=1e-5)
-
-
-def test_q_is_told_where_the_motion_from_other_values_turns_more_often() -> None:
-    """A curve of the loss lets the last swings fade later or earlier than the fit's own."""
-    b, longer, shorter = 0.2, Model(TIME_S[:300], INTERVAL_S), Model(TIME_S[:200], INTERVAL_S)
-    value = np.array([0.0, b, 0.0, 0.0, OMEGA_RAD_S, 0.15, -0.3, 0.0])
-    data, noise = prepared(shorter.reading(value), TIME_S[:200])
-    fit = refine(shorter, data, noise, value, rounds=0)
     fit = replace(fit, evaluation=replace(fit.evaluation, model=longer))
-    assert quality_factors_of(fit, [0.1])[0.1].value == pytest.approx(OMEGA_RAD_S / 2 / b, rel=1e-5)
+    for found in quality_factors_of(fit, amplitudes).values():
+        assert found.value == pytest.approx(0.5 * OMEGA_RAD_S / b, rel=1e-5)
 
 
 # Each description is fitted as it is named.
