@@ -23,8 +23,9 @@ _RIDGE: Final = 1e-12
 
 def harmonic_columns(phase: FloatArray, harmonics: int) -> FloatArray:
     """Return 1, cos psi, sin psi, cos 2 psi, ...; shape (1 + 2 harmonics, n)."""
-    turned = np.arange(1, harmonics + 1)[:, None] * phase
-    waves = np.stack([np.cos(turned), np.sin(turned)], axis=1).reshape(-1, len(phase))
+    first = np.cos(phase) + 1j * np.sin(phase)
+    turned = np.cumprod(np.broadcast_to(first, (harmonics, len(phase))), axis=0)
+    waves = np.stack([turned.real, turned.imag], axis=1).reshape(-1, len(phase))
     return np.concatenate([np.ones((1, len(phase))), waves])
 
 

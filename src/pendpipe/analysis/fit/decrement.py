@@ -194,9 +194,11 @@ def seen_loss(points: TurningPoints) -> tuple[float, float, float, float]:
 
 def loss_of(law: Eq8, amplitude: float) -> float:
     """Relative loss of a law, 1/s, averaged over the cycle in whose middle y is `amplitude`."""
-    return losses_of(law, amplitude)[0]
+    cycle = _cycle(law, amplitude)
+    return losses_of(law, amplitude)[0] if cycle is None else cycle[1]
 
 
+@lru_cache(maxsize=16)
 def losses_of(law: Eq8, amplitude: float) -> tuple[float, FloatArray]:
     """The same, and the parts of it that a, b and c take, shape (3,).
 

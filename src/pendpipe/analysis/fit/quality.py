@@ -17,9 +17,9 @@ from pendpipe.analysis.fit.decrement import Light, losses_of
 from pendpipe.analysis.fit.fitted import Fit, Fitted, Verdict
 from pendpipe.analysis.torque import TOP, swing_phase
 from pendpipe.arrays import FloatArray
-from pendpipe.dynamics import Eq8, Release, turning_points
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Z95, Estimate, over
+from pendpipe.physics.lengthening import elliptic
 from pendpipe.quantities import after_number
 
 LEAST_QUALITY: Final = 3.0
@@ -248,14 +248,10 @@ def _covariance_of_losses(result: Fitted, amplitude: float) -> FloatArray:
 
 def period_of(result: Fitted, amplitude: float) -> float:
     """Period at one amplitude, s; that of small amplitudes where the law cannot swing there."""
-    if not math.isfinite(result.value("frequency")):
-        return math.nan
-    lossless = Eq8(2.0 * math.pi * result.value("frequency"), restoring=result.restoring)
-    try:
-        cycle = turning_points(lossless, Release(0.0, amplitude), count=3)
-    except ValueError:
-        return 1.0 / result.value("frequency")
-    return float(cycle.time_s[2]) if amplitude > 0.0 else 1.0 / result.value("frequency")
+    small = 1.0 / result.value("frequency")
+    if result.restoring == "linear" or not 0.0 < amplitude < math.pi:
+        return small
+    return 2.0 / math.pi * small * float(elliptic(np.array(math.sin(0.5 * amplitude) ** 2))[0])
 
 
 def mean_square(result: Fitted) -> float:

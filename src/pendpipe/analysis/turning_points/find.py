@@ -155,13 +155,16 @@ def smooth_times(
     low, high = np.maximum(middle - 2, 0), np.minimum(middle + 2, last)
     low, high = np.minimum(low, high - 3), np.maximum(high, low + 3)
     low, high = np.maximum(low, 0), np.minimum(high, last)
-    total = np.append(0.0, np.cumsum(weight))
-    while np.any(
-        grows := (total[high + 1] - total[low] < wanted)
-        & (high - low < _WIDEST)
-        & ((low > 0) | (high < last))
-    ):
-        low, high = np.maximum(low - grows, 0), np.minimum(high + grows, last)
+    total, grown = np.append(0.0, np.cumsum(weight)), np.zeros_like(low)
+    # By how many neighbours to each side: the weights only rise, so that a bit at a time tells.
+    for more in (64, 32, 16, 8, 4, 2, 1):
+        start, stop = (
+            np.maximum(low - grown - more + 1, 0),
+            np.minimum(high + grown + more - 1, last),
+        )
+        short = (total[stop + 1] - total[start] < wanted) & (stop - start < _WIDEST)
+        grown += more * (short & ((start > 0) | (stop < last)))
+    low, high = np.maximum(low - grown, 0), np.minimum(high + grown, last)
     near = low[:, None] + np.arange(np.max(high - low, initial=0) + 1)
     inside, near = near <= high[:, None], np.minimum(near, last)
     u, since = (number[near] - at[:, None]).astype(np.float64), time_s[low]
