@@ -203,9 +203,9 @@ def only_falls(values: FloatArray) -> bool:
     # A long rest behind a decay tells nothing of it, and a wild reading makes no range.
     largest = float(np.percentile(sizes, 98))
     moving = sizes[: int(np.flatnonzero(sizes > _REST * largest)[-1]) + 1]
-    above = moving - np.minimum.accumulate(moving)
-    low, high = np.percentile(moving, (2, 98))
-    if not float(np.mean(above)) < _LEVEL * float(high - low):
+    above = float(np.mean(moving - np.minimum.accumulate(moving)))
+    # None is above 1: of a swing no range need be asked for.
+    if not above < _LEVEL or not above < _LEVEL * float(np.ptp(np.percentile(moving, (2, 98)))):
         return False
     steps = np.diff(sizes)
     falls, rises = float(np.mean(steps < 0.0)), float(np.mean(steps > 0.0))

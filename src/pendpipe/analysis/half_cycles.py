@@ -171,8 +171,8 @@ def thinned(
     thin_time, thin_values = thin_time[:count].copy(), thin_values[:count].copy()
     if count > 0.99 * (time_s[-1] - time_s[0]) / step:
         # Means over an eighth of a half cycle take mains hum out, and 0.6 % of a crest.
-        padded = np.pad(thin_values, 2, mode="edge")
-        thin_values = np.convolve(padded, np.full(5, 0.2), mode="valid")
+        ends = thin_values[[0, 0]], thin_values, thin_values[[-1, -1]]
+        thin_values = np.convolve(np.concatenate(ends), np.full(5, 0.2), mode="valid")
     return thin_time, thin_values
 
 
@@ -207,14 +207,14 @@ def _without_wild(values: FloatArray, turn: float) -> FloatArray:
     Where a cycle has few samples, `turn` rad apart, the topmost stands out of the next by up
     to A (1 - cos turn), A the motion's amplitude: it is no wild reading.
     """
-    edged = np.pad(values, 1, mode="edge")
+    edged = np.concatenate([values[:1], values, values[-1:]])
     # The median of three, in a tenth of the time that np.median takes.
     lower, upper = np.minimum(edged[:-2], values), np.maximum(edged[:-2], values)
     middle = np.maximum(lower, np.minimum(upper, edged[2:]))
     # The range of each cycle; a cycle that is cut at its edges turns in one beside it.
     starts = np.arange(0, len(values), math.ceil(2.0 * math.pi / turn))
     swing = np.maximum.reduceat(middle, starts) - np.minimum.reduceat(middle, starts)
-    edged = np.pad(swing, 1, mode="edge")
+    edged = np.concatenate([swing[:1], swing, swing[-1:]])
     amplitude = 0.5 * np.maximum(np.maximum(edged[:-2], edged[2:]), swing)
     lasts = np.diff(np.append(starts, len(values)))
     allowed = 1.5 * np.repeat(amplitude, lasts) * (1.0 - math.cos(min(turn, math.pi)))

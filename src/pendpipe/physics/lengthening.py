@@ -70,20 +70,14 @@ def unit_shown(
     return fitting[0] if len(fitting) == 1 else None
 
 
-_ALIKE: Final = 1e-9
-"""Of half the difference of two means: that of the next ones is less than its square."""
-
-
 def elliptic(m: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Complete elliptic integrals K and E of the parameter m = k^2 < 1, by Gauss's means."""
     a, b = np.ones_like(m), np.sqrt(1.0 - m)
     total = 0.5 * m
-    # Each step doubles the digits.
-    for step in range(8):
+    # Each step doubles the digits: of m = 1/2 the means differ by 1e-21 after the fifth.
+    for step in range(5 if np.max(m, initial=0.0) < 0.5 else 8):
         a, b, difference = 0.5 * (a + b), np.sqrt(a * b), 0.5 * (a - b)
         total = total + 2.0**step * difference**2
-        if np.all(difference < _ALIKE):
-            break
     k = 0.5 * math.pi / a
     return k, k * (1.0 - total)
 

@@ -147,8 +147,8 @@ def fit_energies(
     slope = np.maximum(slope, 1e-3 * np.max(slope))
     shared = -points.level_coupling * points.side
     for _ in range(2):
-        losses = _half_swing_losses(y, share, sine=sine) * swings
-        lost = np.cumsum(np.pad(losses, ((0, 0), (1, 0))), axis=1)
+        lost = np.zeros((3, len(y)))
+        np.cumsum(_half_swing_losses(y, share, sine=sine) * swings, axis=1, out=lost[:, 1:])
         jacobian = np.stack([*(-lost / slope), slope[0] / slope, shared], axis=1)
         rows = np.vstack([jacobian / sd[:, None], prior.rows(5)])
         residual = (energy - energy[0]) / slope - jacobian @ (start - base)

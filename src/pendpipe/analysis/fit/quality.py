@@ -248,10 +248,9 @@ def _covariance_of_losses(result: Fitted, amplitude: float) -> FloatArray:
 
 def period_of(result: Fitted, amplitude: float) -> float:
     """Period at one amplitude, s; that of small amplitudes where the law cannot swing there."""
-    small = 1.0 / result.value("frequency")
-    if result.restoring == "linear" or not 0.0 < amplitude < math.pi:
-        return small
-    return 2.0 / math.pi * small * float(elliptic(np.array(math.sin(0.5 * amplitude) ** 2))[0])
+    swings = result.restoring == "sine" and 0.0 < amplitude < math.pi
+    quarter = elliptic(np.array(math.sin(0.5 * amplitude) ** 2 if swings else 0.0))[0]
+    return 2.0 / math.pi * float(quarter) / result.value("frequency")
 
 
 def mean_square(result: Fitted) -> float:

@@ -156,14 +156,13 @@ def smooth_times(
     low, high = np.minimum(low, high - 3), np.maximum(high, low + 3)
     low, high = np.maximum(low, 0), np.minimum(high, last)
     total, grown = np.append(0.0, np.cumsum(weight)), np.zeros_like(low)
-    # By how many neighbours to each side: the weights only rise, so that a bit at a time tells.
+    # By how many neighbours to each side: the weights only add up, so that a bit at a time tells.
     for more in (64, 32, 16, 8, 4, 2, 1):
         start, stop = (
             np.maximum(low - grown - more + 1, 0),
             np.minimum(high + grown + more - 1, last),
         )
-        short = (total[stop + 1] - total[start] < wanted) & (stop - start < _WIDEST)
-        grown += more * (short & ((start > 0) | (stop < last)))
+        grown += more * ((total[stop + 1] - total[start] < wanted) & (stop - start < _WIDEST))
     low, high = np.maximum(low - grown, 0), np.minimum(high + grown, last)
     near = low[:, None] + np.arange(np.max(high - low, initial=0) + 1)
     inside, near = near <= high[:, None], np.minimum(near, last)
