@@ -776,7 +776,8 @@ def intervals95(
             begun = bounded_step(normal, gradient, room, (*held, j))
             low, high = (_end(normal, gradient, room, matrix, j, begun, way) for way in (-1.0, 1.0))
         # Else chi^2 is one parabola: none comes to a bound on the way.
-        found.append((at + float(low), at + float(high)))
+        low, high = np.clip([low, high], room.lower[j], room.upper[j]).tolist()
+        found.append((at + low, at + high))
     return found
 
 
