@@ -360,17 +360,6 @@ def test_a_stop_code_ends_the_scans_and_what_only_begins_like_one_is_data() -> N
     assert plain_scans(b"stop 0", 1).counts.tobytes() == b"stop 0"
 
 
-@pytest.mark.parametrize("channels", [1, 2, 3, 4])
-@pytest.mark.parametrize("bits", [10, 12, 14])
-def test_every_code_on_every_channel(bits: int, channels: int) -> None:
-    codes = np.arange(-(2 ** (bits - 1)), 2 ** (bits - 1))
-    scans = np.stack([np.roll(codes, 7 * channel) for channel in range(channels)], axis=1)
-    data = b"".join(frame(scan, bits) for scan in scans.tolist())
-    decoded = marked_scans(data, channels, bits)
-    assert np.array_equal(decoded.counts, scans)
-    assert not decoded.losses
-
-
 @pytest.mark.parametrize(
     ("what", "data", "good", "suspect", "losses"),
     [
