@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from pendpipe.analysis.free_decay import measure_recording
 from pendpipe.diagnosis.data import Data
@@ -279,16 +280,18 @@ def test_a_slow_creep_has_hardly_begun(identifier: str, values: tuple[float, ...
     assert displaced == pytest.approx(went, rel=0.05)
 
 
-def test_a_knock_is_seldom_just_where_it_leaves_the_amplitude_alone() -> None:
-    """Of a quarter turn's instants each is as likely; from a hundredth on nearer ones are alike."""
+@pytest.mark.parametrize("error", [0.01, 0.1])
+def test_a_knock_is_seldom_just_where_it_leaves_the_amplitude_alone(error: float) -> None:
+    """At a turning point, within its error; of a quarter turn's instants each is as likely."""
     knock = by_identifier("impulse")
     span = evaluated("impulse", (0.0, 30.0), baseline(), TIME).span
+    span = span._replace(instant_sd_s=error * 0.25 * CYCLE)
     costs = [
         knock.prior_penalty(np.array([1e-3, (20.0 + part) * 0.25 * CYCLE]), span)
-        for part in (0.0, 0.1, 0.5, 1.0)
+        for part in (0.0, error, 5.0 * error)
     ]
-    expected = [2.0 * math.log(times) for times in (100.0, 10.0, 2.0, 1.0)]
-    np.testing.assert_allclose(costs, expected, atol=1e-3)
+    least = 2.0 * math.log(2.0 * norm.pdf(0.0, scale=error))
+    np.testing.assert_allclose(costs, [least, least - 1.0, 0.0], atol=1e-3)
 
 
 @pytest.mark.parametrize("samples", [1.0, -1.0, 3.0])

@@ -13,6 +13,7 @@ from pendpipe.diagnosis.refine import refine
 from pendpipe.dynamics.eq8 import OMEGA, SHARE, START, TIME as TIME_OF_START, A, B, C
 from pendpipe.dynamics.eq8_model import values_of
 from pendpipe.effects.catalogue import by_identifier
+from pendpipe.effects.catalogue.in_time import string_planes
 from pendpipe.effects.effect import Pendulum
 from pendpipe.effects.model import Model
 from pendpipe.effects.two_planes import planes, two_planes
@@ -69,7 +70,7 @@ def test_a_string_pendulum_seen_by_one_camera(
     value = np.concatenate([values_of(begun.law, begun.release), begun.values])
     data = Data(TIME, readings, 1.0 / 30.0, True, np.ones(len(TIME)))
     noise = white_noise(data, 1e-4)
-    both = Model(TIME, 1.0 / 30.0, (PLANES,), restoring="sine")
+    both = Model(TIME, 1.0 / 30.0, (begun.effect,), restoring="sine")
     fit = refine(both, data, noise, value, held=[C, SHARE])
     alone = refine(both.bare(), data, noise, value[: both.first], held=[C, SHARE])
     left, one = data.rms_left(fit.at.reading), data.rms_left(alone.at.reading)
@@ -81,7 +82,7 @@ def test_a_string_pendulum_seen_by_one_camera(
 @pytest.mark.parametrize("index", [A, B, OMEGA, START, TIME_OF_START])
 def test_what_the_pendulum_carries_follows_its_values(index: int) -> None:
     """A second plane as large as the first, by differences of two whole evaluations."""
-    both = Model(TIME, 1.0 / 30.0, (PLANES,), restoring="sine")
+    both = Model(TIME, 1.0 / 30.0, (string_planes,), restoring="sine")
     value = np.array([1e-3, LOSS, 0.0, 0.5, math.sqrt(SQUARE), 0.3, 0.0, 0.0, 0.2, 0.1, 1e-3])
     step = 1e-6 * np.eye(len(value))[index]
     change = (both.reading(value + step) - both.reading(value - step)) / 2e-6

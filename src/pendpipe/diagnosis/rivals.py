@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -272,7 +271,9 @@ def evidence(effect: Effect, fit: Fit, gain: float, chance: Chance, unit: float 
         # The size is predicted: a free one would be charged.
         gain += max(math.log(gain) - 0.45, 0.0)
     local = float(chdtrc(sizes, gain))
-    trials = chance.own.get(effect.key, Trials(1.0, 0.0))
+    # A form that has no scan is found by that of its effect.
+    scanned = chance.own.get(effect.identifier, Trials(1.0, 0.0))
+    trials = chance.own.get(effect.key, scanned)
     if local > _UNDERFLOW:
         worth = equivalent(trials.global_p_value(local), gain)
     else:
@@ -284,9 +285,15 @@ def evidence(effect: Effect, fit: Fit, gain: float, chance: Chance, unit: float 
 
 def _prior(effect: Effect, fit: Fit) -> float:
     position = next((position for other, position in fit.model.places() if other is effect), None)
-    # A released parameter has no position among the model's effects.
-    unlikely = 0.0 if position is None else effect.prior_penalty(fit.value[position], fit.at.span)
-    return effect.prior - unlikely
+    if position is None:
+        # A released parameter has no position among the model's effects.
+        return effect.prior
+    span = fit.at.span
+    if effect.local:
+        last = position.stop - 1
+        told = float(np.linalg.norm(fit.beside(fit.jacobian[:, [last]], [last])))
+        span = span._replace(instant_sd_s=1.0 / max(told, 1e-300))
+    return effect.prior - effect.prior_penalty(fit.value[position], span)
 
 
 def _needed_sizes(fit: Fit, effect: Effect, unit: float) -> tuple[float, int]:
@@ -399,7 +406,8 @@ def refit_leads(
     """Refit the leading effects nonlinearly, and return them ranked, the best first."""
     lost = phase_lost and base.model.restoring == "linear" and data.unit == "rad"
     as_pendulum = replace(base.model, restoring="sine") if lost else base.model
-    found = [_restarted(base, as_pendulum, data, noise, lead, held) for lead in detection.leads]
+    begun = (_begun(base, as_pendulum, data, noise, lead, held) for lead in detection.leads)
+    found = [*detection.leads, *filter(None, begun)]
     leads = _worth_refitting(found, phase_lost, most, wide=bool(pulled(base)))
     fits = side_by_side(base, data, noise, leads, held, phase_lost=phase_lost)
     if not fits:
@@ -541,48 +549,53 @@ def _started(
     effect = lead.effect
     if isinstance(effect, ReleasedParameter):
         held = effect.without(held)
-    # An effect without a free size is there; of others none is, at first.
-    sizes = np.ones(1) if effect.parameter_free else np.zeros(min(effect.sizes, effect.count))
-    start = np.concatenate([base.value, sizes, finer_shape(base, noise, effect, lead.shape)])
-    refits = []
-    for model, begun in [(base.model.adding(effect), start), *([lead.begun] if lead.begun else [])]:
-        with suppress(NoMotionError, np.linalg.LinAlgError):
-            refit = searching(model, data, noise, begun, held=held, little=little)
-            refit.go(_FIRST_ROUNDS)
-            refits.append(refit)
-    return min(refits, key=lambda refit: refit.here.chi2, default=None)
+    if lead.begun:
+        model, start = lead.begun
+    else:
+        # An effect without a free size is there; of others none is, at first.
+        sizes = np.ones(1) if effect.parameter_free else np.zeros(min(effect.sizes, effect.count))
+        own = finer_shape(base, noise, effect, lead.shape)
+        model, start = base.model.adding(effect), np.concatenate([base.value, sizes, own])
+    try:
+        refit = searching(model, data, noise, start, held=held, little=little)
+        refit.go(_FIRST_ROUNDS)
+    except (NoMotionError, np.linalg.LinAlgError):
+        return None
+    return refit
 
 
-def _restarted(
+def _begun(
     base: Fit, model: Model, data: Data, noise: Noise, lead: Lead, held: Sequence[int]
-) -> Lead:
-    """Return the lead of an effect that may begin at what it makes of the readings, if it explains.
+) -> Lead | None:
+    """Return the lead of the form that begins at what it makes of the readings, if it explains.
 
     What the model's other effects add to these is taken off. `model` is that of the fit; where
     this has lost the phase of angles, which tells nothing of the torque, that of a pendulum.
     """
     effect = lead.effect
     if type(effect).restart is Effect.restart or data.unit != "rad" or base.at.parts:
-        return lead
+        return None
     angle = base.at.sampled.angle
     left = np.where(data.weight > 0.0, data.residual(base.at.reading), 0.0)
     about_s = float(base.value[TIME])
     pendulum = model.pendulum(base.value)
     found = effect.restart(data.time_s, left + angle, pendulum, about_s)
     if found is None:
-        return lead
+        return None
     own = values_of(found.law, found.release, float(base.value[OFFSET]))
     start = np.concatenate([own, base.value[len(own) :], found.values])
     kept = [SHARE, *held]
     start[kept] = base.value[kept]
     try:
-        model = model.adding(effect)
+        model = model.adding(found.effect)
         search = searching(model, data, noise, start, held=held)
         search.go(_ROUNDS_OF_A_START)
     except (NoMotionError, np.linalg.LinAlgError):
-        return lead
-    gain, begun = base.chi2 - search.here.chi2, (model, search.here.value)
-    return lead._replace(score=max(gain, lead.score), begun=begun) if gain > 0.0 else lead
+        return None
+    gain = base.chi2 - search.here.chi2
+    if gain <= 0.0:
+        return None
+    return lead._replace(effect=found.effect, score=gain, begun=(model, search.here.value))
 
 
 def _finished(refit: Search[Evaluation], useful: float) -> Fit | None:

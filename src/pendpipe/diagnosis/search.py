@@ -72,7 +72,7 @@ from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES
 from pendpipe.quantities import compact
-from pendpipe.score import CLASS, Trials
+from pendpipe.score import Trials
 
 
 def with_other_noise(state: Hypothesis, task: Task) -> Hypothesis:
@@ -193,10 +193,8 @@ def leading(state: Hypothesis, task: Task, *, names_first: bool) -> Step | None:
     )
     if not rivals:
         return None
-    # A rare name is a rival of what it looks like, and leads where it is told from that, or where
-    # `prefer_rare` says so.
-    usual = max((each.evidence for each in rivals if not each.effect.rare), default=-math.inf)
-    rivals.sort(key=lambda rival: rival.effect.rare and rival.evidence < usual + CLASS)
+    # A rare name is a rival of what it looks like, and leads where `prefer_rare` says so.
+    rivals.sort(key=lambda rival: rival.effect.rare)
     if names_first:
         rivals.sort(key=lambda rival: rival.drawn)
     return Step(tuple(prefer_rare(state, rivals, task)), state.unexplained, state.fit)

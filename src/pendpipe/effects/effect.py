@@ -134,6 +134,8 @@ class Span(NamedTuple):
     """How many recorded readings each of those that are analysed is the mean of."""
     sampled: Sampled | None = None
     """The motion at the readings."""
+    instant_sd_s: float = math.inf
+    """Standard deviation of an instant that was fitted."""
 
     @property
     def duration_s(self) -> float:
@@ -145,15 +147,17 @@ class Span(NamedTuple):
         """2 pi/omega."""
         return 2.0 * math.pi / self.pendulum.angular_frequency
 
-    def to_a_turn(self, instant_s: float) -> float:
-        """Return the phase to the next turning point, before or behind, of a quarter turn: 0 to 1.
+    def to_a_turn(self, instant_s: float) -> tuple[float, float]:
+        """Return the phase to the next turning point, before or behind, and its error.
 
-        Of an instant at random each is as likely.
+        Of a quarter turn: of an instant at random each from 0 to 1 is as likely.
         """
         if self.sampled is None:
-            return 1.0
+            return 1.0, math.inf
         phase = float(np.interp(instant_s, self.sampled.time_s, self.sampled.phase))
-        return abs(math.remainder(phase, math.pi)) / (0.5 * math.pi)
+        quarter = 0.5 * math.pi
+        error = self.pendulum.angular_frequency * self.instant_sd_s / quarter
+        return abs(math.remainder(phase, math.pi)) / quarter, error
 
     def times(self, count: int) -> FloatArray:
         """Instants for a scan: inside the record, one and a half periods from its ends.

@@ -1,6 +1,7 @@
 """What has a time of its own: added oscillations; drifts, sudden changes, the release."""
 
 import math
+from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -116,10 +117,14 @@ beating_mode: Final[Effect] = subclass(
 )()
 
 
-def _detunings(span: Span) -> list[tuple[float, ...]]:
-    """On both sides, half of 1/duration apart."""
+_SLOWEST: Final = 1.5
+"""Beats, or cycles of a modulation, within the recording: slower ones are drifts."""
+
+
+def _detunings(span: Span, slowest: float = 0.25) -> list[tuple[float, ...]]:
+    """On both sides, half of 1/duration apart, from so many beats within the recording on."""
     last = plane_band_hz(span)
-    beats = np.arange(0.25 / span.duration_s, last, 0.5 / span.duration_s)
+    beats = np.arange(slowest / span.duration_s, last, 0.5 / span.duration_s)
     return rows([*(-beats[::-1]), *beats])
 
 
@@ -141,30 +146,37 @@ def _in_two_planes(
     at = Release(float(time_s[0]) + late, side * found.amplitude * math.exp(-lost))
     share = side * found.other * found.amplitude
     detuning = found.detuning / (2.0 * math.pi)
-    return Start(plane_coupling, law, at, np.array([share.real, -share.imag, detuning]))
+    return Start(string_planes, law, at, np.array([share.real, -share.imag, detuning]))
 
 
-@enters(
-    "reading",
-    identifier="plane-coupling",
-    name="swing in a second plane",
-    kind="dynamics",
+def _second_plane(**more: Any) -> Callable[[Callable[..., Any]], Effect]:
+    """Declare a form of the second plane; `more` is what distinguishes it."""
+    return enters(
+        "reading",
+        identifier="plane-coupling",
+        name="swing in a second plane",
+        kind="dynamics",
+        parameters=(
+            Parameter("q_cosine", "rad", -10.0, 10.0, word="amplitude"),
+            Parameter("q_sine", "rad", -10.0, 10.0, 0.0, word="amplitude"),
+            Parameter("detuning", "Hz", -1e3, 1e3, word="detuning"),
+        ),
+        sizes=2,
+        carried=True,
+        discriminating_test=(
+            "add a second sensor across the first, or record longer: beats must repeat"
+        ),
+        **more,
+    )
+
+
+@_second_plane(
     equation=(
-        r"y = \operatorname{Re}\left[(a \cos\alpha - b \sin\alpha)\, e^{i\psi}\right], \quad"
-        r" \dot a = -\tfrac{i \omega}{16} (|a|^2 + |b|^2) a - \Omega b, \quad"
-        r" \dot b = -\tfrac{i \omega}{16} (|a|^2 + |b|^2) b + \Omega a + 2\pi i \delta b,"
-        r" \quad \Omega = -\tfrac38 \omega \operatorname{Im}(a^* b)"
+        r"y = x + \frac{r}{r_1} \left[q_c \cos(\psi + 2\pi \delta t)"
+        r" + q_s \sin(\psi + 2\pi \delta t)\right]"
     ),
-    parameters=(
-        Parameter("q_cosine", "rad", -10.0, 10.0, word="amplitude"),
-        Parameter("q_sine", "rad", -10.0, 10.0, 0.0, word="amplitude"),
-        Parameter("detuning", "Hz", -1e3, 1e3, word="detuning"),
-    ),
-    sizes=2,
-    carried=True,
     example=(1e-3, 5e-4, 0.02),
-    discriminating_test="add a second sensor across the first, or record longer: beats must repeat",
-    shapes=_detunings,
+    shapes=lambda span: _detunings(span, _SLOWEST),
     start=lambda time_s, values, period_s: _in_two_planes(
         time_s, values, Pendulum(2.0 * math.pi / period_s, restoring="sine"), float(time_s[0])
     ),
@@ -175,28 +187,45 @@ def plane_coupling(
 ) -> FloatArray:
     """A second plane, of nearly the same frequency and loss, seen by the sensor: beats.
 
-    Along the suspension's axis of frequency f_0 + `detuning` the motion seen is
-    q_c cos(psi) + q_s sin(psi) at the first reading. Where the torque is that of sin x, both planes
-    are those of a spherical pendulum: the more they swing, the slower, and an ellipse turns by 3/8
-    of the product of its half axes. Without detuning that is precession alone. The axes' angle
-    alpha to the plane that is seen, tan^2 alpha = q/r, is that with which the other moves least.
+    A sensor askew adds a part of it: a tone with the main motion's envelope, which runs ahead of it
+    by `detuning`. Of a string both planes are those of a spherical pendulum: the more they swing,
+    the slower, and an ellipse turns by 3/8 of the product of its half axes.
     """
-    motion, first = sampled.motion, sampled.amplitude[0]
-    share, turned = complex(cosine, -sine), 2.0 * math.pi * detuning
-    time = elapsed(sampled.time_s)
-    if pendulum.restoring != "sine" or abs(share) < _LINEAR * first:
-        return np.asarray(
-            sampled.amplitude / first * tone_at(cosine, sine, sampled.phase + turned * time)
-        )
-    reached = sampled.at_nodes(motion.clock.integral(motion.amplitude**2))
-    ratio = motion.upwards * share / first
-    both = planes(time, reached - reached[0], sampled.amplitude**2, ratio, turned)
-    return motion.upwards * waveform(sampled.amplitude, sampled.phase, *both)
+    phase = sampled.phase + 2.0 * math.pi * detuning * elapsed(sampled.time_s)
+    return np.asarray(sampled.amplitude / sampled.amplitude[0] * tone_at(cosine, sine, phase))
 
 
-_LINEAR: Final = 1e-5
-"""Of the amplitude: a second plane so small turns no ellipse, and enters in proportion."""
 PlaneCoupling = type(plane_coupling)
+
+
+@_second_plane(
+    key="plane-coupling:string",
+    # Axes at 45 degrees to the plane that is seen share its motion equally.
+    displacement=lambda _own, _duration_s: 0.0,
+    equation=(
+        r"y = \operatorname{Re}\left[(a \cos\alpha - b \sin\alpha)\, e^{i\psi}\right], \quad"
+        r" \dot a = -\tfrac{i \omega}{16} (|a|^2 + |b|^2) a - \Omega b, \quad"
+        r" \dot b = -\tfrac{i \omega}{16} (|a|^2 + |b|^2) b + \Omega a + 2\pi i \delta b,"
+        r" \quad \Omega = -\tfrac38 \omega \operatorname{Im}(a^* b)"
+    ),
+)
+def string_planes(
+    sampled: Sampled, pendulum: Pendulum, cosine: float, sine: float, detuning: float
+) -> FloatArray:
+    """A spherical pendulum's two planes: the form of `plane-coupling` at which a restart begins.
+
+    Along the suspension's axis of frequency f_0 + `detuning` the motion seen is
+    q_c cos(psi) + q_s sin(psi) at the first reading. Without detuning that is precession alone.
+    The axes' angle alpha to the plane that is seen, tan^2 alpha = q/r, is that with which the other
+    moves least. At size 0 it has no derivative.
+    """
+    motion = sampled.motion
+    reached = sampled.at_nodes(motion.clock.integral(motion.amplitude**2))
+    ratio = motion.upwards * complex(cosine, -sine) / sampled.amplitude[0]
+    turned = 2.0 * math.pi * detuning
+    time, square = elapsed(sampled.time_s), sampled.amplitude**2
+    both = planes(time, reached - reached[0], square, ratio, turned)
+    return motion.upwards * waveform(sampled.amplitude, sampled.phase, *both)
 
 
 class SteadyTone(Effect):
@@ -314,9 +343,6 @@ parametric_drive: Final = _parametric(
     shapes=lambda span: rows(2.0 / span.period_s - np.ravel(_detunings(span))),
     prior_penalty=_keeps_in_step,
 )
-
-_SLOWEST: Final = 1.5
-"""Cycles of a modulation within the recording: slower ones are drifts."""
 
 slow_modulation: Final = _parametric(
     key="parametric-drive:slow",
@@ -501,17 +527,15 @@ def damping_step(motion: Motion, pendulum: Pendulum, change: float, instant_s: f
     return np.asarray(change * smooth_step(motion, instant_s) * pendulum.losses(motion))
 
 
-_TOLD_FROM_A_TURN: Final = 0.01
-"""Of a quarter turn, how near a turning point an instant may be: as near as by chance one of a
-hundred is. What is nearer says no more, since its own error is a part of the step that it makes."""
-
-
 def _at_a_turn(values: FloatArray, span: Span) -> float:
     """Return twice the logarithm by which a knock is less likely to leave the amplitude alone.
 
-    At a turning point it does, as a jump of the clock does anywhere.
+    At a turning point it does, as a jump of the clock does anywhere. Of an instant at a turning
+    point, known to s, the phase u from it has the density (2/pi)^(1/2)/s e^(-u^2/(2 s^2)); of one
+    at random, 1. What is told from a turning point has no such rival.
     """
-    return -2.0 * math.log(max(span.to_a_turn(float(values[1])), _TOLD_FROM_A_TURN))
+    phase, error = span.to_a_turn(float(values[1]))
+    return max(math.log(2.0 / math.pi / error**2) - (phase / error) ** 2, 0.0)
 
 
 @enters(
