@@ -176,19 +176,6 @@ def test_a_lost_scan_is_a_row_and_not_a_join() -> None:
     assert any("1 scans lost at 1 places" in note for note in recording.notes)
 
 
-def test_a_damaged_first_frame_moves_nothing() -> None:
-    """Its scans are rows without a reading, and the others stay where they are."""
-    whole = written(*(bytes([2 * code, 0x81]) for code in range(1, 9)))
-    sound = decode_recording(whole)
-    damaged = bytearray(whole)
-    damaged[whole.index(b"\x02\x81")] ^= 8
-    recording = decode_recording(bytes(damaged))
-    assert recording.time_s.tolist() == sound.time_s.tolist()
-    assert recording.quality.tolist() == [MISSING] + [0] * 7
-    assert recording.values[1:].tolist() == sound.values[1:].tolist()
-    assert any("1 scans are lost" in note for note in recording.notes)
-
-
 @pytest.mark.parametrize("model", ["DI-2108", "DI-154RS"])
 def test_frames_need_not_hold_whole_scans(model: str) -> None:
     """Two channels in pieces of seven bytes: behind any lost piece they are told apart."""

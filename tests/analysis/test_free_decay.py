@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 import pendpipe
 from pendpipe.analysis.free_decay import (
     FreeDecay,
-    Run,
     _falls,
     _running_median,
     best_runs,
@@ -720,21 +719,6 @@ def test_a_decay_fades_unless_the_record_ends_in_a_pull(
     assert run.fades == fades
 
 
-def test_of_two_runs_the_more_telling_comes_first() -> None:
-    swing = np.concatenate((decay(12, 0.1), 2.0 * decay(12, 0.1)))
-    assert [run.first for run in best_runs(half_cycles(swing), EVERYTHING)] == [12, 0]
-
-
-@given(share=st.floats(0.0, 0.2), count=st.integers(3, 60))
-def test_a_decay_is_one_run(share: float, count: int) -> None:
-    (run,) = best_runs(half_cycles(decay(count, share)), EVERYTHING)
-    assert (run.first, run.last, run.legs, run.bridged) == (0, count - 1, count, 0)
-    assert run.half_period_s == pytest.approx(HALF)
-    # Information about a rate of n equal swings grows as n^3.
-    if share == 0.0:
-        assert run.worth**2 == pytest.approx((count**3 - count) / 12.0)
-
-
 def test_a_ring_that_is_repeated_is_a_decay() -> None:
     """Each of sixty pushes rings for seven half cycles."""
     time, pushes = np.arange(6000) / RATE, np.random.default_rng(2).uniform(0.5, 1.5, 59)
@@ -755,19 +739,6 @@ def test_a_fall_by_chance_is_no_decay() -> None:
             parts = [ramp(low, high, 0.6) for low, high in pairwise(levels.tolist())]
             taken += find_free_decay(recording(parts, noise=1e-3)).half_cycles >= 3
     assert taken <= 8
-
-
-@given(scale=st.floats(1e-3, 1e3), pace=st.floats(1e-2, 1e2), kick=st.floats(0.2, 2.0))
-def test_units_do_not_matter(scale: float, pace: float, kick: float) -> None:
-    swing = decay()
-    swing[12:] *= kick
-    cycles = half_cycles(swing, step=0.01)
-    assert ends(half_cycles(scale * swing, HALF * pace, 0.01 * scale)) == ends(cycles)
-
-
-def test_half_cycles_that_are_left_count_as_legs() -> None:
-    run = Run(EVERYTHING, half_cycles(decay()), 3, 7)
-    assert run.legs == len(run.swing) == len(run.middle_s) == 5
 
 
 @pytest.mark.parametrize(("rest_s", "rests"), [(9.0, 1), (7.0, 0)])

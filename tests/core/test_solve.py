@@ -171,27 +171,6 @@ def test_the_likelihood_of_counts_has_its_minimum_at_their_mean() -> None:
     assert math.exp(found.value[0]) == pytest.approx(5.0, rel=1e-4)
 
 
-def test_a_step_taken_on_trust_asks_for_no_more_derivatives() -> None:
-    asked = []
-
-    def counted(p: FloatArray, x: FloatArray) -> FloatArray:
-        return line(p, x)
-
-    def at(p: FloatArray) -> Summed:
-        left = LINE_Y - counted(p, LINE_X)
-        return Summed(p, float(left @ left), derivatives)
-
-    def derivatives(p: FloatArray) -> Quadratic:
-        asked.append(p)
-        design = np.stack([np.ones(6), LINE_X], axis=1)
-        left = LINE_Y - design @ p
-        return Quadratic(float(left @ left), design.T @ left, design.T @ design)
-
-    found = minimise(Problem(at, Bounds.none(2)), np.zeros(2), trust=0.03)
-    assert found.converged
-    assert len(asked) == 1
-
-
 def test_a_model_without_a_value_at_the_start_has_no_search() -> None:
     problem = problem_of(power, np.array([-1.0, 1.0]), np.ones(2), 1.0)
     with np.errstate(invalid="ignore"), pytest.raises(NoStartError):
