@@ -422,25 +422,6 @@ def test_every_byte_is_in_a_scan_or_counted_or_waiting(
     assert 0 <= unaccounted < 4
 
 
-@given(
-    codes=st.lists(st.integers(-2048, 2047), min_size=3, max_size=60, unique=True),
-    kind=st.sampled_from(["drop", "double", "flip"]),
-    place=st.integers(0, 1000),
-)
-def test_one_fault_is_flagged_and_costs_at_most_two_scans(
-    codes: list[int], kind: str, place: int
-) -> None:
-    """Neighbours are whole again: all scans but at most two are delivered, in order."""
-    data = b"".join(frame([code]) for code in codes)
-    # The first and the last scan have no neighbour that could tell.
-    at = 2 + place % (len(data) - 4)
-    scans = marked_scans(damaged(data, [(kind, at)]), 1, 12)
-    assert [loss.lost_scans for loss in scans.losses] == [1]
-    got = scans.counts[~scans.suspect].ravel().tolist()
-    assert got == [code for code in codes if code in set(got)]
-    assert len(got) >= len(codes) - 2
-
-
 def words(codes: AnyArray) -> bytes:
     return np.clip(np.rint(codes), -32768, 32767).astype("<i2").tobytes()
 

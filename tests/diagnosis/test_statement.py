@@ -21,7 +21,6 @@ from pendpipe.diagnosis.noise import Noise, white_noise
 from pendpipe.diagnosis.refine import Fit, Remainder, refine, remainder_of, with_errors
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.rivals import near_harmonic_by_chance
-from pendpipe.diagnosis.seen import Seen
 from pendpipe.diagnosis.summary import Change, Summary, numbers_of, test_of as measurement_of
 from pendpipe.diagnosis.values import constants_of, curve_values, drawn_of
 from pendpipe.dynamics.any_law import Motion
@@ -336,16 +335,6 @@ def likely(identifier: str, probability: float, *rivals: tuple[str, float]) -> F
 
 
 @pytest.mark.structure
-def test_what_a_test_of_the_measurement_found_is_told_beside_what_is_seen() -> None:
-    mark = replace(named("tracking-noise"), location=Location(summary="the tracked mark wanders"))
-    loss = Seen("loss", 0.8, Estimate(0.1, 0.01, ""), (1.0, 9.0), (0.2, 0.1), "the loss is larger")
-    summary = diagnosis(mark, seen=(loss,)).summary
-    assert summary.seen == "the loss is larger"
-    assert ("where", "the tracked mark wanders") in summary.pairs()
-    assert summary.headline.startswith("the loss is larger; missing: ")
-
-
-@pytest.mark.structure
 def test_a_healthy_pendulum_takes_one_line() -> None:
     healthy = diagnosis()
     assert healthy.statement == "nothing is missing (p = 0.9)"
@@ -459,18 +448,6 @@ def test_a_wide_table_leaves_out_the_middle_q() -> None:
     titles = [re.findall(r"Q at [^ ]*", text) for text in lines]
     assert [len(each) for each in titles] == [3, 2]
     assert titles[1] == [titles[0][0], titles[0][-1]]
-
-
-@pytest.mark.structure
-def test_a_number_that_moves_keeps_its_power_of_ten() -> None:
-    rates = [Estimate(4.0e-4, 0.2e-4, "1/s"), Estimate(1.11e-3, 0.2e-4, "1/s")]
-    found = diagnosis(likely("impulse", 0.9))
-    before, after = (
-        replace(model, parameters={**model.parameters, "b": rate})
-        for model, rate in zip((found.baseline, found.improved), rates, strict=True)
-    )
-    matters = replace(found, baseline=before, improved=after).summary.matters
-    assert matters.endswith("b 4.00(20) × 10⁻⁴ → 0.001110(20) s⁻¹")
 
 
 @pytest.mark.parametrize(
