@@ -210,46 +210,40 @@ def test_the_stages_after_a_refusal_pass_it_on_until_the_record_is_mended(tmp_pa
     assert reason_of(refused) is None
 
 
-@pytest.mark.parametrize(("fault", "kind"), [("fails", InputError), ("breaks", ZeroDivisionError)])
+def is_torn() -> None:
+    raise DamagedError(Path("recording.csv"), "it is torn", "run again")
+
+
+def has_no_room() -> None:
+    with replaced(Path("fit.json")):
+        raise OSError(errno.EFBIG, "File too large")
+
+
+@pytest.mark.parametrize(
+    ("fault", "kind"),
+    [
+        (fails, InputError),
+        (breaks, ZeroDivisionError),
+        (is_torn, DamagedError),
+        (has_no_room, UnwritableError),
+    ],
+)
 def test_what_is_no_refusal_ends_the_program(
-    fault: str, kind: type[Exception], tmp_path: Path
+    fault: Callable[[], None],
+    kind: type[Exception],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A fault of the program's own, and one without a place for refusals."""
-    refused = tmp_path / "refused.json" if fault == "breaks" else None
+    """Without a place for refusals; of the program; a damaged input; a full disk."""
+    monkeypatch.chdir(tmp_path)
+    refused = None if fault is fails else Path("refused.json")
     with pytest.raises(kind):
-        run_stage("fit", "x", globals()[fault], outputs=[tmp_path / "fit.json"], refused=refused)
-    assert not (tmp_path / "refused.json").exists()
-
-
-def test_a_damaged_result_refuses_no_record(tmp_path: Path) -> None:
-    recording, fit = tmp_path / "recording.csv", tmp_path / "fit.json"
-    recording.write_text("torn")
-
-    def reads() -> None:
-        raise DamagedError(recording, "it is torn", "run again")
-
-    refused = tmp_path / "refused.json"
-    with pytest.raises(DamagedError):
-        run_stage("fit", "x", reads, outputs=[fit], refused=refused, inputs=[recording])
-    assert not refused.exists()
-    assert not fit.exists()
+        run_stage("fit", "x", fault, outputs=[Path("fit.json")], refused=refused)
+    assert list(tmp_path.iterdir()) == []
 
 
 def write(path: Path, text: str) -> None:
     path.write_text(text)
-
-
-def test_a_full_disk_refuses_no_record(tmp_path: Path) -> None:
-    refused, out = tmp_path / "x/refused.json", tmp_path / "x/recording.csv"
-
-    def has_no_room() -> None:
-        with replaced(out):
-            raise OSError(errno.EFBIG, "File too large")
-
-    with pytest.raises(UnwritableError, match="too large"):
-        run_stage("acquire", "x", has_no_room, outputs=[out], refused=refused)
-    assert not refused.exists()
-    assert not out.exists()
 
 
 # Another version of pendpipe makes the results anew.

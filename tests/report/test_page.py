@@ -95,7 +95,9 @@ def test_the_page_is_well_formed_and_its_names_are_unique(page: str) -> None:
     assert set(targets) <= set(outline.ids)
 
 
-def test_the_page_refers_to_nothing_outside_itself(page: str) -> None:
+def test_the_page_refers_to_nothing_outside_itself(page: str, example: Any) -> None:
+    """Nor does it tell a folder of this machine."""
+    assert not any(folder in page for folder in (str(example.folder), f"{Path.home()}/"))
     outline = Outline(page)
     assert all(ref.startswith(("#", "data:")) for ref in outline.references)
     assert not re.findall(r"url\((?!#)", page)
@@ -250,11 +252,6 @@ def test_the_same_results_make_the_same_page(page: str, example: Any) -> None:
         example.folder / "figures",
     )
     assert again == page
-
-
-def test_no_folder_of_this_machine_is_told(page: str, example: Any) -> None:
-    assert str(example.folder) not in page
-    assert str(Path.home()) + "/" not in page
 
 
 def test_the_command_writes_the_page_whole_or_not_at_all(
