@@ -132,7 +132,9 @@ class Linear(NamedTuple):
         best, damping = self._damped(radius)
         if np.any(best < floor) or np.any(best > ceiling):
             best = self._within(floor, ceiling, radius, damping)
-        step[self.free] = best / self.scale
+        # What met a bound ends there, to the last digit.
+        inside = np.where(best >= ceiling, room.upper[self.free], best / self.scale)
+        step[self.free] = np.where(best <= floor, room.lower[self.free], inside)
         return room.clip(step), float(np.linalg.norm(best))
 
     def _damped(self, radius: float) -> tuple[FloatArray, float]:
