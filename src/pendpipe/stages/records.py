@@ -3,10 +3,11 @@
 The ending of each FILE says its form: .parquet keeps numbers as they are, .csv is for spreadsheets.
 """
 
-import csv
+from __future__ import annotations
+
 import io
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from pendpipe.arguments import Arguments, command, load
 from pendpipe.cells import csv_text
@@ -17,6 +18,9 @@ from pendpipe.options import OUTPUT, flags
 from pendpipe.report.class_table import Fitted, record as row_of
 from pendpipe.stages.archive import gathered
 from pendpipe.stages.results import RecordResult, read_results
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 _OF_THE_TABLE: Final = ("record", "fluid", "branch", "pendulum")
 _WORDS: Final = (*_OF_THE_TABLE, "light", "verdict", "refusal", "unit")
@@ -50,14 +54,23 @@ def run(arguments: Arguments) -> None:
     campaign = load(arguments.campaign)
     names = ("fit.json", "calibration.json", "diagnosis/diagnosis.json")
     with gathered(campaign.folder, *names) as folder:
-        # In the order of the campaign's own table.
-        rows = [_row(campaign, folder, result) for result in read_results(campaign, folder)]
+        table = records_table(campaign, folder)
     for out in arguments.out:
-        write_whole(out, csv_text(COLUMNS, rows) if out.suffix == ".csv" else _parquet(rows))
+        write_whole(out, _in_form(table, out.suffix))
 
 
-def _row(campaign: Campaign, folder: Path, result: RecordResult) -> list[Any]:
-    """The cells of `COLUMNS`; of a law that contradicts the decay what needs no law alone."""
+def records_table(campaign: Campaign, folder: Path) -> pa.Table:
+    """Return the table of `COLUMNS`, in the order of the campaign's own table."""
+    import pyarrow as pa
+
+    rows = [_row(campaign, folder, result) for result in read_results(campaign, folder)]
+    kinds = [(name, pa.string() if name in _WORDS else pa.float64()) for name in COLUMNS]
+    schema = pa.schema(kinds, metadata={MARK: MADE_BY})
+    return pa.Table.from_pylist(rows, schema=schema)
+
+
+def _row(campaign: Campaign, folder: Path, result: RecordResult) -> dict[str, Any]:
+    """The numbers of a fit; of a law that contradicts the decay only what needs no law."""
     record, fit = result.record, result.fit
     row: dict[str, Any] = {name: getattr(record, name) or None for name in _OF_THE_TABLE}
     row["refusal"] = result.refused
@@ -66,24 +79,14 @@ def _row(campaign: Campaign, folder: Path, result: RecordResult) -> list[Any]:
         row["verdict"] = diagnosis["verdict"]
     if fit is not None:
         row |= row_of(Fitted(record.record, fit)) | {"unit": fit["amplitude"].unit}
-    return [row.get(name) for name in COLUMNS]
+    return {name: row.get(name) for name in COLUMNS}
 
 
-def _parquet(rows: list[list[Any]]) -> bytes:
-    """The rows by way of text: made of lists, Arrow's tables import pandas."""
-    import pyarrow as pa
-    from pyarrow import csv as tables, parquet
+def _in_form(table: pa.Table, form: str) -> bytes | str:
+    if form == ".csv":
+        return csv_text(COLUMNS, (row.values() for row in table.to_pylist()))
+    from pyarrow import parquet
 
-    text = io.StringIO()
-    csv.writer(text).writerows([COLUMNS, *rows])
-    kinds = [(name, pa.string() if name in _WORDS else pa.float64()) for name in COLUMNS]
-    table = tables.read_csv(
-        io.BytesIO(text.getvalue().encode()),
-        parse_options=tables.ParseOptions(newlines_in_values=True),
-        convert_options=tables.ConvertOptions(
-            column_types=dict(kinds), null_values=[""], strings_can_be_null=True
-        ),
-    )
     stream = io.BytesIO()
-    parquet.write_table(table.replace_schema_metadata({MARK: MADE_BY}), stream)
+    parquet.write_table(table, stream)
     return stream.getvalue()
