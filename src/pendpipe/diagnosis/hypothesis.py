@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -33,7 +34,11 @@ from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.dynamics.eq8 import OMEGA, Restoring
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import resonant_drive, slow_modulation
-from pendpipe.effects.catalogue.reading import SoftClipping
+from pendpipe.effects.catalogue.reading import (
+    SoftClipping,
+    camera_beyond_a_quarter,
+    camera_geometry,
+)
 from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN, circular_error
 from pendpipe.effects.curves import CURVES, Curve
 
@@ -316,6 +321,8 @@ def applicable(
         and (effect.identifier not in used or effect.local)
     ]
     if rare:
+        if fit.at.span.first_amplitude > 0.5 * math.pi:
+            named = [camera_beyond_a_quarter if e is camera_geometry else e for e in named]
         return list(fit.model.admitted(named))
     keys = {effect.key for effect in fit.model.effects}
     forms: list[Effect | None] = [SoftClipping(), resonant_drive, slow_modulation]

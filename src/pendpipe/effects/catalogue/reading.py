@@ -1,7 +1,8 @@
 """What stands between the motion and the file: sensor, time base, noise."""
 
 import math
-from typing import Final
+from collections.abc import Callable
+from typing import Any, Final
 
 import numpy as np
 
@@ -56,20 +57,30 @@ def sensor_cubic(sampled: Sampled, pendulum: Pendulum, s3: float) -> FloatArray:
     return np.asarray(s3 * sampled.angle**2 * sampled.angle)
 
 
-@enters(
-    "reading",
-    identifier="camera-geometry",
-    name="geometry of the camera (pivot, obliquity), or an encoder's eccentricity",
+_MISPLACED: Final = (
+    Parameter("e_1", "rad", -1.0, 1.0, word="cos x term"),
+    Parameter("e_2", "rad", -0.5, 0.5, word="sin 2x term"),
+)
+
+
+def _camera(**more: Any) -> Callable[[Callable[..., Any]], Effect]:
+    """Declare a form of the camera's geometry; `more` is what distinguishes it."""
+    return enters(
+        "reading",
+        identifier="camera-geometry",
+        name="geometry of the camera (pivot, obliquity), or an encoder's eccentricity",
+        rare=True,
+        angular=True,
+        discriminating_test="move the camera, or turn the encoder on its shaft by a quarter turn",
+        **more,
+    )
+
+
+@_camera(
     equation=r"y = x + e_1 (\cos x - 1) + e_2 \sin 2x",
-    parameters=(
-        Parameter("e_1", "rad", -1.0, 1.0, word="cos x term"),
-        Parameter("e_2", "rad", -0.5, 0.5, word="sin 2x term"),
-    ),
+    parameters=_MISPLACED,
     sizes=2,
-    rare=True,
-    angular=True,
     example=(0.03, 0.01),
-    discriminating_test="move the camera, or turn the encoder on its shaft by a quarter turn",
 )
 def camera_geometry(sampled: Sampled, pendulum: Pendulum, e_1: float, e_2: float) -> FloatArray:
     """The angle on an image whose pivot is misplaced, or that is seen obliquely.
@@ -80,6 +91,25 @@ def camera_geometry(sampled: Sampled, pendulum: Pendulum, e_1: float, e_2: float
     """
     angle = sampled.angle
     return np.asarray(e_1 * (np.cos(angle) - 1.0) + e_2 * np.sin(2.0 * angle))
+
+
+@_camera(
+    key="camera-geometry:wide",
+    equation=r"y = x + e_1 (\cos x - 1) + e_2 \sin 2x + e_3 (\cos 2x - 1)",
+    parameters=(*_MISPLACED, Parameter("e_3", "rad", -0.5, 0.5, word="cos 2x term")),
+    sizes=3,
+)
+def camera_beyond_a_quarter(
+    sampled: Sampled, pendulum: Pendulum, e_1: float, e_2: float, e_3: float
+) -> FloatArray:
+    """The form beyond a quarter turn, where cos 2x is told from cos x.
+
+    A camera turned by beta about an axis at 45 degrees to the vertical makes e_3 = beta^2/4 of the
+    ellipse that it sees.
+    """
+    angle = sampled.angle
+    own = camera_geometry.reading(sampled, pendulum, np.array([e_1, e_2]))
+    return np.asarray(own + e_3 * (np.cos(2.0 * angle) - 1.0))
 
 
 @enters(
