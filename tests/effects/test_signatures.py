@@ -10,7 +10,11 @@ from scipy.special import ellipj
 
 from pendpipe.arrays import FloatArray
 from pendpipe.effects.catalogue import by_identifier
-from pendpipe.effects.catalogue.reading import SoftClipping
+from pendpipe.effects.catalogue.reading import (
+    SoftClipping,
+    camera_beyond_a_quarter,
+    camera_geometry,
+)
 from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN
 from pendpipe.effects.curves import usual_loss_rate
 from pendpipe.effects.effect import STRAIGHT_S, Span
@@ -365,15 +369,23 @@ def test_a_rolling_shutter_reads_the_motion_later_on_one_side() -> None:
     assert np.max(np.abs(found - own)) > 5e-3
 
 
-def test_a_camera_sees_the_angle_of_a_turned_plane_and_a_misplaced_pivot() -> None:
-    """By projection: the plane turned by beta about the vertical, and e_1 of a length across."""
+@pytest.mark.parametrize("axis_rad", [0.0, 0.25 * math.pi, -0.4])
+def test_a_camera_sees_the_angle_of_a_turned_plane_and_a_misplaced_pivot(axis_rad: float) -> None:
+    """By projection: the plane turned by beta about an axis, and e_1 of a length across."""
     beta, across = 0.2, 0.004
-    own = plain(baseline(start=0.6), MIDDLE_TIME)
-    x = np.cos(beta) * np.sin(own)
-    seen = np.arctan2(x, np.cos(own)) + across * (np.cos(own) - 1.0)
-    found = reading("camera-geometry", (across, -(beta**2) / 4.0), baseline(start=0.6), MIDDLE_TIME)
+    at = evaluated("camera-geometry", (0.0, 0.0), baseline(start=2.0), MIDDLE_TIME)
+    own = at.sampled.angle
+    late = np.append(own, 0.0) - axis_rad
+    seen = np.arctan2(np.cos(beta) * np.sin(late), np.cos(late)) + axis_rad
+    turned = np.unwrap(seen[:-1] - own) - seen[-1] + across * (np.cos(own) - 1.0)
+    sizes = beta**2 / 4.0 * np.array([-math.cos(2.0 * axis_rad), math.sin(2.0 * axis_rad)])
+    values = np.array([across, *sizes])
+    wide = camera_beyond_a_quarter.reading(at.sampled, at.span.pendulum, values)
     # To the next order in beta^2.
-    np.testing.assert_allclose(found, seen, 0.0, beta**4 / 8.0)
+    np.testing.assert_allclose(wide, turned, 0.0, beta**4 / 6.0)
+    if not axis_rad:
+        usual = camera_geometry.reading(at.sampled, at.span.pendulum, values[:2])
+        np.testing.assert_array_equal(usual, wide)
 
 
 def test_play_in_the_sensor_is_the_play_operator() -> None:

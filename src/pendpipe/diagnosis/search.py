@@ -71,6 +71,7 @@ from pendpipe.dynamics.eq8_model import values_of
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES
+from pendpipe.estimate import LISTED
 from pendpipe.quantities import compact
 from pendpipe.score import Trials
 
@@ -425,7 +426,12 @@ def run_search(state: Hypothesis, task: Task) -> Hypothesis:
                 state = best.settle(best.fit)
                 break
         else:
-            return _weighed(_judged(examine(state, task)))
+            found = _weighed(_judged(examine(state, task)))
+            other = _likelier(found)
+            if other is None or other.key in seen:
+                return found
+            task.progress(other.words)
+            state = other.settle(other.fit)
 
 
 def _weighed(state: Hypothesis) -> Hypothesis:
@@ -437,6 +443,29 @@ def _weighed(state: Hypothesis) -> Hypothesis:
             others = tuple(other for other in state.steps if other is not step)
             return _weighed(replace(state, fit=without, steps=others).settle(without))
     return replace(state, steps=steps)
+
+
+def _likelier(found: Hypothesis) -> Hypothesis | None:
+    """Put the likeliest of its class in the place of a name that was added.
+
+    It was the likelier beside others, or none, that were there then. What was drawn beside names
+    goes, and may be drawn again.
+    """
+    for step in found.steps:
+        others = zip(step.weights[1:-1], step.mates, strict=True)
+        weight, mate = max(others, key=lambda each: each[0], default=(0.0, step.winner))
+        released = any(isinstance(each.effect, ReleasedParameter) for each in (mate, step.winner))
+        # A curve follows any law: it takes the place of a name that does not count.
+        least = min(LISTED, weight) if mate.drawn else weight
+        if released or step.weights[0] >= least:
+            continue
+        rivals = (mate, *(rival for rival in step.rivals if rival is not mate))
+        kept = [replace(step, rivals=rivals) if each is step else each for each in found.steps]
+        there = {id(effect) for effect in mate.fit.model.effects}
+        steps = tuple(each for each in kept if id(each.winner.effect) in there)
+        words = f"{mate.name} in place of {step.winner.name}"
+        return replace(found, fit=mate.fit, steps=steps, without_curve=None, words=words)
+    return None
 
 
 def _starts(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:

@@ -89,7 +89,10 @@ def camera_geometry(sampled: Sampled, pendulum: Pendulum, e_1: float, e_2: float
     plane of swing from an angle beta, turned about the vertical, e_2 = -beta^2/4. The constant
     is the offset's. What sin x and cos 2x would add is a scale and e_1 up to a quarter turn.
     """
-    angle = sampled.angle
+    return _misplaced(sampled.angle, e_1, e_2)
+
+
+def _misplaced(angle: FloatArray, e_1: float, e_2: float) -> FloatArray:
     return np.asarray(e_1 * (np.cos(angle) - 1.0) + e_2 * np.sin(2.0 * angle))
 
 
@@ -108,8 +111,7 @@ def camera_beyond_a_quarter(
     ellipse that it sees.
     """
     angle = sampled.angle
-    own = camera_geometry.reading(sampled, pendulum, np.array([e_1, e_2]))
-    return np.asarray(own + e_3 * (np.cos(2.0 * angle) - 1.0))
+    return np.asarray(_misplaced(angle, e_1, e_2) + e_3 * (np.cos(2.0 * angle) - 1.0))
 
 
 @enters(
