@@ -195,6 +195,7 @@ def _columns(rng: Rng) -> tuple[Table, int, int]:
         np.sin(40.0 * time) + rng.standard_normal(many),
         20.0 + 1e-4 * time + 0.1 * rng.standard_normal(many),
         np.full(many, 7.0),
+        np.sin(2.0 * np.pi * time / (0.9 * drawn.period_s)),
         np.arange(many, dtype=np.float64),
     ]
     # The number of the row is that, and no other time.

@@ -3,6 +3,7 @@
 import json
 from datetime import datetime, timedelta
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from pendpipe.formats import ReadOptions, inspect, read
 from pendpipe.readings import motion_of
 
 from .cases import swing
+from .test_dialects import motion
 
 TIME, ANGLE = swing(2000)
 SAMPLES = sorted((Path(__file__).parent / "facts").glob("*/*.json"))
@@ -230,6 +232,17 @@ def test_of_columns_without_names_one_that_swings_clearly_is_read(
     rows = np.column_stack([TIME, buzz, pull, 20.0 * ANGLE, buzz[::-1]])
     np.savetxt(tmp_path / "a.csv", rows, fmt="%.6f", delimiter=",")
     assert inspect(tmp_path / "a.csv").chosen == "column 4"
+
+
+@pytest.mark.parametrize("seed", [514, 944, 1224, 1396])
+def test_of_columns_without_names_a_drive_is_not_read_however_clearly_it_swings(
+    tmp_path: Path, seed: int
+) -> None:
+    """Its line is narrow, and that of a decay between two rests broad."""
+    time, swing, period = motion(Random(seed))
+    drive = 0.3 * np.sin(2.0 * np.pi * time / (0.9 * period))
+    np.savetxt(tmp_path / "a.csv", np.column_stack([time, swing, drive]), "%.4f", ",")
+    assert inspect(tmp_path / "a.csv").chosen == "column 2"
 
 
 def test_a_rate_that_the_stamps_contradict_is_a_guess(tmp_path: Path) -> None:

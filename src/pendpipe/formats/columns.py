@@ -17,7 +17,14 @@ from pendpipe.facts import Fact, How
 from pendpipe.formats.circle import on_a_circle, pivot_of
 from pendpipe.formats.grammar import MOST_DAMAGED
 from pendpipe.formats.lists import ONE_WAY, Listed, counts_samples, list_in, one_way
-from pendpipe.formats.table import Column, ReadOptions, Table, derivative_slope, evenness
+from pendpipe.formats.table import (
+    Column,
+    ReadOptions,
+    Swing,
+    Table,
+    derivative_slope,
+    evenness,
+)
 from pendpipe.formats.words import Role, Unit, counts_swings, plain, role_of, split_header, unit_of
 from pendpipe.readings import amplitudes_in, sizes_of
 
@@ -389,6 +396,10 @@ def _readings(
 
 def _of_equals(equals: Sequence[tuple[Column, ...]]) -> tuple[tuple[Column, ...], str]:
     """The first of equals, unless another swings far more, or it is a drive."""
+    free = [each for each in equals if not _drives(each[0].swing, equals)]
+    if len(free) < len(equals):
+        chosen, why = _of_equals(free)
+        return chosen, why or ", whose swing decays"
     # Some wander, through a few cycles at most, and one swings.
     often = [each for each in equals if each[0].swing.clear and not each[0].wanders] or equals
     clearest = max(column[0].swing.clarity for column in often)
@@ -404,10 +415,7 @@ def _of_equals(equals: Sequence[tuple[Column, ...]]) -> tuple[tuple[Column, ...]
     for column in equals:
         swing = column[0].swing
         ratio = swing.clear * swing.samples_per_cycle / (own.samples_per_cycle or np.inf)
-        # A drive has one size from beginning to end; a free decay has all of them.
         along = 1.0 / _PACE < ratio < _PACE
-        if along and swing.graded > 0.3 and own.graded < 0.1 and own.clear:
-            return column, ", whose swing decays"
         # Height, and the pull along the string, go through two cycles in one of the swing.
         # Known to one cycle more or less in the whole.
         blur = max(0.05, min(1.01 * swing.samples_per_cycle / len(column[0].values), 0.2))
@@ -423,6 +431,21 @@ def _of_equals(equals: Sequence[tuple[Column, ...]]) -> tuple[tuple[Column, ...]
     largest = max(column[0].swing.amplitude for column in some)
     wide = next(c for c in some if c[0].swing.amplitude >= largest / 3)
     return wide, ", which swings most" if wide is not first and named else ""
+
+
+def _drives(own: Swing, equals: Sequence[tuple[Column, ...]]) -> bool:
+    """Whether a swing has one size from beginning to end, beside one of its pace that has all."""
+    beside = (column[0].swing for column in equals)
+    return (own.clear and own.graded < _DRIVE) and any(
+        each.clear
+        and each.graded > _DECAY
+        and 1.0 / _PACE < each.samples_per_cycle / own.samples_per_cycle < _PACE
+        for each in beside
+    )
+
+
+_DRIVE, _DECAY = 0.1, 0.3
+"""Shares of cycles of middling size: of a drive at most, of a decay at least."""
 
 
 def _not_a_derivative(
