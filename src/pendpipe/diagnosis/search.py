@@ -446,7 +446,7 @@ def _weighed(state: Hypothesis) -> Hypothesis:
 
 
 def _likelier(found: Hypothesis) -> Hypothesis | None:
-    """Put the likeliest of its class in the place of a name that was added.
+    """Put the likeliest of its class in the place of a name that does not count.
 
     It was the likelier beside others, or none, that were there then. What was drawn beside names
     goes, and may be drawn again.
@@ -455,9 +455,7 @@ def _likelier(found: Hypothesis) -> Hypothesis | None:
         others = zip(step.weights[1:-1], step.mates, strict=True)
         weight, mate = max(others, key=lambda each: each[0], default=(0.0, step.winner))
         released = any(isinstance(each.effect, ReleasedParameter) for each in (mate, step.winner))
-        # A curve follows any law: it takes the place of a name that does not count.
-        least = min(LISTED, weight) if mate.drawn else weight
-        if released or step.weights[0] >= least:
+        if released or not step.weights[0] < LISTED <= weight:
             continue
         rivals = (mate, *(rival for rival in step.rivals if rival is not mate))
         kept = [replace(step, rivals=rivals) if each is step else each for each in found.steps]
