@@ -24,18 +24,24 @@ SQUARE, LOSS = 8.0, 0.008
 
 
 def spherical(
-    along: float, across: float, stiffer: float, axis_rad: float, camera_rad: float = 0.0
+    along: float,
+    across: float,
+    stiffer: float,
+    axis_rad: float,
+    camera_rad: float = 0.0,
+    drag_per_m: float = 0.0,
 ) -> FloatArray:
     """The angle that a camera sees of a mass on a string of length 1.
 
     Let go at `along` with a velocity that would carry it to `across`; the suspension is stiffer
-    along one axis, as a string on two hooks is.
+    along one axis, as a string on two hooks is. Drag is `drag_per_m` |v| v.
     """
     axis = np.array([math.cos(axis_rad), math.sin(axis_rad), 0.0])
 
     def slopes(_: float, state: FloatArray) -> FloatArray:
         place, velocity = state[:3], state[3:]
         force = np.array([0.0, 0.0, -SQUARE]) - 2.0 * LOSS * velocity
+        force -= drag_per_m * np.linalg.norm(velocity) * velocity
         force -= SQUARE * stiffer * (place @ axis) * axis
         pull = -(velocity @ velocity) - place @ force
         return np.concatenate([velocity, force + pull * place])
@@ -77,6 +83,22 @@ def test_a_string_pendulum_seen_by_one_camera(
     assert left < max(along**5 / 30.0, 3e-5)
     assert left < 0.25 * one
     assert fit.value[OMEGA] == pytest.approx(math.sqrt(SQUARE), rel=max(stiffer, 1e-3))
+
+
+@pytest.mark.parametrize("camera_rad", [0.1, 0.5])
+def test_a_drag_of_the_speed_in_both_planes_needs_no_detuning(camera_rad: float) -> None:
+    """The smaller half axis loses less, and the loss of one plane is 4/(3 pi) of v|v| a length."""
+    readings = spherical(0.4, 0.06, 0.0, 0.0, camera_rad, drag_per_m=0.03)
+    begun = PLANES.restart(TIME, readings, Pendulum(math.sqrt(SQUARE), restoring="sine"), 0.0)
+    assert begun is not None
+    value = np.concatenate([values_of(begun.law, begun.release), begun.values])
+    data = Data(TIME, readings, 1.0 / 30.0, True, np.ones(len(TIME)))
+    both = Model(TIME, 1.0 / 30.0, (begun.effect,), restoring="sine")
+    value[[B, -1]] = LOSS, 0.0
+    fit = refine(both, data, white_noise(data, 1e-4), value, held=[B, C, SHARE, len(value) - 1])
+    assert data.rms_left(fit.at.reading) < 0.4**5 / 30.0
+    law = 4.0 / (3.0 * math.pi) * 0.03 * math.sqrt(SQUARE)
+    assert fit.value[A] == pytest.approx(law, rel=0.05)
 
 
 @pytest.mark.parametrize("index", [A, B, OMEGA, START, TIME_OF_START])

@@ -54,14 +54,15 @@ def weigh(found: Hypothesis, step: Step) -> Step:
     mates = _best_of_each([mate for mate in others if of_one_class(own, mate)])
     # An effect that every pendulum has gets its prior against rivals and against "none of these".
     none = own.evidence - max(own.prior, 0.0) - _clean_charge(found)
+    gain = step.before.chi2 - found.fit.chi2
     if effect.kind != "unnamed":
-        none += _charge_for_several(found)
+        none += _charge_for_several(found) - _little_left(found, effect, gain)
     # Any law of the motion that nobody knows makes lines at its harmonics.
     none -= 2.0 * math.log(near_harmonic_by_chance(found.fit, effect))
     weights = probabilities([own, *mates], none)
     # What every pendulum has, and a line off the harmonics, no misfit can be mistaken for.
     if not (effect.expected or off_harmonics(found.fit, effect)):
-        weights = weights * _explained(found, effect, step.before.chi2 - found.fit.chi2)
+        weights = weights * _explained(found, effect, gain)
     return replace(step, mates=tuple(mates), weights=tuple(weights.tolist()))
 
 
@@ -131,11 +132,29 @@ def _explained(found: Hypothesis, effect: Effect, gain: float) -> float:
 
     What an unnamed curve describes beside it is not explained.
     """
-    curves = [step.winner for step in found.steps if step.winner.drawn]
-    open_still = sum(each.gain for each in curves if each.effect is not effect)
+    open_still = _described(found, effect)
     if found.remainder.systematic:
         open_still += found.remainder.excess
     return max(gain, 0.0) / max(max(gain, 0.0) + open_still, 1.0)
+
+
+def _described(found: Hypothesis, effect: Effect) -> float:
+    """Return the chi^2 that unnamed curves take beside an effect."""
+    curves = [step.winner for step in found.steps if step.winner.drawn]
+    return sum(each.gain for each in curves if each.effect is not effect)
+
+
+def _little_left(found: Hypothesis, effect: Effect, gain: float) -> float:
+    """Return the charge (in chi^2) against "none of these" where a misfit is left beside a name.
+
+    A law that is wrong may leave any part of an amplitude; the best of all that were tried leaves
+    less than a part x of it with the probability x times their number.
+    """
+    if found.unexplained > FALSE_ALARM or found.first is None:
+        return 0.0  # what is left is noise: `_CLEAN_CHARGE`
+    left = max(_described(found, effect) + found.remainder.excess, 1.0)
+    by_chance = len(found.first.leads) ** 2 * left / (max(gain, 0.0) + left)
+    return min(max(-math.log(by_chance), 0.0), _CLEAN_CHARGE)
 
 
 def fault_named(found: Hypothesis, finding: Finding) -> FoundEffect:

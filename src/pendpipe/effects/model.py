@@ -522,11 +522,11 @@ def _jacobian(at: Evaluated) -> FloatArray:
     columns[:, START] = (sampled.angle * by_log - sampled.velocity * by_time) / value[START]
     columns[:, TIME] = -sampled.velocity
     columns[:, OFFSET] = 1.0
-    if carried := [(effect, value[place]) for effect, place in model.places() if effect.carried]:
+    if any(effect.carried for effect in model.effects):
         changes[START] = node_log / value[START], node_time / value[START]
         changes[TIME] = np.zeros_like(node_log), np.ones_like(node_time)
         for index, change in changes.items():
-            columns[:, index] += _carried(carried, sampled, pendulum, *change)
+            columns[:, index] += _carried(at, index, *change)
     for effect, place in model.places():
         if isinstance(effect, Curve):
             # It is linear in its values.
@@ -548,21 +548,19 @@ def _by_loss(at: Evaluated, index: int) -> FloatArray:
     return np.asarray(change / (moved[index] - value[index]))
 
 
-def _carried(
-    effects: Sequence[tuple[Effect, FloatArray]],
-    sampled: Sampled,
-    pendulum: Pendulum,
-    by_log: FloatArray,
-    by_time: FloatArray,
-) -> FloatArray:
-    """Derivative of what effects add to the readings, as the motion that carries them changes."""
-    largest = max(np.abs(by_log).max(), pendulum.angular_frequency * np.abs(by_time).max())
+def _carried(at: Evaluated, index: int, by_log: FloatArray, by_time: FloatArray) -> FloatArray:
+    """Derivative of what the motion carries by one value of the baseline."""
+    model, value, moved = at.model, at.value, at.value.copy()
+    largest = max(np.abs(by_log).max(), value[OMEGA] * np.abs(by_time).max())
     step = _CARRIED / max(float(largest), 1e-300)
-    moved = sampled.moved(step * by_log, step * by_time)
-    change = np.zeros_like(sampled.phase)
-    for effect, values in effects:
-        for sign, motion in ((1.0, moved), (-1.0, sampled)):
-            change += sign * np.asarray(effect.reading(motion, pendulum, values))
+    moved[index] += step
+    motion = at.sampled.moved(step * by_log, step * by_time)
+    change = np.zeros_like(at.reading)
+    for effect, place in model.places():
+        if effect.carried:
+            there = effect.reading(motion, model.pendulum(moved), value[place])
+            here = effect.reading(at.sampled, at.span.pendulum, value[place])
+            change += np.asarray(there) - np.asarray(here)
     return change / step
 
 

@@ -7,7 +7,8 @@ what averaging over a cycle leaves, and psi the phase at small amplitude,
     b' = -i omega/16 (|a|^2 + |b|^2) b + W a + 2 pi i delta b,    W = -3/8 omega Im(a* b):
 
 the circular error of both planes together, the turn of the ellipse by 3/8 of its area, the product
-of its half axes (Olsson 1978), and the detuning delta of the second axis. Both lose alike.
+of its half axes (Olsson 1978), and the detuning delta of the second axis. Both lose alike by b; a
+drag |v| v takes from the smaller half axis of a narrow ellipse half as much of it as of the larger.
 
 The next power comes from Birkhoff's normal form. With N = (|a|^2 + |b|^2)/2 and the area
 L = Im(a* b), H = N - N^2/16 - N^3/256 + 3/16 L^2 + 9/256 N L^2 is that of the plane pendulum for
@@ -31,13 +32,16 @@ _FEWEST: Final = 10
 """Windows, each of a period or more: two planes have eight numbers."""
 
 
-def _stepped(a: Any, b: Any, reached: Any, square: Any, detuned: Any) -> tuple[Any, Any]:
-    """Follow both planes over a step: omega r^2 integrates to `reached`, and r^2 is `square`.
+def _stepped(a: Any, b: Any, reached: Any, square: Any, lost: Any, detuned: Any) -> tuple[Any, Any]:
+    """Follow both planes over a step: omega r^2 integrates to `reached`, a r to `lost`.
 
     Both halves of the detuning about the rest, whose turns are by Cayley's transform: unitary, and
     the same for numbers and for arrays.
     """
     b = b * detuned
+    more, across = _apart(a, b, 0.5 * lost)
+    more, across = _apart(a - more, b - across, lost)
+    a, b = a - more, b - across
     energy = a.real**2 + a.imag**2 + b.real**2 + b.imag**2
     area = a.imag * b.real - a.real * b.imag
     slower = energy - 1.0 + square * (3.0 / 64.0 * (energy**2 - 1.0) - 9.0 / 16.0 * area**2)
@@ -46,6 +50,25 @@ def _stepped(a: Any, b: Any, reached: Any, square: Any, detuned: Any) -> tuple[A
     scale = (1.0 + late) / (1.0 - late) / (1.0 + turn * turn)
     cosine, sine = scale * (1.0 - turn * turn), scale * (2.0 * turn)
     return cosine * a - sine * b, (sine * a + cosine * b) * detuned
+
+
+def _apart(a: Any, b: Any, lost: Any) -> tuple[Any, Any]:
+    """What a drag |v| v takes more than of one plane, where it takes the part `lost` of that.
+
+    With m = |a^2 + b^2|/(|a|^2 + |b|^2), |v| is d_0 + d_1 cos(2 psi), whose series in m end with
+    those of a circle, m = 0, and of a line, m = 1: d_0 = 2/pi, d_1 = 4/(3 pi); over 8/(3 pi).
+    """
+    energy, both = np.abs(a) ** 2 + np.abs(b) ** 2, a * a + b * b
+    root, narrow = np.sqrt(energy), (np.abs(both) / energy) ** 2
+    same = _CIRCLE * root * (1.0 - narrow / 16.0 - _LINE_SAME * narrow**2) - 1.0
+    cross = 0.5 * _CIRCLE * root * (0.5 + _LINE_CROSS * narrow) * both / energy
+    return lost * (same * a + cross * np.conj(a)), lost * (same * b + cross * np.conj(b))
+
+
+_CIRCLE: Final = 3.0 * math.pi / 8.0 / math.sqrt(2.0)
+_LINE_SAME: Final = 1.0 - 1.0 / 16.0 - 0.75 / _CIRCLE
+_LINE_CROSS: Final = 0.5 / _CIRCLE - 0.5
+"""Both from the sums at m = 1, 3/4 and 1/4."""
 
 
 def _begun(other: Any) -> tuple[Any, Any, Any, Any]:
@@ -62,7 +85,12 @@ def _begun(other: Any) -> tuple[Any, Any, Any, Any]:
 
 
 def planes(
-    time_s: FloatArray, reached: FloatArray, square: FloatArray, other: complex, detuning: float
+    time_s: FloatArray,
+    reached: FloatArray,
+    square: FloatArray,
+    other: complex,
+    detuning: float,
+    quadratic: float = 0.0,
 ) -> tuple[AnyArray, AnyArray]:
     """Return the complex amplitudes in the plane that is seen, and across, over the first mode's.
 
@@ -78,6 +106,8 @@ def planes(
         The second mode's part of what is seen at the first reading, over the first one's.
     detuning
         Of the second mode, rad/s.
+    quadratic
+        The loss a of Eq. 14, 1/(rad s).
     """
     a, b, seen, hidden = (each.item() for each in map(np.asarray, _begun(other)))
     last_s, size = float(time_s[-1]), (1.0 + abs(other)) ** 2
@@ -85,11 +115,12 @@ def planes(
     count = min(8 + math.ceil(turns / _TURN), 20_000)
     at = np.linspace(0.0, last_s, count + 1)
     parts = np.diff(np.interp(at, time_s, reached)).tolist()
-    squares = np.interp(0.5 * (at[1:] + at[:-1]), time_s, square).tolist()
+    squares = np.interp(0.5 * (at[1:] + at[:-1]), time_s, square)
+    lost = (quadratic * last_s / count * np.sqrt(squares)).tolist()
     detuned = complex(np.exp(0.5j * detuning * last_s / count))
     along, across = [a], [b]
-    for part, now in zip(parts, squares, strict=True):
-        a, b = _stepped(a, b, part, now, detuned)
+    for step in zip(parts, squares.tolist(), lost, strict=True):
+        a, b = _stepped(a, b, *step, detuned)
         along.append(a)
         across.append(b)
     both = np.array([along, across])
@@ -182,12 +213,15 @@ def two_planes(time_s: FloatArray, values: FloatArray, omega: float) -> Planes |
         square = (size * level) ** 2
         whole = omega * last_s / count * square
         part = np.concatenate([0.5 * whole[..., :1], 0.5 * (whole[..., 1:] + whole[..., :-1])], -1)
+        # On the search's way a window may seem to lose all.
+        lost = np.minimum(a * level / count, 0.5)
         other = cosine - 1j * sine
         x, y, seen, hidden = _begun(other[..., 0])
         half = np.exp(0.5j * turned[..., 0] / count)
         found = np.empty(level.shape, dtype=np.complex128)
         for k in range(count):
-            x, y = _stepped(x, y, part[..., k], square[..., k], np.sqrt(half) if k == 0 else half)
+            step = part[..., k], square[..., k], lost[..., k]
+            x, y = _stepped(x, y, *step, np.sqrt(half) if k == 0 else half)
             u, w = seen * x - hidden * y, hidden * x + seen * y
             found[..., k] = u + square[..., k] / 32.0 * _further(u, w)
         turn = phase + faster * at - np.cumsum(part, axis=-1) / 16.0

@@ -224,7 +224,7 @@ def string_planes(
     ratio = motion.upwards * complex(cosine, -sine) / sampled.amplitude[0]
     turned = 2.0 * math.pi * detuning
     time, square = elapsed(sampled.time_s), sampled.amplitude**2
-    both = planes(time, reached - reached[0], square, ratio, turned)
+    both = planes(time, reached - reached[0], square, ratio, turned, pendulum.quadratic)
     return motion.upwards * waveform(sampled.amplitude, sampled.phase, *both)
 
 
@@ -535,7 +535,8 @@ def _at_a_turn(values: FloatArray, span: Span) -> float:
     at random, 1. What is told from a turning point has no such rival.
     """
     phase, error = span.to_a_turn(float(values[1]))
-    return max(math.log(2.0 / math.pi / error**2) - (phase / error) ** 2, 0.0)
+    density = math.log(2.0 / math.pi) - 2.0 * math.log(error)
+    return max(density - (phase / error) ** 2, 0.0)
 
 
 @enters(
