@@ -808,7 +808,7 @@ def _end(
         for k in np.flatnonzero(wall).tolist():
             # What is held takes its part off the covariance of the others.
             own = own - own[:, k, None] * (own[k] / max(own[k, k], _HAIR * matrix[k, k], _TINY))
-        variance = max(float(own[index, index]), _HAIR * float(matrix[index, index]))
+        variance = max(float(own[index, index]), _HAIR * float(matrix[index, index]), 0.0)
         way = np.where(wall == 0.0, own[:, index] * (side / max(variance, _TINY)), 0.0)
         slope, missing = side * float(pull[index]), CHI2_95 + float(step @ (pull + gradient))
         last = slope * variance + math.sqrt((slope * variance) ** 2 + max(missing, 0.0) * variance)

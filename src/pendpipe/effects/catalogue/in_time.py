@@ -535,6 +535,7 @@ def _at_a_turn(values: FloatArray, span: Span) -> float:
     at random, 1. What is told from a turning point has no such rival.
     """
     phase, error = span.to_a_turn(float(values[1]))
+    error = max(error, np.finfo(np.float64).eps)  # no phase is known better than it is rounded
     density = math.log(2.0 / math.pi) - 2.0 * math.log(error)
     return max(density - (phase / error) ** 2, 0.0)
 
