@@ -123,10 +123,12 @@ def pivot_of(x: FloatArray, y: FloatArray) -> FloatArray | None:
     mean = float(radius.mean())
     hangs = high.min() > 0.05 * mean and wide.max() > 0.1 * mean
     away = math.hypot(*centre) / mean
+    # The farther from (0, 0), the less the circle need show: a string that grows is no other pivot.
+    shown = np.std(radius) < min(max(0.3, 1.5 * away), 0.5) * np.std(arm[:, 1])
     # Of a straight line circles of any size are about as good.
     straight = float(np.linalg.eigvalsh(np.cov(arm.T, bias=True))[0])
     clear = (straight / float(np.var(radius)) - 1.0) * (len(arm) - 3) > _BETTER
-    return centre if known < _KNOWN and hangs and clear and away > _AWAY else None
+    return centre if known < _KNOWN and hangs and shown and clear and away > _AWAY else None
 
 
 def _circle_of(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, float] | None:
