@@ -330,14 +330,14 @@ def humming() -> tuple[FloatArray, float]:
 def test_a_cause_that_cannot_be_named_moves_no_period_beyond_its_error(
     make: Callable[[], tuple[FloatArray, float]],
 ) -> None:
-    """Nor is the diagnosis surer of it than the fit, where more than noise is left."""
+    """Nor is the diagnosis surer of it than the fit, but where a curve describes the cause."""
     readings, period_s = make()
     outcome = diagnose_recording(recording(readings, 1), restoring="linear")
     before, after = outcome.baseline, outcome.improved or outcome.baseline
-    for numbers in (before, after):
-        found = numbers.parameters["frequency"]
+    for found in (before.parameters["frequency"], after.parameters["frequency"]):
         assert abs(1.0 / found.value - period_s) < 4.0 * found.sd / found.value**2
-    assert after.parameters["frequency"].sd > 0.99 * before.parameters["frequency"].sd
+    surer = after.parameters["frequency"].sd < 0.99 * before.parameters["frequency"].sd
+    assert surer == (make is humming)
 
 
 # What explains nothing shrinks no error.
