@@ -731,8 +731,14 @@ def _scaled(normal: FloatArray, free: IntArray) -> tuple[FloatArray, FloatArray]
 
 CHI2_95: Final = 3.841458820694124
 """95 % point of chi^2 with one degree of freedom."""
-_CORNERS: Final = 50
-"""Places on the way to the end of an interval at which another value meets or leaves its bound."""
+_FAR: Final = 8.0
+"""Standard deviations from which a bound is out of sight."""
+_CLOSE_TO: Final = 1e-10
+"""Of an interval's half length, which is printed with two digits: Newton's steps end there."""
+_AT_REST: Final = 1e-2
+"""Standard deviations that a gradient may pull: less than what ends a search."""
+_NEWTON: Final = 50
+"""Steps to the end of an interval, at most."""
 
 
 def intervals95(
@@ -767,60 +773,52 @@ def intervals95(
     least 95 % of the cases (97.5 % with one bound), never less.
     """
     matrix = covariance(normal, held) if matrix is None else matrix
-    room, best = bounds.about(value), matrix @ gradient
-    level = CHI2_95 + float(gradient @ best)
+    deviations = np.sqrt(np.maximum(matrix.diagonal(), 0.0))
+    pull = np.abs(gradient * deviations)
+    fitted = [j for j in range(len(value)) if j not in held]
+    at_rest = bool((pull if len(held) == 0 else pull[fitted]).max(initial=0.0) < _AT_REST)
+    half = math.sqrt(CHI2_95) * deviations
+    room = bounds.about(value)
+    if at_rest and bool(((room.lower <= -half) & (half <= room.upper)).all()):
+        # None can come to a bound, since following another moves it by 1.96 of its own at most.
+        return [(float(value[j] - half[j]), float(value[j] + half[j])) for j in indices]
     found = []
     for j in indices:
-        at, half = float(value[j]), math.sqrt(level * max(float(matrix[j, j]), 0.0))
-        others = np.abs(matrix[:, j]) * (half / max(float(matrix[j, j]), _TINY))
-        low, high = best[j] - half, best[j] + half
-        if np.any((best - others < room.lower) | (best + others > room.upper)):
-            begun = bounded_step(normal, gradient, room, (*held, j))
-            low, high = (_end(normal, gradient, room, matrix, j, begun, way) for way in (-1.0, 1.0))
-        # Else chi^2 is one parabola: none comes to a bound on the way.
-        low, high = np.clip([low, high], room.lower[j], room.upper[j]).tolist()
-        found.append((at + low, at + high))
+        ways = (-float(half[j]), float(half[j]))
+        low, high = (_profiled_end(value, normal, gradient, room, j, held, way) for way in ways)
+        found.append((low, high))
     return found
 
 
-@np.errstate(over="ignore")  # a corner may be beyond all numbers
-def _end(
+def _profiled_end(
+    value: FloatArray,
     normal: FloatArray,
     gradient: FloatArray,
     room: Bounds,
-    matrix: FloatArray,
     index: int,
-    begun: FloatArray,
-    side: float,
+    held: Sequence[int],
+    half: float,
 ) -> float:
-    """How far one end of an interval is away where bounds take part in it.
+    """One end of an interval that a bound takes part in, `half` away without it.
 
-    The others follow within their bounds, from where they are best (`begun`): straight on from one
-    corner to the next, at which a value meets its bound or comes off it. So chi^2 is a parabola
-    between corners, and the end is a root.
+    The others follow within their bounds. Chi^2 along the way is convex, and made of parabolas, so
+    that Newton's steps come to where it has risen enough.
     """
-    step, pull = begun, gradient - normal @ begun
-    # A value is stuck at its upper bound (1), at its lower one (-1), or free (0).
-    wall = 1.0 * ((step >= room.upper) & (pull > 0.0)) - ((step <= room.lower) & (pull < 0.0))
-    wall[index] = 0.0
-    for _ in range(_CORNERS):
-        own = matrix
-        for k in np.flatnonzero(wall).tolist():
-            # What is held takes its part off the covariance of the others.
-            own = own - own[:, k, None] * (own[k] / max(own[k, k], _HAIR * matrix[k, k], _TINY))
-        variance = max(float(own[index, index]), _HAIR * float(matrix[index, index]), 0.0)
-        way = np.where(wall == 0.0, own[:, index] * (side / max(variance, _TINY)), 0.0)
-        slope, missing = side * float(pull[index]), CHI2_95 + float(step @ (pull + gradient))
-        last = slope * variance + math.sqrt((slope * variance) ** 2 + max(missing, 0.0) * variance)
-        corner, change = np.full(len(step), np.inf), -normal @ way
-        ahead = np.where(way > 0.0, room.upper - step, room.lower - step)
-        np.divide(ahead, way, out=corner, where=way != 0.0)
-        np.divide(-pull, change, out=corner, where=wall * change < 0.0)
-        k = int(np.argmin(corner))
-        go = max(float(corner[k]), 0.0)
-        if k == index or not go < last:
-            return float(step[index]) + side * min(go, last)
-        step = room.clip(step + go * way)
-        # From there on it is stuck, or no longer.
-        wall[k], pull = np.sign(way[k]), gradient - normal @ step
-    return float(step[index])
+    side = math.copysign(1.0, half)
+    wall = float(room.upper[index] if side > 0.0 else -room.lower[index])
+    most = min(_FAR / math.sqrt(CHI2_95) * abs(half), wall)
+    if not most > 0.0:
+        return float(value[index])
+    end, moved = min(abs(half), most), np.zeros(len(value))
+    others = of_normal(normal, gradient, _others(len(value), (*held, index)))
+    for _ in range(_NEWTON):
+        moved[index] = side * end
+        step = moved + others.pulled(gradient - normal @ moved).step(room)[0]
+        pull = normal @ step - gradient
+        risen, slope = float(step @ (pull - gradient)), 2.0 * side * float(pull[index])
+        before, end = end, most
+        if slope > 0.0:
+            end = min(max(before + (CHI2_95 - risen) / slope, 0.0), most)
+        if abs(end - before) <= _CLOSE_TO * end:
+            break
+    return float(value[index] + side * end)
