@@ -446,7 +446,7 @@ def _weighed(state: Hypothesis) -> Hypothesis:
 
 
 def _likelier(found: Hypothesis) -> Hypothesis | None:
-    """Put the likeliest of its class in the place of a name that does not count.
+    """Put the most likely of its class in the place of a name that does not count.
 
     It was the likelier beside others, or none, that were there then. What was drawn beside names
     goes, and may be drawn again.

@@ -334,7 +334,7 @@ class Cause:
 def causes_of(found: Sequence[FoundEffect]) -> list[Cause]:
     """Return what is said of each effect: three names together at most, the most likely first.
 
-    Effects that one curve of unknown form is likeliest to stand for are one cause.
+    Effects for which the same curve of unknown form is most likely are one cause.
     """
     room, said, curves = _MOST_NAMES, dict[int, Cause](), dict[str, Cause]()
     for effect in sorted(found, key=lambda each: -class_of(each)[0][0]):
