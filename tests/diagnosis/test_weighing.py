@@ -2,6 +2,7 @@
 
 import functools
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -318,3 +319,22 @@ def test_the_strongest_tone_leads_where_no_p_value_is_above_zero() -> None:
     tone = by_identifier("tone-pickup")
     (lead,) = detect(prepare(fit, data, noise, [tone]), fit, seed=1).leads
     assert lead.shape[0] == pytest.approx(2.3, abs=0.01)
+
+
+# What is left beside a name speaks for it.
+
+
+@pytest.mark.structure
+@pytest.mark.parametrize("part", [0.002, 0.004, 0.008])
+def test_none_of_these_is_charged_by_how_seldom_chance_leaves_so_little(part: float) -> None:
+    """Of forty wrong laws each leaves any part of an amplitude; drawn, the least of them."""
+    least = np.random.default_rng(1).random((20_000, 40)).min(axis=1)
+    search = SimpleNamespace(
+        unexplained=0.0,
+        first=SimpleNamespace(leads=[None] * 40),
+        steps=(),
+        remainder=SimpleNamespace(excess=1e6 * part**2, systematic=True),
+    )
+    charge = weighing._little_left(search, by_identifier("impulse"), 1e6 * (1.0 - part**2))
+    drawn = np.mean(least < part)
+    assert np.exp(-0.5 * charge) == pytest.approx(drawn, rel=0.2)
