@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from pendpipe_challenge import items
 from pendpipe_challenge.items import Recipe, make_item
 from pendpipe_challenge.score import calibration_error, figure, found_at, page, ratio, score
 
@@ -230,3 +231,16 @@ def test_what_is_outside_leaves_something_to_every_catalogue_entry() -> None:
     assert effect["left_by_catalogue"] == pytest.approx(100.0, rel=0.5)
     assert effect["delta_chi2"] > effect["left_by_catalogue"]
     assert effect["effect"] == "unnamed-restoring"
+
+
+@pytest.mark.parametrize(("wanted", "least"), [(4.0, 4.0), (100.0, 4.0), (2.0, 4.0)])
+def test_what_no_scene_can_show_is_made_smaller_as_far_as_it_can_be_seen(
+    monkeypatch: pytest.MonkeyPatch, wanted: float, least: float
+) -> None:
+    tried = list[float]()
+    monkeypatch.setattr(items, "sized", lambda *given: tried.append(given[4]))
+    recipe: Recipe = {"family": "single", "effects": ["impulse"], "delta_chi2": [wanted]}
+    with pytest.raises(ValueError, match="no pendulum can show"):
+        make_item({**recipe, "least": least}, np.random.default_rng(1))
+    assert max(tried) == wanted
+    assert min(tried) == min(wanted, least)

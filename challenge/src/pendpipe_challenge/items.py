@@ -317,7 +317,8 @@ def _hide(
         if not forms:
             return None
         laws.append(forms[int(rng.integers(len(forms)))])
-        cause = sized(rng, scene, causes, laws[-1], wanted * ease, recipe.get("least", 4.0))
+        least = recipe.get("least", 4.0)
+        cause = sized(rng, scene, causes, laws[-1], max(wanted * ease, min(wanted, least)), least)
         if cause is None:
             return None
         causes.append(cause)
