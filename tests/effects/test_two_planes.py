@@ -54,6 +54,15 @@ def spherical(
     return np.asarray(np.arctan2(math.cos(camera_rad) * x + math.sin(camera_rad) * y, -z))
 
 
+def started(readings: FloatArray) -> tuple[Model, Data, FloatArray]:
+    """The model of two planes, and where a fit of it begins."""
+    begun = PLANES.restart(TIME, readings, Pendulum(math.sqrt(SQUARE), restoring="sine"), 0.0)
+    assert begun is not None
+    value = np.concatenate([values_of(begun.law, begun.release), begun.values])
+    data = Data(TIME, readings, 1.0 / 30.0, True, np.ones(len(TIME)))
+    return Model(TIME, 1.0 / 30.0, (begun.effect,), restoring="sine"), data, value
+
+
 @pytest.mark.parametrize(
     ("along", "across", "stiffer", "axis_rad", "camera_rad"),
     [
@@ -70,13 +79,8 @@ def test_a_string_pendulum_seen_by_one_camera(
     along: float, across: float, stiffer: float, axis_rad: float, camera_rad: float
 ) -> None:
     """The slow flow leaves the next odd power of the amplitude; one plane far more."""
-    readings = spherical(along, across, stiffer, axis_rad, camera_rad)
-    begun = PLANES.restart(TIME, readings, Pendulum(math.sqrt(SQUARE), restoring="sine"), 0.0)
-    assert begun is not None
-    value = np.concatenate([values_of(begun.law, begun.release), begun.values])
-    data = Data(TIME, readings, 1.0 / 30.0, True, np.ones(len(TIME)))
+    both, data, value = started(spherical(along, across, stiffer, axis_rad, camera_rad))
     noise = white_noise(data, 1e-4)
-    both = Model(TIME, 1.0 / 30.0, (begun.effect,), restoring="sine")
     fit = refine(both, data, noise, value, held=[C, SHARE])
     alone = refine(both.bare(), data, noise, value[: both.first], held=[C, SHARE])
     left, one = data.rms_left(fit.at.reading), data.rms_left(alone.at.reading)
@@ -88,12 +92,7 @@ def test_a_string_pendulum_seen_by_one_camera(
 @pytest.mark.parametrize("camera_rad", [0.1, 0.5])
 def test_a_drag_of_the_speed_in_both_planes_needs_no_detuning(camera_rad: float) -> None:
     """The smaller half axis loses less, and the loss of one plane is 4/(3 pi) of v|v| a length."""
-    readings = spherical(0.4, 0.06, 0.0, 0.0, camera_rad, drag_per_m=0.03)
-    begun = PLANES.restart(TIME, readings, Pendulum(math.sqrt(SQUARE), restoring="sine"), 0.0)
-    assert begun is not None
-    value = np.concatenate([values_of(begun.law, begun.release), begun.values])
-    data = Data(TIME, readings, 1.0 / 30.0, True, np.ones(len(TIME)))
-    both = Model(TIME, 1.0 / 30.0, (begun.effect,), restoring="sine")
+    both, data, value = started(spherical(0.4, 0.06, 0.0, 0.0, camera_rad, drag_per_m=0.03))
     value[[B, -1]] = LOSS, 0.0
     fit = refine(both, data, white_noise(data, 1e-4), value, held=[B, C, SHARE, len(value) - 1])
     assert data.rms_left(fit.at.reading) < 0.4**5 / 30.0
