@@ -577,7 +577,9 @@ def test_two_campaigns_in_one_are_two_groups() -> None:
     names = [run.record for run in DESIGN.runs]
     odd = {name for name in names[1::2] if name.startswith("air")}
     assert odd in (set(seen["first"]), set(seen["second"]))
-    assert content["quoted"]["loss_torque"]["water"] is None
+    # By no law of the drag: its error is that of the loss torque of another assembly, 5 %.
+    water = content["quoted"]["loss_torque"]["water"]
+    assert water["sd"] / water["value"] == pytest.approx(0.05, rel=0.1)
 
 
 @pytest.mark.slow
@@ -591,7 +593,9 @@ def test_a_mode_of_the_water_is_found_where_it_is() -> None:
     peak = bump(answer.baseline)
     assert peak is not None
     assert peak.frequency_hz == min(f for f, _ in answer.baseline.data.values if f > 0.75)
-    assert quoted_torques(answer)["water"] is None
+    # Of one material: the mode is not taken for a loss of the water's assembly.
+    air, water = (quoted_torques(answer)[name] for name in ("air", "water"))
+    assert abs(water.value - air.value) < 3.0 * water.sd
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from snakemake.utils import update_config
 from pendpipe import provenance
 from pendpipe.cli import main
 from pendpipe.configuration.load import read_records
-from pendpipe.files import check_output
+from pendpipe.files import MARK, check_output, read_json, write_json
 from pendpipe.physics import sphere_in_tank
 from pendpipe.project import SNAKEFILE
 from pendpipe.stages.chunks import split
@@ -411,3 +411,65 @@ def test_snakemake_knows_every_file_of_a_finished_campaign(campaign: Campaign) -
     listed = campaign.ask("--list-untracked").splitlines()
     assert [name for name in listed if name.startswith(f"{campaign.results.name}/")] == []
     assert "config/config.yaml" in listed, "so it does list"
+
+
+PLACES = ("air", "water", "low", "high")
+"""Keys that say where a number holds: the key above says what it is."""
+HELD = ("quality_factor_hysteretic", "quality_factor_viscous")
+"""In fit.json what ``--fix`` has held: one recording can't tell them."""
+
+
+def numbers_in(
+    content: Any, record: str | None, path: tuple[str, ...] = ("",)
+) -> Iterator[tuple[str | None, str, bool]]:
+    """Of each number with an error, and each null: whose it is, its name, and if it stands."""
+    name = "/".join(path[-2:] if path[-1] in PLACES else path[-1:])
+    if isinstance(content, list):
+        for each in content:
+            own = each.get("record") if isinstance(each, dict) else None
+            yield from numbers_in(each, own or record, path)
+    elif isinstance(content, dict):
+        if {"value", "sd"} <= content.keys():
+            yield record, name, True
+        for key, each in content.items():
+            yield from numbers_in(each, record, (*path, key))
+    elif content is None:
+        yield record, name, False
+
+
+@pytest.mark.parametrize("kind", ["sound", "bad", "foreign"])
+def test_no_number_is_null_where_another_file_has_it(
+    kind: str, campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also with a record that was refused, and with one whose loss is that of no such pendulum."""
+    there = campaign.copied(tmp_path / "copy")
+    monkeypatch.chdir(there.folder)
+    results = Path(there.results.name)
+    # Without archives the files of the records count.
+    shutil.rmtree(results / "chunks")
+    if kind == "sound":
+        rows = Path(there.records.name).read_text(encoding="utf-8")
+        Path(there.records.name).write_text(rows.partition("broken")[0], encoding="utf-8")
+    if kind == "foreign":
+        fit = json.loads((results / "water-high-8/fit.json").read_text())
+        fit["parameters"]["b"]["value"] *= 0.5
+        del fit[MARK]
+        write_json(results / "water-high-8/fit.json", fit)
+    together, table = results / "campaign_diagnosis.json", results / "separation.json"
+    both = f"--out={results}/comparison.json", f"--summary={results}/campaign.json"
+    for call in (
+        ("diagnose-campaign", str(results)),
+        ("separate", f"--diagnosis={together}", f"--out={table}"),
+        ("compare", f"--separation={table}", *both),
+    ):
+        assert main([*call, "--campaign", "config/config.yaml"]) == 0
+    assert len(read_json(table)["left_out"]) == (kind == "foreign")
+    assert len(read_json(results / "campaign.json")["refused"]) == (kind != "sound")
+    found = {True: set[tuple[str | None, str]](), False: set[tuple[str | None, str]]()}
+    for path in (*results.glob("*.json"), *results.glob("*/[cf]*.json")):
+        record = None if path.parent == results else path.parent.name
+        for owner, name, stands in numbers_in(read_json(path), record):
+            if path.name != "fit.json" or name not in HELD:
+                found[stands].add((owner, name))
+    assert (None, "loss_torque/water") in found[True]
+    assert not found[True] & found[False]

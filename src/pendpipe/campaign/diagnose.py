@@ -40,6 +40,7 @@ from pendpipe.campaign.seen import (
     told_and_measured,
     told_by_frequency,
 )
+from pendpipe.campaign.values import campaign_values
 from pendpipe.diagnosis.found import FoundEffect, Location, Mate
 from pendpipe.estimate import LISTED, Estimate, averaged
 from pendpipe.files import plain
@@ -62,9 +63,8 @@ def campaign_diagnosis(
     ``priors``, ``excluded``, ``records``, ``left_out`` (records that disagree with all others,
     with the numbers with and without them), ``patterns`` (`causes`), ``scatter`` (the factor by
     which the records' errors are too small, where that is found), ``described`` and ``seen`` (what
-    the records show where the model does not describe them), ``quoted`` (k, and the loss torques,
-    None in a fluid whose drag may follow another law), and of each fit ``pulls_of_inputs`` in
-    stated errors.
+    the records show where the model does not describe them), ``quoted`` (k, and the loss torques),
+    and of each fit ``pulls_of_inputs`` in stated errors.
 
     Parameters
     ----------
@@ -106,9 +106,7 @@ def campaign_diagnosis(
         "numbers": {name: _shown(fit) for name, fit in _with_and_without(search).items()},
         "quoted": {
             "hysteretic_coefficient": quoted_coefficient(search).as_json(),
-            "loss_torque": {
-                name: each and each.as_json() for name, each in quoted_torques(search).items()
-            },
+            "loss_torque": {name: each.as_json() for name, each in quoted_torques(search).items()},
         },
         "priors": {
             "nothing_missing": NOTHING_MISSING,
@@ -190,17 +188,17 @@ def changes_drag_law(search: CampaignSearch) -> bool:
     return any(likely) or not search.described
 
 
-def quoted_torques(search: CampaignSearch) -> dict[str, Estimate | None]:
-    """Return kappa'' of each assembly; None in the fluid beside another law of its drag.
+def quoted_torques(search: CampaignSearch) -> dict[str, Estimate]:
+    """Return kappa'' of each assembly.
 
-    There it is what the law leaves over at low frequencies, where it is most of b.
+    In a fluid it is what the law of the drag leaves over at low frequencies, where it is most of b.
+    Beside another law these are the numbers of the campaign's table, in which the drag of every
+    record is free; without a benchmark there are none.
     """
-    design, unsure = search.improved.design, changes_drag_law(search)
-    wet = {run.assembly for run in design.runs if run.fluid is not None}
-    return {
-        name: None if unsure and name in wet else each
-        for name, each in loss_torques(search.improved).items()
-    }
+    if not changes_drag_law(search):
+        return loss_torques(search.improved)
+    values = campaign_values(search.improved.design, search.improved.data)
+    return loss_torques(values.fit) if values else {}
 
 
 def _shown(fit: JointFit) -> dict[str, Any]:
@@ -384,8 +382,6 @@ def _rows(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> list[t
     }
     sizes = (f"{each.expected:g} ({_words(each.parameter.name)})" for each in known.values())
     beforehand = "beforehand nothing is as likely as all causes together"
-    torques = quoted_torques(search)
-    unsure = ", ".join(name for name, each in torques.items() if each is None)
     return [
         *(("seen", each["text"]) for each in seen_in(search)),
         ("off the others", ", ".join(map(off, search.left_out))),
@@ -406,7 +402,6 @@ def _rows(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> list[t
         ),
         ("shares", f"{beforehand}; sd expected: {', '.join(sizes)}" if known else ""),
         ("quote", f"k is {quoted_coefficient(search)}, averaged over causes" if known else ""),
-        ("not to quote", f"kappa'' in {unsure}: what the drag's law leaves over" if unsure else ""),
     ]
 
 

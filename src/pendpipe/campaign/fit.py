@@ -325,10 +325,11 @@ def only(design: Design, data: Measured, keep: BoolArray) -> tuple[Design, Measu
 
 
 def joint_values(design: Design, data: Measured) -> dict[str, Any]:
-    """k, loss torques, drag factor, C_H and added mass, with and without the benchmark.
+    """k, drag factor, C_H and added mass, with and without the benchmark.
 
     All are over Eq. 16, whose walls are far away. Beside the drag the added mass is free: no wall
-    changes the one without the other.
+    changes the one without the other. The loss torque in the fluid is none of them: with one factor
+    for all of the drag it is what the law of the drag leaves over.
 
     Returns
     -------
@@ -350,7 +351,6 @@ def _values(design: Design, data: Measured) -> dict[str, Any]:
     )
     return {
         "hysteretic_coefficient": coefficient(factor).as_json(),
-        "loss_torque": {name: each.as_json() for name, each in loss_torques(factor).items()},
         "drag_factor": factor.size(0, about=1.0).as_json(),
         "history_coefficient": history.size(0, about=1.0).as_json(),
         "added_mass_coefficient": factor.size(about=POTENTIAL_FLOW_ADDED_MASS).as_json(),

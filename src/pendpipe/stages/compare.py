@@ -59,9 +59,6 @@ def compare_campaign(campaign: Campaign, folder: Path, separated: dict[str, Any]
     found = values if values and values.wet and is_line(values) else None
     split = {entry["record"]: entry for entry in separated["records"]}
     joint = joint_values(*together) if together and enough(together[0]) else None
-    for found_with in filter(None, (joint or {}).values()):
-        # The fits have one factor for all of the drag: of another law's they would make a torque.
-        found_with["loss_torque"] |= dict.fromkeys(separated.get("torques_not_to_quote", ()))
     settings = campaign.configuration
     excluded = {
         name: f"{name} is the same recording as {first}" for name, first in twins(results).items()

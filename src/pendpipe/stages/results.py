@@ -109,12 +109,6 @@ def surprises(diagnosis: Path | None) -> dict[str, float]:
     return {row["record"]: row["pull_from_the_others"] for row in rows}
 
 
-def torques_not_to_quote(diagnosis: Path | None) -> list[str]:
-    """Assemblies whose loss torque the diagnosis does not quote, beside another law of the drag."""
-    quoted = read_json(diagnosis).get("quoted") if diagnosis else None
-    return [name for name, each in (quoted or {}).get("loss_torque", {}).items() if each is None]
-
-
 def enough(design: Design) -> bool:
     """Whether records can be compared: k and one effect are free."""
     return len(design.runs) >= FEWEST_RECORDS and design.wet.sum() >= 2.0

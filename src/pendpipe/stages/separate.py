@@ -21,7 +21,6 @@ from pendpipe.stages.results import (
     left_out,
     read_results,
     surprises,
-    torques_not_to_quote,
 )
 
 
@@ -44,7 +43,6 @@ def run(arguments: Arguments) -> None:
         results = read_results(campaign, folder)
     out = left_out(campaign, results, arguments.diagnosis)
     content = separate_campaign(campaign, results, out)
-    content["torques_not_to_quote"] = torques_not_to_quote(arguments.diagnosis)
     known = surprises(arguments.diagnosis)
     for row in content["records"]:
         row["surprise"] = known.get(row["record"])
