@@ -731,16 +731,11 @@ def _scaled(normal: FloatArray, free: IntArray) -> tuple[FloatArray, FloatArray]
 
 CHI2_95: Final = 3.841458820694124
 """95 % point of chi^2 with one degree of freedom."""
-_FAR: Final = 8.0
-"""Standard deviations from which a bound is out of sight."""
-_CLOSE_TO: Final = 1e-10
-"""Of an interval's half length, which is printed with two digits: Newton's steps end there."""
-_AT_REST: Final = 1e-2
-"""Standard deviations that a gradient may pull: less than what ends a search."""
-_NEWTON: Final = 50
-"""Steps to the end of an interval, at most."""
+_CORNERS: Final = 50
+"""Places on the way to the end of an interval at which another value meets or leaves its bound."""
 
 
+@np.errstate(over="ignore")  # a corner may be beyond all numbers
 def intervals95(
     value: FloatArray,
     normal: FloatArray,
@@ -748,7 +743,6 @@ def intervals95(
     bounds: Bounds,
     indices: Sequence[int],
     held: Sequence[int] = (),
-    matrix: FloatArray | None = None,
 ) -> list[tuple[float, float]]:
     """Profile-likelihood intervals of some parameters, the others refitted within their bounds.
 
@@ -764,61 +758,64 @@ def intervals95(
         The parameters whose intervals are wanted.
     held
         Parameters that are not fitted.
-    matrix
-        The covariance, where it is known.
 
     Notes
     -----
     chi^2 is taken as quadratic. Where truth lies on a bound the interval covers it in at
     least 95 % of the cases (97.5 % with one bound), never less.
     """
-    matrix = covariance(normal, held) if matrix is None else matrix
-    deviations = np.sqrt(np.maximum(matrix.diagonal(), 0.0))
-    pull = np.abs(gradient * deviations)
-    fitted = [j for j in range(len(value)) if j not in held]
-    at_rest = bool((pull if len(held) == 0 else pull[fitted]).max(initial=0.0) < _AT_REST)
-    half = math.sqrt(CHI2_95) * deviations
-    room = bounds.about(value)
-    if at_rest and bool(((room.lower <= -half) & (half <= room.upper)).all()):
-        # None can come to a bound, since following another moves it by 1.96 of its own at most.
-        return [(float(value[j] - half[j]), float(value[j] + half[j])) for j in indices]
+    if not np.isfinite(normal).all():
+        # A search that got to where nothing moves tells nothing.
+        return [(float(value[j]), float(value[j])) for j in indices]
+    part, scale = _scaled(normal, np.arange(len(value)))
+    part, room = part + _HAIR * np.eye(len(value)), bounds.about(value)
+    best = bounded_step(normal, gradient, room, held) * scale
+    way, pull = Bounds(room.lower * scale, room.upper * scale), gradient / scale
     found = []
     for j in indices:
-        ways = (-float(half[j]), float(half[j]))
-        low, high = (_profiled_end(value, normal, gradient, room, j, held, way) for way in ways)
-        found.append((low, high))
+        low, high = (_end(part, pull, way, (j, *held), best, side) for side in (-1.0, 1.0))
+        # What met a bound ends there, to the last digit.
+        low = bounds.lower[j] if low <= way.lower[j] else value[j] + low / scale[j]
+        high = bounds.upper[j] if high >= way.upper[j] else value[j] + high / scale[j]
+        found.append((float(low), float(high)))
     return found
 
 
-def _profiled_end(
-    value: FloatArray,
+def _end(
     normal: FloatArray,
     gradient: FloatArray,
     room: Bounds,
-    index: int,
     held: Sequence[int],
-    half: float,
+    best: FloatArray,
+    side: float,
 ) -> float:
-    """One end of an interval that a bound takes part in, `half` away without it.
+    """How far the first of what is `held` gets to an end of its interval, from the optimum on.
 
-    The others follow within their bounds. Chi^2 along the way is convex, and made of parabolas, so
-    that Newton's steps come to where it has risen enough.
+    The others follow within their bounds, straight on from one corner to the next, at which a
+    value meets its bound or comes off it. So chi^2 is a parabola between corners, and the end is
+    the root of one: the first, where no bound is met. A matrix that rounding made indefinite bends
+    no parabola downwards (`_HAIR`).
     """
-    side = math.copysign(1.0, half)
-    wall = float(room.upper[index] if side > 0.0 else -room.lower[index])
-    most = min(_FAR / math.sqrt(CHI2_95) * abs(half), wall)
-    if not most > 0.0:
-        return float(value[index])
-    end, moved = min(abs(half), most), np.zeros(len(value))
-    others = of_normal(normal, gradient, _others(len(value), (*held, index)))
-    for _ in range(_NEWTON):
-        moved[index] = side * end
-        step = moved + others.pulled(gradient - normal @ moved).step(room)[0]
-        pull = normal @ step - gradient
-        risen, slope = float(step @ (pull - gradient)), 2.0 * side * float(pull[index])
-        before, end = end, most
-        if slope > 0.0:
-            end = min(max(before + (CHI2_95 - risen) / slope, 0.0), most)
-        if abs(end - before) <= _CLOSE_TO * end:
+    index, step, follows = held[0], best, np.ones(len(best), dtype=bool)
+    follows[list(held)], last = False, 0.0
+    # A value is stuck at its upper bound (1), at its lower one (-1), or free (0).
+    pull = gradient - normal @ best
+    wall = 1.0 * ((step >= room.upper) & (pull > 0.0)) - ((step <= room.lower) & (pull < 0.0))
+    for _ in range(_CORNERS):
+        free, way = np.flatnonzero(follows & (wall == 0.0)), np.zeros(len(step))
+        way[index], rows = side * (index not in held[1:]), normal[free]
+        way[free] = np.linalg.solve(rows[:, free], -way[index] * rows[:, index])
+        change, pull = normal @ way, gradient - normal @ step
+        bend, slope = max(float(way @ change), _HAIR), float(way @ pull)
+        missing = max(CHI2_95 + float(step @ (pull + gradient)), 0.0)
+        last = (slope + math.sqrt(slope**2 + bend * missing)) / bend
+        corner = np.full(len(step), np.inf)
+        ahead = np.where(way > 0.0, room.upper - step, room.lower - step)
+        np.divide(ahead, way, out=corner, where=way != 0.0)
+        np.divide(pull, change, out=corner, where=follows & (wall * change > 0.0))
+        k = int(np.argmin(corner))
+        if k == index or not (go := max(float(corner[k]), 0.0)) < last:
             break
-    return float(value[index] + side * end)
+        # From there on it is stuck, or no longer.
+        wall[k], step = np.sign(way[k]), room.clip(step + go * way)
+    return float(room.clip(step + last * way)[index])

@@ -391,5 +391,5 @@ def numbers_of(
     frequency, phase = 0.5 * period.angular_frequency / math.pi, math.remainder(phase, math.tau)
     value: FloatArray = np.array([a, b, c, frequency, amplitude, phase, level])
     bounds, held = known_of(points)[0], envelope.held
-    ends = intervals95(envelope.value, normal, gradient, bounds, range(3), held, rates)
+    ends = intervals95(envelope.value, normal, gradient, bounds, range(3), held)
     return value, matrix, ends

@@ -491,8 +491,7 @@ def _numbers(
     own = covariance(normal, held, None if left is None else _beyond_noise(fitted, left, noise))
     (amplitude, phase), jacobian = _first_turning_point(fitted, start_s)
     numbers = np.array([*value[:3], value[OMEGA] / math.tau, amplitude, phase, value[OFFSET]])
-    known = (held, own) if left is None else (held,)
-    ends = intervals95(value, normal, gradient, fitted.problem.bounds, range(3), *known)
+    ends = intervals95(value, normal, gradient, fitted.problem.bounds, range(3), held)
     return numbers, jacobian @ own @ jacobian.T, ends, math.sqrt(own[DRIFT, DRIFT])
 
 
