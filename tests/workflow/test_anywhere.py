@@ -168,6 +168,40 @@ rule all:
     assert len(list(paths[0].parent.glob("fit.json.damaged-*"))) == 1
 
 
+def test_an_archive_has_all_that_a_campaign_is_made_of(begun: Path, tmp_path: Path) -> None:
+    """Where it is unpacked the same is planned, and runs; no conda is asked."""
+    with (begun / "config/records.tsv").open("a", encoding="utf-8") as table:
+        table.write("live\tdataq:simulated:di2108\n")
+    (raw := begun / "results/live/raw/1.raw").parent.mkdir(parents=True)
+    raw.write_bytes(b"what cannot be measured again")
+    words = ("--snakefile", str(SNAKEFILE))
+    archive, there = tmp_path / "all.tar", tmp_path / "there"
+    status, said = snakemake(begun, *words, "--archive", str(archive))
+    assert status == 0, said
+    shutil.unpack_archive(archive, there, filter="data")
+    assert (there / raw.relative_to(begun)).read_bytes() == raw.read_bytes()
+    assert planned(there, *words) == planned(begun, *words) != {}
+    status, said = snakemake(there, *words, "--cores", "1", "results/rod/fit.json")
+    assert status == 0, said
+    assert (there / "results/rod/fit.json").is_file()
+
+
+def test_conda_is_asked_where_the_user_asks_for_it(
+    begun: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By a conda that makes nothing: this tells what Snakemake would have it make, no more."""
+    (begun / "bin").mkdir()
+    info = '{"conda_prefix": "/", "platform": "linux-64", "get": {"channel_priority": "strict"}}'
+    (conda := begun / "bin/conda").write_text(
+        f"#!/bin/sh\n[ $1 = --version ] && echo conda 24.9.0 || echo '{info}'\n", encoding="utf-8"
+    )
+    conda.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{conda.parent}{os.pathsep}{os.environ['PATH']}")
+    words = ("--snakefile", str(SNAKEFILE), "--sdm", "conda", "--list-conda-envs")
+    status, said = snakemake(begun, *words)
+    assert (status, said.count(".snakemake/pendpipe/environment-")) == (0, 1), said
+
+
 def test_init_replaces_nothing(
     begun: Path, monkeypatch: pytest.MonkeyPatch, answer_of: Any
 ) -> None:

@@ -6,7 +6,7 @@ rule acquire:
     log:
         f"{RESULTS}/logs/acquire-{{chunk}}.log",
     conda:
-        ENVIRONMENT
+        environment
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(30),

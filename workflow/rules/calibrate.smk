@@ -8,7 +8,7 @@ rule caliper:
     log:
         f"{RESULTS}/calibration/logs/caliper.log",
     conda:
-        ENVIRONMENT
+        environment
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(30),
@@ -37,7 +37,7 @@ rule calibrate:
     log:
         f"{RESULTS}/logs/calibrate-{{chunk}}.log",
     conda:
-        ENVIRONMENT
+        environment
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(10),

@@ -26,7 +26,7 @@ rule challenge_make:
     log:
         f"{OPEN}/logs/make.log",
     conda:
-        ENVIRONMENT
+        environment
     threads: 2
     params:
         number=CHALLENGE_ITEMS,
@@ -48,7 +48,7 @@ rule challenge_solve:
     log:
         f"{OPEN}/logs/solve.log",
     conda:
-        ENVIRONMENT
+        environment
     threads: 2
     params:
         folder=subpath(input[0], parent=True),
@@ -66,7 +66,7 @@ rule challenge_open:
     log:
         f"{OPEN}/logs/open.log",
     conda:
-        ENVIRONMENT
+        environment
     params:
         folder=subpath(input[0], parent=True),
         sealed=SEALED,
@@ -84,7 +84,7 @@ rule challenge_score:
     log:
         f"{OPEN}/logs/score.log",
     conda:
-        ENVIRONMENT
+        environment
     params:
         folder=subpath(input[0], parent=True),
         out=subpath(output[0], parent=True),

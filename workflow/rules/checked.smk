@@ -25,9 +25,20 @@ for path in filter(os.path.isfile, workflow.configfiles):
 PLACE = ", ".join(map(str, workflow.configfiles)) or "--config"
 OURS = ".snakemake/pendpipe"
 CODE = code_version()
-ENVIRONMENT = checked(
-    jobs.environment, OURS, workflow.source_path("../envs/pendpipe.yaml")
-)
+TEMPLATE = workflow.source_path("../envs/pendpipe.yaml")
+
+
+def environment(_wildcards):
+    """The environment of a job: Snakemake's own, unless `--sdm conda` asks for another.
+
+    So `--archive` and `--summary` need no conda where the jobs need none.
+    """
+    asked = workflow.deployment_settings.deployment_method
+    return (
+        checked(jobs.environment, OURS, TEMPLATE)
+        if "conda" in {*map(str, asked)}
+        else None
+    )
 
 
 def doubled(number):

@@ -91,15 +91,16 @@ def of_all(*names):
     )
 
 
-def sources(wildcards):
-    """The users' files of a chunk: known by their content, not by their times."""
-    files = [str(row.file) for row in CHUNKS[wildcards.chunk] if row.file]
+def users(paths):
+    """The user's files: known by their content, not by their times."""
+    there = [str(path) for path in paths if path and os.path.isfile(path)]
     # Snakemake would take what stands in brackets for a variable of its own.
-    return [
-        ancient(file)
-        for file in files
-        if os.path.isfile(file) and not {*"{}<>"} & {*file}
-    ]
+    return [ancient(path) for path in there if not {*"{}<>"} & {*path}]
+
+
+def sources(wildcards):
+    """The recordings of a chunk."""
+    return users(row.file for row in CHUNKS[wildcards.chunk])
 
 
 wildcard_constraints:
@@ -165,7 +166,15 @@ def wanted():
         *pendulum_diagnoses(),
         *records,
         *of_all(*chunks.STAGES),
+        # What nothing here makes, so that `--archive` takes it along.
+        *users([CAMPAIGN.configuration.records, jobs.caliper_source(CAMPAIGN)]),
+        *users(path for chunk in LIVE for path in raw_files(*CHUNKS[chunk])),
     ]
+
+
+def raw_files(row):
+    """What an instrument has recorded."""
+    return Path(RESULTS, row.record).glob("raw/*.raw")
 
 
 def missing_sources():

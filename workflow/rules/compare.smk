@@ -9,7 +9,7 @@ rule compare:
     log:
         f"{RESULTS}/logs/compare.log",
     conda:
-        ENVIRONMENT
+        environment
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(30),

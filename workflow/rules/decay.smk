@@ -6,7 +6,7 @@ rule decay:
     log:
         f"{RESULTS}/logs/decay-{{chunk}}.log",
     conda:
-        ENVIRONMENT
+        environment
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(30),

@@ -8,7 +8,7 @@ rule diagnose:
     # It takes longest: begun last, it would leave the other cores idle.
     priority: 1
     conda:
-        ENVIRONMENT
+        environment
     resources:
         mem_mb=doubled(2000),
         runtime=doubled(240),

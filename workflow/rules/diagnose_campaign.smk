@@ -6,7 +6,7 @@ rule diagnose_campaign:
     log:
         f"{RESULTS}/logs/diagnose_campaign.log",
     conda:
-        ENVIRONMENT
+        environment
     resources:
         mem_mb=doubled(2000),
         runtime=doubled(30),

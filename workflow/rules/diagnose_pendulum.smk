@@ -7,7 +7,7 @@ rule diagnose_pendulum:
     log:
         f"{RESULTS}/pendulums/{{pendulum}}/logs/diagnose.log",
     conda:
-        ENVIRONMENT
+        environment
     resources:
         mem_mb=doubled(2000),
         runtime=doubled(120),

@@ -13,7 +13,7 @@ rule figures:
     log:
         f"{RESULTS}/logs/figures.log",
     conda:
-        ENVIRONMENT
+        environment
     resources:
         mem_mb=doubled(3000),
         runtime=doubled(60),

@@ -22,7 +22,7 @@ if SMALL:
                 f"{RESULTS}/logs/files-{stage.name}-{chunk}.log",
             localrule: True
             conda:
-                ENVIRONMENT
+                environment
             params:
                 folder=subpath(input[0], ancestor=2),
                 damages=history(*names),
@@ -48,7 +48,7 @@ else:
             file="|".join(re.escape(name) for each in STAGES for name in each.files),
         localrule: True
         conda:
-            ENVIRONMENT
+            environment
         params:
             folder=subpath(input[0], ancestor=2),
         message:

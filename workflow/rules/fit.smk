@@ -6,7 +6,7 @@ rule fit:
     log:
         f"{RESULTS}/logs/fit-{{chunk}}.log",
     conda:
-        ENVIRONMENT
+        environment
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(30),

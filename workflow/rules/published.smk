@@ -21,7 +21,7 @@ rule published:
     log:
         f"{RESULTS}/logs/published.log",
     conda:
-        ENVIRONMENT
+        environment
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(10),

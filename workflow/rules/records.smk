@@ -7,7 +7,7 @@ rule records:
     log:
         f"{RESULTS}/logs/records.log",
     conda:
-        ENVIRONMENT
+        environment
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(10),

@@ -16,7 +16,7 @@ rule report:
     log:
         f"{RESULTS}/logs/report.log",
     conda:
-        ENVIRONMENT
+        environment
     resources:
         mem_mb=doubled(2000),
         runtime=doubled(20),

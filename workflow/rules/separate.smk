@@ -7,7 +7,7 @@ rule separate:
     log:
         f"{RESULTS}/logs/separate.log",
     conda:
-        ENVIRONMENT
+        environment
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(20),

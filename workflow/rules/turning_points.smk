@@ -6,7 +6,7 @@ rule turning_points:
     log:
         f"{RESULTS}/logs/turning_points-{{chunk}}.log",
     conda:
-        ENVIRONMENT
+        environment
     resources:
         mem_mb=doubled(1000),
         runtime=doubled(20),
