@@ -361,6 +361,26 @@ def test_what_comes_after_the_last_reading_is_of_no_consequence() -> None:
     assert np.max(np.abs(one - other)) < 1e-6 * start
 
 
+@pytest.mark.parametrize("half_cycles", [1.2, 1.6, 2.2, 2.7])
+@pytest.mark.parametrize("amplitude", AMPLITUDES)
+def test_near_its_stop_a_motion_is_the_same_wherever_the_search_begins(
+    amplitude: float, half_cycles: float
+) -> None:
+    """What is tried for the half cycles that friction forbids is in no order."""
+    law = replace(pendulum("coulomb", "sine", "energy", amplitude), coulomb=0.009 * amplitude)
+    release = Release(0.0, amplitude)
+    stop_s = float(turning_points(law, release).time_s[-1])
+    time_s = np.arange(0.0, stop_s - half_cycles * math.pi / OMEGA, 0.01)
+    model, value = general(law, amplitude)
+    model = replace(model, time_s=time_s, interval_s=0.01)
+    exact = sample(law, release, time_s)
+    for rate in (1.0, 1.001, 0.999, 1.0):
+        found = model.reading(
+            value * np.where(np.arange(len(value)) == BASELINE.index("c"), rate, 1.0)
+        )
+    assert np.max(np.abs(found - exact)) < 10.0 * GENERAL * amplitude
+
+
 def test_a_pendulum_that_stops_before_the_last_reading_is_refused() -> None:
     """Friction stops it after 30 half cycles, and 50 are read."""
     pendulum = Pendulum(OMEGA_RAD_S, 0.0, 0.0, 0.0, 0.15 / (30.0 * math.pi / OMEGA_RAD_S))

@@ -297,8 +297,9 @@ def follow(
 
 
 def _followed(motion: Motion, until_s: float) -> int:
-    """How many half cycles begin before a time."""
-    return int(np.searchsorted(motion.time_s[:-1, -1], until_s)) + 1
+    """How many half cycles begin before a time; those after it may be in any order."""
+    after = np.append(motion.time_s[:-1, -1] >= until_s, True)
+    return int(np.argmax(after)) + 1
 
 
 def _solved(
@@ -545,7 +546,8 @@ def sample_motion(motion: Motion, time_s: FloatArray) -> Sampled:
     """
     length = _FINER * motion.clock.order + 1
     nodes = _at_finer(motion.time_s)
-    behind = np.searchsorted(nodes.reshape(-1), time_s)
+    # Half cycles after the time up to which it was followed may go back in time.
+    behind = np.searchsorted(np.maximum.accumulate(nodes.reshape(-1)), time_s)
     half = np.clip((behind - 1) // length, 0, len(nodes) - 1)
     left = np.clip(behind - half * length - _POINTS // 2, 0, length - _POINTS)
     first = (half * length + left).astype(np.intp)

@@ -379,7 +379,7 @@ class Model(Eq8Model):
         for count in [*known, *(math.ceil(needed * more) + 1 for more in _MORE)]:
             if needed - 1.0 < count < 1.3 * needed + 4.0:
                 motion = self._from_guesses(law, value, Clock(count, nodes))
-                if motion.time_s[-1, -1] >= self.time_s[-1]:
+                if np.max(motion.time_s[:, -1]) >= self.time_s[-1]:
                     return motion
         raise NoMotionError("the frequency is out of reach")
 
