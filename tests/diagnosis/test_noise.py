@@ -18,7 +18,13 @@ from pendpipe.diagnosis.detect import Band, ToneScan, tone_scan
 from pendpipe.diagnosis.forensics.colour import note_wander
 from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.forensics.tracking import rows_of, wander, wander_confirmed
-from pendpipe.diagnosis.noise import Noise, _about_lines, estimate_noise, stands_out, white_noise
+from pendpipe.diagnosis.noise import (
+    Noise,
+    _about_lines,
+    estimate_noise,
+    noise_of_counts,
+    stands_out,
+)
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.formats import read
 from pendpipe.recording import Recording, read_plain, write_plain
@@ -226,12 +232,17 @@ def test_the_noise_is_never_below_the_floor() -> None:
     assert noise.rms == pytest.approx(1e-2)
 
 
-def test_a_counter_errs_in_time_so_its_angles_err_where_it_is_fast() -> None:
-    times = np.arange(COUNT) * INTERVAL_S
-    speed = np.cos(2.0 * np.pi * FREQUENCY_HZ * times)
-    variance = white_noise(data_of(speed), 1e-3, speed).sd ** 2
-    assert variance[np.abs(speed).argmax()] > 4.0 * variance[np.abs(speed).argmin()]
-    assert np.all(variance > 0.0)
+@pytest.mark.parametrize(("edge", "late_s"), [(1e-4, 0.0), (0.0, 1e-4), (1e-4, 5e-5), (1e-4, 4e-4)])
+def test_a_counters_noise_is_that_of_its_edges_and_of_its_clock(edge: float, late_s: float) -> None:
+    """Whatever swing is left: s^2 + (tau v)^2, within a tenth of its root."""
+    turn = 2.0 * np.pi * np.arange(COUNT) / 60.0
+    speed, rng = 2.0 * np.cos(turn), np.random.default_rng(3)
+    sd = np.hypot(edge, late_s * speed)
+    swing = 1e-3 * np.sin(turn)
+    found = noise_of_counts(swing + sd * rng.standard_normal(COUNT), speed)
+    fast = np.abs(speed) > 1.0
+    assert np.mean(found[fast] ** 2) == pytest.approx(np.mean(sd[fast] ** 2), rel=0.1)
+    assert np.max(np.abs(found - sd)) < 0.15 * np.max(sd)
 
 
 def test_a_counters_errors_are_white_once_divided_by_their_level() -> None:
@@ -242,7 +253,7 @@ def test_a_counters_errors_are_white_once_divided_by_their_level() -> None:
     speed = np.interp(times, fine, np.gradient(angle, fine))
     error = 1e-3 * speed * np.random.default_rng(2).standard_normal(len(times))
     data = Data(times, error, float(np.median(np.diff(times))), False, np.ones(len(times)))
-    noise = estimate_noise(data, error, FREQUENCY_HZ, 0.0, slope=speed)
+    noise = estimate_noise(data, error, FREQUENCY_HZ, 0.0, level=noise_of_counts(error, speed))
     assert not noise.coloured
     fast = np.abs(speed) > np.median(np.abs(speed))
     squares = noise.whiten(error) ** 2

@@ -18,7 +18,7 @@ from pendpipe.diagnosis.data import Data, with_lattice
 from pendpipe.diagnosis.detect import CATALOGUE_SHARE, Detection, detect, prepare
 from pendpipe.diagnosis.found import COLOURED_NOISE, Finding
 from pendpipe.diagnosis.instants import with_better_instants
-from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise
+from pendpipe.diagnosis.noise import Noise, estimate_noise, noise_of_counts, white_noise
 from pendpipe.diagnosis.refine import (
     GROSS,
     INCOMPLETE,
@@ -237,22 +237,22 @@ class Hypothesis:
 def first_noise(beginning: Beginning) -> Noise:
     """Return white noise, estimated from differences without the motion."""
     data = beginning.data
-    slope = None
-    if data.time_noise:
-        slope = beginning.model.evaluate(beginning.value).sampled.velocity
-    return white_noise(data, data.noise_rms, slope)
+    if not data.time_noise:
+        return white_noise(data, data.noise_rms)
+    at = beginning.model.evaluate(beginning.value)
+    return white_noise(data, 1.0, noise_of_counts(data.residual(at.reading), at.sampled.velocity))
 
 
 def noise_of_residual(fit: Fit, data: Data, *, red: bool = True) -> Noise:
     """Estimate the noise from a fit's residual."""
     frequency = fit.value[OMEGA] / (2.0 * np.pi)
     residual = data.residual(fit.at.reading)
-    slope = fit.at.sampled.velocity if data.time_noise else None
+    level = noise_of_counts(residual, fit.at.sampled.velocity) if data.time_noise else None
     floor = _LEAST_STEP * data.step
     power = fit.at.sampled.amplitude**2
     seen = float(np.mean(power) ** 2 / np.mean(power**2))
     cycles = frequency * float(np.ptp(data.time_s)) * seen
-    return estimate_noise(data, residual, frequency, floor, cycles=cycles, red=red, slope=slope)
+    return estimate_noise(data, residual, frequency, floor, cycles=cycles, red=red, level=level)
 
 
 def settled(

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.fft import dct, idct
 from scipy.ndimage import maximum_filter1d, median_filter
+from scipy.optimize import nnls
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.solve import Bounds, Problem, Quadratic, Summed, minimise
@@ -181,26 +182,25 @@ class Noise:
         return Noise(variance, weight, level)
 
 
-def white_noise(data: Data, rms: float, slope: FloatArray | None = None) -> Noise:
-    """Return white noise, the same for all readings (or proportional to speed, for counts).
+def white_noise(data: Data, rms: float, level: FloatArray | None = None) -> Noise:
+    """Return white noise of an rms, times a level at each reading."""
+    return Noise(np.full(len(data), rms * rms), data.weight, level)
 
-    Parameters
-    ----------
-    data
-        The readings.
-    rms
-        Standard deviation of one.
-    slope
-        If the error is in the time: the speed at each reading.
+
+def noise_of_counts(residual: FloatArray, speed: FloatArray) -> FloatArray:
+    """Return the noise of each row that comes with a count, rad.
+
+    The place of an edge errs, and the time at which it is seen: sigma^2 = s^2 + (tau v)^2. Both are
+    told by the squares of fourth differences between rows, in which no motion is left.
     """
-    variance = np.full(len(data), rms * rms)
-    return Noise(variance, data.weight, None if slope is None else level_of_counts(slope))
-
-
-def level_of_counts(slope: FloatArray) -> FloatArray:
-    """Return the level of readings that err in time: in proportion to the speed, half at rest."""
-    usual = math.sqrt(float(np.mean(slope**2)))
-    return np.sqrt(0.25 + (slope / usual) ** 2)
+    square = np.convolve(residual, (1.0, -4.0, 6.0, -4.0, 1.0), "same") ** 2 / 70.0
+    parts = np.stack([np.ones(len(speed)), (speed / np.sqrt(np.mean(speed**2))) ** 2], axis=1)
+    variance = np.full(len(speed), np.mean(square))
+    for _ in range(_CLEANINGS):
+        # Their errors are as large as themselves; neither part is below a hundredth.
+        share = nnls(parts / variance[:, None], square / variance)[0]
+        variance = parts @ np.maximum(share, 0.01 * share.sum())
+    return np.asarray(np.sqrt(variance))
 
 
 _HARMONICS: Final = 7
@@ -272,7 +272,7 @@ def estimate_noise(
     *,
     cycles: float = math.inf,
     red: bool = True,
-    slope: FloatArray | None = None,
+    level: FloatArray | None = None,
 ) -> Noise:
     """Estimate the noise from a residual.
 
@@ -292,8 +292,8 @@ def estimate_noise(
     red
         Whether the noise may grow to low frequencies; else it is told by what lies above half the
         motion's.
-    slope
-        If the error is in the time: the speed at each reading.
+    level
+        Of rows that come with counts: see `noise_of_counts`.
     """
     width = max(_HARMONIC_HALF_WIDTH, _LOBE / cycles)
     lowest, highest = _cycles_per_reading(data, frequency_hz)
@@ -301,7 +301,6 @@ def estimate_noise(
     faster = noise_only & (np.arange(len(data)) > lowest * len(data))
     if not red and np.count_nonzero(faster) >= _FEWEST_COSINES:
         noise_only = faster
-    level = None if slope is None else level_of_counts(slope)
     noise = Noise(np.ones(len(data)), data.weight, level, harmonics=~noise_only)
     noise.harmonics[0] = False
     noise = _with_spectrum(noise, residual, noise_only, red=red)
