@@ -9,6 +9,7 @@ import pytest
 from hypothesis import example, given, strategies as st
 from scipy.special import ellipk
 
+from pendpipe.analysis.half_cycles import periods
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.formats import (
@@ -28,7 +29,6 @@ from pendpipe.formats.table import (
     evenness,
     find_gaps,
     is_uniform,
-    periods,
     sine_in,
     swing_of,
 )
@@ -454,8 +454,8 @@ def test_periods_and_amplitudes_of_a_steady_swing(period: float, level: float, s
     # A crossing is interpolated on a straight line.
     assert lasted == pytest.approx(np.full(len(lasted), period), rel=0.01)
     assert np.median(amplitude) == pytest.approx(size, rel=0.01)
-    # Every half period one ends, but for the first two and what the ends cut.
-    assert abs(len(lasted) - (2 * 39.99 / period - 2)) <= 1.5
+    # Between turning points, one every half period, lie swings, and a period ends with the third.
+    assert abs(len(lasted) - (2 * 39.99 / period - 3)) <= 1.0
 
 
 @given(spikes=st.integers(8, 15), size=st.floats(1e-3, 1e3))

@@ -276,3 +276,30 @@ def _passages(time: FloatArray, values: FloatArray, turns: IntArray) -> FloatArr
     share = (middle[swing] - values[at]) / (values[at + 1] - values[at])
     found[swing] = time[at] + share * (time[at + 1] - time[at])
     return found
+
+
+_LARGER: Final = 0.1
+"""Of the range, from which a swing counts among the larger ones: a tenth of the largest."""
+
+
+def periods(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Find the periods and the amplitudes of the larger cycles of any column of readings.
+
+    Returns
+    -------
+    periods, amplitudes
+        From each passage of the middle to the next but one, shape (n,); empty where there are few.
+    """
+    good = np.isfinite(values) & np.isfinite(time_s)
+    time_s, values = time_s[good], values[good]
+    least = _LARGER * float(np.ptp(np.percentile(values, (0.5, 99.5)))) if len(values) else 0.0
+    half = usual_half_period(time_s, values) if least > 0.0 else None
+    cycles = half_cycles(time_s, values, least, half) if half else None
+    if cycles is None or len(cycles) <= LEAST_HALF_CYCLES:
+        return np.empty(0), np.empty(0)
+    # A swing that was cut off at the first reading passes its middle too late.
+    first = int(cycles.turn_time_s[0] - time_s[0] < half / _PER_HALF_CYCLE)
+    middle_s, swing = cycles.middle_s[first:], cycles.swing[first:]
+    lasted, size = middle_s[2:] - middle_s[:-2], 0.25 * (swing[:-2] + swing[1:-1])
+    usual = np.abs(lasted - np.median(lasted)) < 0.6 * np.median(lasted)
+    return lasted[usual], size[usual]

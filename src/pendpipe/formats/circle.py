@@ -6,10 +6,11 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.half_cycles import periods
 from pendpipe.arrays import FloatArray
 from pendpipe.facts import Fact
 from pendpipe.formats.lists import one_way
-from pendpipe.formats.table import ABSURD, FEWEST, Column, periods, swing_of
+from pendpipe.formats.table import ABSURD, FEWEST, Column, swing_of
 from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 
 

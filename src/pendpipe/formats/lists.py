@@ -7,8 +7,9 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.half_cycles import periods
 from pendpipe.arrays import FloatArray
-from pendpipe.formats.table import Column, periods
+from pendpipe.formats.table import Column
 from pendpipe.formats.words import plain
 from pendpipe.readings import only_falls
 

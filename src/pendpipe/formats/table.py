@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendpipe.analysis.half_cycles import periods
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import refuse_if
 from pendpipe.facts import Fact
@@ -105,39 +106,6 @@ def _graded(rest: FloatArray, cycle: float) -> float:
     size = np.ptp(rest[: len(rest) // width * width].reshape(-1, width), axis=1)
     large = float(size.max(initial=0.0))
     return float(np.mean((size > 0.1 * large) & (size < 0.85 * large))) if large else 0.0
-
-
-def periods(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Find the periods and the amplitudes of the larger cycles.
-
-    The level is crossed when the reading has gone from a tenth of the largest amplitude on
-    one side to as much on the other, so noise near the level is no crossing.
-
-    Returns
-    -------
-    periods, amplitudes
-        From each crossing to the next but one, shape (n,); empty where there are few.
-    """
-    good, none = np.isfinite(values) & np.isfinite(time), np.empty(0)
-    time, values = time[good], values[good]
-    if len(values) < FEWEST or np.abs(values).max() > ABSURD:
-        return none, none
-    low, middle, high = np.percentile(values, (0.5, 50, 99.5))
-    rest = values - middle
-    outside = np.flatnonzero(np.abs(rest) > 0.1 * max(high - middle, middle - low))
-    turns = np.flatnonzero(np.diff(np.signbit(rest[outside]).astype(np.int8)))
-    if not high > low or len(outside) < FEWEST or len(turns) < 5:
-        return none, none
-    before, after = outside[turns], outside[turns + 1]
-    part = rest[before] / (rest[before] - rest[after])
-    crossings = time[before] + part * (time[after] - time[before])
-    high, low = (
-        sign * np.maximum.reduceat(sign * rest, before)[:-1] for sign in (1.0, -1.0)
-    )  # of half cycles
-    largest = np.maximum(high[:-1], high[1:]) - np.minimum(low[:-1], low[1:])
-    lasted = crossings[2:] - crossings[:-2]
-    usual = np.abs(lasted - np.median(lasted)) < 0.6 * np.median(lasted)
-    return lasted[usual], 0.5 * largest[usual]
 
 
 _TOP_RAD: Final = 2.8

@@ -8,13 +8,14 @@ from typing import Final
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from pendpipe.analysis.half_cycles import periods
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.facts import SWINGS, Fact, How
 from pendpipe.formats.columns import Choice
 from pendpipe.formats.grammar import MOST_DAMAGED
 from pendpipe.formats.lists import ONE_WAY, counts_samples, one_way
-from pendpipe.formats.table import FEWEST, Column, ReadOptions, Table, periods
+from pendpipe.formats.table import FEWEST, Column, ReadOptions, Table
 from pendpipe.formats.words import Unit, counts_swings, plain, unit_of
 from pendpipe.recording import is_uniform
 

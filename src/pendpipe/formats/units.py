@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.half_cycles import periods
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
 from pendpipe.facts import Fact, How
@@ -17,7 +18,6 @@ from pendpipe.formats.table import (
     ReadOptions,
     Table,
     derivative_slope,
-    periods,
     sine_in,
 )
 from pendpipe.formats.times import TimeBase
