@@ -471,7 +471,7 @@ def test_the_share_of_sine_is_the_power_with_which_the_period_goes_as_k(
     power: float, radians: float
 ) -> None:
     """To second order in the amplitude: at 0.6 rad the fourth makes up 1/25 of a share of 2."""
-    share = sine_in(CENTISECONDS, decay(power, 0.6) / radians, radians)
+    share = sine_in(*periods(CENTISECONDS, decay(power, 0.6) / radians), radians)
     assert share is not None
     assert share.value == pytest.approx(power, abs=0.1)
     assert not (share.tells and abs(power - 1.0) > 0.5)
@@ -479,13 +479,11 @@ def test_the_share_of_sine_is_the_power_with_which_the_period_goes_as_k(
 
 def test_small_swings_and_loud_ones_tell_no_unit() -> None:
     noise = np.random.default_rng(5).standard_normal(len(CENTISECONDS))
-    small = sine_in(CENTISECONDS, decay(1.0, 0.05) + 1e-2 * noise, 1.0)
-    assert small is not None
-    assert not small.tells
-    large = sine_in(CENTISECONDS[:1000], decay(1.0)[:1000], 1.0)
-    assert large is not None
-    assert large.tells
-    assert sine_in(CENTISECONDS[:400], decay(1.0)[:400], 1.0) is None
+    found = (
+        sine_in(*periods(CENTISECONDS, decay(1.0, 0.05) + 1e-2 * noise), 1.0),
+        *(sine_in(*periods(CENTISECONDS[:few], decay(1.0)[:few]), 1.0) for few in (1000, 400)),
+    )
+    assert [share and share.tells for share in found] == [False, True, None]
 
 
 @given(ratio=st.floats(1e-3, 1e3), upwards=st.booleans())

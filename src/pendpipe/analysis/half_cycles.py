@@ -140,11 +140,15 @@ def without_ripples(values: FloatArray, turns: IntArray) -> IntArray:
     return np.array(kept, dtype=np.int64)
 
 
+def _range(values: FloatArray) -> float:
+    """Tell the range of most readings: of all, a wild one would hide every swing."""
+    some = values[:: max(1, len(values) // _SOME)]
+    return float(np.ptp(np.percentile(some, (0.5, 99.5))))
+
+
 def usual_half_period(time_s: FloatArray, values: FloatArray) -> float | None:
     """Estimate the half period from the large swings; ``None`` if there are not two."""
-    # Not the whole range: a wild reading would hide every swing.
-    low, high = np.percentile(values[:: max(1, len(values) // _SOME)], (0.5, 99.5))
-    span = float(high - low) or float(np.ptp(values))
+    span = _range(values) or float(np.ptp(values))
     for share in (0.2, 0.05, 0.02):
         turns = without_ripples(values, find_extremes(values, share * span))
         if len(turns) > LEAST_HALF_CYCLES:
@@ -292,10 +296,9 @@ def periods(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatAr
     """
     good = np.isfinite(values) & np.isfinite(time_s)
     time_s, values = time_s[good], values[good]
-    least = _LARGER * float(np.ptp(np.percentile(values, (0.5, 99.5)))) if len(values) else 0.0
+    least = _LARGER * _range(values) if len(values) else 0.0
     half = usual_half_period(time_s, values) if least > 0.0 else None
-    cycles = half_cycles(time_s, values, least, half) if half else None
-    if cycles is None or len(cycles) <= LEAST_HALF_CYCLES:
+    if not half or len(cycles := half_cycles(time_s, values, least, half)) <= LEAST_HALF_CYCLES:
         return np.empty(0), np.empty(0)
     # A swing that was cut off at the first reading passes its middle too late.
     first = int(cycles.turn_time_s[0] - time_s[0] < half / _PER_HALF_CYCLE)

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pendpipe.analysis.half_cycles import periods
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.errors import refuse_if
 from pendpipe.facts import Fact
@@ -114,15 +113,14 @@ _FEWEST_CYCLES: Final = 8
 """Cycles: beyond the three numbers of `sine_share` with a drift they leave five for its error."""
 
 
-def sine_in(time: FloatArray, values: FloatArray, radians: float) -> Coefficient | None:
-    """How much of sin x the periods of larger cycles ask for, a reading being so many `radians`.
+def sine_in(lasted: FloatArray, size: FloatArray, radians: float) -> Coefficient | None:
+    """How much of sin x periods of such amplitudes ask for, a reading being so many `radians`.
 
     Returns
     -------
     share
         ``None`` of too few cycles.
     """
-    lasted, size = periods(time, values)
     # Near the top the period has no end.
     keep = (size > 0.3 * size.max(initial=0.0)) & (radians * size < _TOP_RAD)
     lasted, angle = lasted[keep], radians * size[keep]

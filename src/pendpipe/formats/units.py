@@ -178,7 +178,8 @@ def _contradicted(column: Column, written: Unit, time_s: FloatArray) -> _Guess |
 def _by_sine(column: Column, time_s: FloatArray, *names: str) -> str | None:
     """The unit of angles, among those named, in which the period lengthens as that of sin x."""
     units = {name: ANGLES[name] for name in names}
-    return unit_shown(lambda size: sine_in(time_s, column.values, size), units)
+    cycles = periods(time_s, column.values)
+    return unit_shown(lambda size: sine_in(*cycles, size), units)
 
 
 def _angle_unit(table: Table, choice: Choice, column: Column, time_s: FloatArray) -> _Guess | None:
