@@ -56,7 +56,7 @@ def between(rng: Rng, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def swing(rng: Rng, fewest: float = 5.0, largest_q: float = 1000.0) -> Swing:
+def swing(rng: Rng, fewest: float = 5.0, largest_q: float = 1000.0, loudest: float = 0.1) -> Swing:
     """Draw a swing of `fewest` to 400 readings a cycle, 8 to 200 cycles, Q from 10 on."""
     cycle, quality, amplitude = (
         between(rng, fewest, 400.0),
@@ -70,7 +70,7 @@ def swing(rng: Rng, fewest: float = 5.0, largest_q: float = 1000.0) -> Swing:
     size = amplitude * np.exp(-np.pi * turns / quality)
     phase = np.cumsum(0.5 * np.pi / elliptic(np.sin(0.5 * size) ** 2)[0]) / cycle
     angle = size * np.cos(2.0 * np.pi * phase + rng.uniform(0.0, 6.3))
-    noise = amplitude * between(rng, 1e-5, 0.1) * rng.standard_normal(len(turns))
+    noise = amplitude * between(rng, 1e-5, loudest) * rng.standard_normal(len(turns))
     return Swing(turns * period, angle + noise, period, cycle)
 
 
@@ -275,16 +275,20 @@ def amplitudes(rng: Rng) -> Answer:
 
 
 def pull(rng: Rng) -> Answer:
-    """An axis of an accelerometer on the bob, which lies as it may; right where 2 f is seen."""
-    drawn = swing(rng)
-    tilt, reach = np.arccos(rng.uniform(-1.0, 1.0)), rng.uniform(0.02, 1.0)
-    angle = drawn.angle_rad
-    rate = np.gradient(angle, drawn.time_s)
-    omega = 2.0 * np.pi / drawn.period_s
-    along = STANDARD_GRAVITY_M_PER_S2 * (np.cos(angle) + (rate / omega) ** 2)
-    values = along * np.cos(tilt) + reach * STANDARD_GRAVITY_M_PER_S2 * np.sin(angle) * np.sin(tilt)
+    """An axis of an accelerometer at a part of the length; right where 2 f is seen.
+
+    One axis in two lies as it may, the others near the string.
+    """
+    drawn = swing(rng, loudest=1e-4)
+    angle, at = drawn.angle_rad, rng.uniform(0.0, 1.5)
+    squared = (np.gradient(angle, drawn.time_s) * drawn.period_s / (2.0 * np.pi)) ** 2
+    tilt = np.arccos(rng.uniform(*((0.96, 1.0) if rng.integers(2) else (-1.0, 1.0))))
+    along, across = np.cos(angle) + at * squared, (1.0 - at) * np.sin(angle)
+    values = STANDARD_GRAVITY_M_PER_S2 * (along * np.cos(tilt) + across * np.sin(tilt))
+    # Phones scatter by 0.001 to 0.1 m/s^2.
+    values += between(rng, 1e-3, 0.1) * rng.standard_normal(len(values))
     twice = swing_of(values).samples_per_cycle < 0.75 * drawn.cycle
-    return pull_along_string(values), twice
+    return pull_along_string(drawn.time_s, values), twice
 
 
 def drive(rng: Rng) -> Answer:
@@ -340,8 +344,8 @@ def counted(kind: str, number: int) -> tuple[int, int]:
             fact, right = DRAWN[kind](np.random.default_rng((660, seed)))
         except InputError:
             continue
-        shown += fact is not None
-        wrong += fact is not None and not right
+        shown += fact is not None and fact.how == "shown"
+        wrong += fact is not None and fact.how == "shown" and not right
     return shown, wrong
 
 

@@ -36,7 +36,7 @@ KINDS: Final[Mapping[str, Kind]] = {
     "turns": Kind("--unit", wrong=0.004),
     "pivot": Kind("--column x for the position itself", wrong=0.02),
     "amplitudes": Kind("--column", ("Q",), 0.006),
-    "pull": Kind("--column", ("period",), 0.03),
+    "pull": Kind("--column", ("period",), 0.01),
     "drive": Kind("--start, --stop", wrong=0.04),
     "lost readings": Kind("--start, --stop", wrong=0.01),
     "saturation": Kind("--start, --stop", wrong=0.004),

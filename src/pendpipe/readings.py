@@ -6,9 +6,11 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.half_cycles import larger_half_cycles
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
 from pendpipe.facts import Fact
+from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 from pendpipe.recording import Recording
 
 
@@ -40,8 +42,7 @@ def motion_of(
     """
     motion = _in_radians(recording, volts_per_radian, place)
     _check_scale(motion, place)
-    _refuse_pull(motion, place)
-    return with_amplitudes(motion)
+    return with_amplitudes(_with_pull(motion, place))
 
 
 def with_amplitudes(recording: Recording) -> Recording:
@@ -69,16 +70,20 @@ def amplitudes_in(label: str, time: FloatArray | None, values: FloatArray) -> Fa
     return Fact("amplitudes", label, "shown", said)
 
 
-def _refuse_pull(recording: Recording, place: str | Path) -> None:
-    """Refuse an accelerometer's pull along the string."""
-    known = recording.unit == "m/s^2" and recording.unit_is_stated
+def _with_pull(recording: Recording, place: str | Path) -> Recording:
+    """Refuse an accelerometer's pull along the string; note what may be one."""
+    if recording.unit != "m/s^2" or not recording.unit_is_stated:
+        return recording
+    good = recording.usable
+    fact = pull_along_string(recording.time_s[good], recording.values[good])
     refuse_if(
-        known and pull_along_string(recording.values[recording.usable]),
+        fact is not None and fact.how == "shown",
         place,
         "this is the pull along the string (about 9.8 m/s^2), which swings twice per period",
         "give the axis along the swing, or the gyroscope, with --column (--unit counts takes it"
         " as it stands)",
     )
+    return recording if fact is None else recording.knowing(fact)
 
 
 def _check_scale(recording: Recording, place: str | Path) -> None:
@@ -134,12 +139,21 @@ _SHORTEST_S, _LONGEST_S = 1e-60, 1e14
 _ALONG: Final = 0.03
 """Of g, within which an axis along the string hangs. Its share is the cosine of the axis' tilt,
 evenly spread where a device lies as it may: one other axis in 33 hangs as near."""
+_SURE_SD: Final = 3.0
+"""Standard errors off 0 of a slope that chance makes one time in 700."""
+_FEWEST_TURNS: Final = 8
+"""Half cycles, which leave five degrees of freedom for the error of a slope."""
 
 
-def pull_along_string(values: FloatArray) -> Fact | None:
-    """Say that readings in m/s^2 hang at g, as an accelerometer's axis along the string does."""
-    from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
+def pull_along_string(time_s: FloatArray, values: FloatArray) -> Fact | None:
+    """Say whether readings in m/s^2 hang at g as an accelerometer's axis along the string does.
 
+    A string is pulled by g (3 cos x - 2 cos A): up to 2 g (1 - cos A) above g in the middle of a
+    swing, and to g (1 - cos A) below it where it turns. So the level between the turning points of
+    the readings rises by a third of their amplitude as that grows; (2 q - 1)/(2 q + 1) of it, of a
+    sensor at q of the length of the simple pendulum. An axis that sees the swing through a tilt has
+    a level that falls.
+    """
     level = float(np.nanmedian(values)) if len(values) else 0.0
     if abs(abs(level) / STANDARD_GRAVITY_M_PER_S2 - 1.0) > _ALONG:
         return None
@@ -147,7 +161,14 @@ def pull_along_string(values: FloatArray) -> Fact | None:
         "the readings hang about 9.8 m/s^2, as a pull along the string does, which swings twice"
         " in a period of the pendulum"
     )
-    return Fact("pull", "9.8 m/s^2", "shown", said)
+    cycles, shown = larger_half_cycles(time_s, values), False
+    if cycles is not None and len(cycles) >= _FEWEST_TURNS:
+        turn = np.sign(level) * cycles.turn
+        between = 0.25 * (turn[:-2] + 2.0 * turn[1:-1] + turn[2:])
+        size = 0.25 * (cycles.swing[:-1] + cycles.swing[1:])
+        (slope, _), matrix = np.polyfit(size, between, 1, cov=True)
+        shown = slope > _SURE_SD * float(np.sqrt(matrix[0, 0]))
+    return Fact("pull", "9.8 m/s^2", "shown" if shown else "guessed", said)
 
 
 _LEVEL: Final = 0.03

@@ -286,6 +286,22 @@ _LARGER: Final = 0.1
 """Of the range, from which a swing counts among the larger ones: a tenth of the largest."""
 
 
+def larger_half_cycles(time_s: FloatArray, values: FloatArray) -> HalfCycles | None:
+    """Read off the half cycles of any column of readings; ``None`` where there are few."""
+    good = np.isfinite(values) & np.isfinite(time_s)
+    time_s, values = time_s[good], values[good]
+    least = _LARGER * _range(values) if len(values) else 0.0
+    half = usual_half_period(time_s, values) if least > 0.0 else None
+    if not half or len(cycles := half_cycles(time_s, values, least, half)) <= LEAST_HALF_CYCLES:
+        return None
+    if cycles.turn_time_s[0] - time_s[0] >= half / _PER_HALF_CYCLE:
+        return cycles
+    # A swing that was cut off at the first reading is no half cycle.
+    turn_time_s, turn = cycles.turn_time_s[1:], cycles.turn[1:]
+    swing, middle_s = cycles.swing[1:], cycles.middle_s[1:]
+    return HalfCycles(turn_time_s, turn, swing, middle_s, cycles.step, cycles.ending)
+
+
 def periods(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Find the periods and the amplitudes of the larger cycles of any column of readings.
 
@@ -294,15 +310,9 @@ def periods(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatAr
     periods, amplitudes
         From each passage of the middle to the next but one, shape (n,); empty where there are few.
     """
-    good = np.isfinite(values) & np.isfinite(time_s)
-    time_s, values = time_s[good], values[good]
-    least = _LARGER * _range(values) if len(values) else 0.0
-    half = usual_half_period(time_s, values) if least > 0.0 else None
-    if not half or len(cycles := half_cycles(time_s, values, least, half)) <= LEAST_HALF_CYCLES:
+    if (cycles := larger_half_cycles(time_s, values)) is None:
         return np.empty(0), np.empty(0)
-    # A swing that was cut off at the first reading passes its middle too late.
-    first = int(cycles.turn_time_s[0] - time_s[0] < half / _PER_HALF_CYCLE)
-    middle_s, swing = cycles.middle_s[first:], cycles.swing[first:]
-    lasted, size = middle_s[2:] - middle_s[:-2], 0.25 * (swing[:-2] + swing[1:-1])
+    lasted = cycles.middle_s[2:] - cycles.middle_s[:-2]
+    size = 0.25 * (cycles.swing[:-2] + cycles.swing[1:-1])
     usual = np.abs(lasted - np.median(lasted)) < 0.6 * np.median(lasted)
     return lasted[usual], size[usual]

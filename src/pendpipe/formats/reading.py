@@ -265,7 +265,7 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     step = own_step * found.factor if own_step is not None else find_step(values)
     limits = limits and (limits[0] * found.factor, limits[1] * found.factor)
     known = guesses(found.facts) == ()
-    pull = pull_along_string(values) if found.unit == "m/s^2" and known else None
+    pull = pull_along_string(base.time_s, values) if found.unit == "m/s^2" and known else None
     facts += filter(None, (pull, saturation(values, step, limits)))
     recording = Recording(
         time_s=base.time_s,

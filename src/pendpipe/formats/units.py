@@ -147,6 +147,10 @@ def _unit(
 
 _METRE_S: Final = 0.3
 """Off 2 s, within which g/omega^2 is 1 m to 30 %, as is no other of the usual units."""
+_POSITION: Final = 0.02
+"""Error of the share of sin x up to which it says of a position that it is an angle. In pixels, or
+metres, of lengths from 1 to 10^4 the share goes as their square, which by chance lies within two
+errors of 1, 0.92 to 1.08 of it, one time in 200."""
 _ASIDE: Final = 3.0
 """Degrees by which a camera hangs askew, as a rule: chance lies as near to a quarter turn once in
 fifteen times, so that a centre only lets guess."""
@@ -168,17 +172,16 @@ def _contradicted(column: Column, written: Unit, time_s: FloatArray) -> _Guess |
     """Doubt a header that gives the one unit of angles where the period shows the other."""
     headed = next((name for name, unit in _ANGLES.items() if unit == written), "")
     other = {"radians": "degrees", "degrees": "radians"}.get(headed, "")
-    name = _by_sine(column, time_s, other) if other else None
+    name = _by_sine(periods(time_s, column.values), other) if other else None
     if name is None:
         return None
     why = f"is headed in {headed}, but its period grows as a swing in {name} does: taken as such"
     return _Guess(_ANGLES[name], why, "guessed")
 
 
-def _by_sine(column: Column, time_s: FloatArray, *names: str) -> str | None:
-    """The unit of angles, among those named, in which the period lengthens as that of sin x."""
+def _by_sine(cycles: tuple[FloatArray, FloatArray], *names: str) -> str | None:
+    """The unit of angles, among those named, in which periods lengthen as that of sin x."""
     units = {name: ANGLES[name] for name in names}
-    cycles = periods(time_s, column.values)
     return unit_shown(lambda size: sine_in(*cycles, size), units)
 
 
@@ -230,13 +233,15 @@ def _by_centre(finite: FloatArray) -> _Guess | None:
 
 def _by_period(column: Column, time_s: FloatArray) -> _Guess | None:
     """Take for radians, degrees or turns what is swung through ever faster, just as they are."""
-    # Of what is named a position other units may well be pixels, of any length.
-    name = _by_sine(column, time_s, *(["radians"] if column.role == "length" else ANGLES))
-    if name is None:
+    cycles = periods(time_s, column.values)
+    position = column.role == "length"
+    name = _by_sine(cycles, *(["radians"] if position else ANGLES))
+    told = sine_in(*cycles, 1.0) if position and name else None
+    if name is None or (told and told.sd > _POSITION):
         return None
     why = f"is in {name}: its period lengthens with the swing as sin x has it"
     # Of a pendulum 1 m long (2 s) metres look the same.
-    usual = float(np.median(periods(time_s, column.values)[0]))
+    usual = float(np.median(cycles[0]))
     if name == "radians" and column.role != "angle" and abs(usual - 2.0) < _METRE_S:
         return _Guess(_RADIAN, f"{why}, or in metres, with a string of 1 m", "guessed")
     return _Guess(_ANGLES[name], why, "shown")
