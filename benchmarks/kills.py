@@ -8,13 +8,11 @@ disturbs the run, does what ``pendpipe doctor`` says about a lock, runs the same
 compares every file of the results, byte for byte, with an undisturbed run. One project suffers
 five kills before it may end; after each, what is sound by the digest in it is compared. A
 result of a finished run that is torn, emptied or altered must be named and set aside as well. Left
-out are logs, which carry dates, in the archives too, and temporary files that a killed process
-left.
+out are logs, which carry dates, and temporary files that a killed process left.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import random
@@ -24,7 +22,6 @@ import subprocess
 import sys
 import tempfile
 import time
-import zipfile
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -36,8 +33,7 @@ from benchmarks.journal import KEPT, ROOT, answers, code, commit, judge_parser
 from benchmarks.scale import write_decay
 from benchmarks.table import head, table_row
 from pendpipe.commands.doctor import TEMPORARY
-from pendpipe.files import SET_ASIDE, damage_of, sha256
-from pendpipe.stages.archive import FOLDER, members
+from pendpipe.files import SET_ASIDE, sha256
 
 SOURCES: Final = (
     *("src/pendpipe/stages/*.py", "src/pendpipe/commands/stage.py"),
@@ -67,12 +63,6 @@ KILLS: Final = 5
 PATIENCE_S: Final = 3600.0
 """No run of the small campaign takes as long, on however busy a machine."""
 Case = dict[str, Any]
-
-
-def hashes(path: Path) -> dict[str, str]:
-    """The hash of each file in an archive."""
-    with zipfile.ZipFile(path) as archive:
-        return {name: hashlib.sha256(archive.read(name)).hexdigest() for name in members(path)}
 
 
 class Project:
@@ -139,16 +129,12 @@ class Project:
         return False
 
     def sums(self) -> dict[str, str]:
-        """The hash of each result, those in archives as well."""
+        """The hash of each result."""
         sums = {}
         for path in sorted(self.results.rglob("*")):
             name = path.relative_to(self.results).as_posix()
             ours = path.is_file() and path.parent.name != "logs" and SET_ASIDE not in name
-            if not ours or TEMPORARY.fullmatch(path.name):
-                continue
-            inside = hashes(path) if path.parent.name == FOLDER and not damage_of(path) else {}
-            sums |= {f"{name}/{of}": each for of, each in inside.items() if "/logs/" not in of}
-            if not inside:
+            if ours and not TEMPORARY.fullmatch(path.name):
                 sums[name] = sha256(path)
         return sums
 

@@ -247,14 +247,13 @@ class Damage(NamedTuple):
 def damage_of(path: Path) -> Damage | None:
     """What is wrong with a result, by the digest in it; None where it is sound or nobody can tell.
 
-    Nobody can of a recording that an instrument has made, of a log, nor of what an earlier version
-    wrote.
+    Nobody can of a recording that an instrument has made, nor of what an earlier version wrote.
     """
     with _named(path), path.open("rb") as stream:
         found = _seal(stream)
         stream.seek(0)
         recorded = found is None and _RECORDED.match(stream.read(_ENDS))
-    if recorded or path.suffix == ".log" or (found and found.stated in ("", found.digest)):
+    if recorded or (found and found.stated in ("", found.digest)):
         return None
     problem = "it is torn or altered" if path.stat().st_size else "it is empty"
     return Damage(path, problem, (sha256(path) or "")[:8])
@@ -498,10 +497,13 @@ def read_text(path: str | Path, remedy: str, *, absent: str = "file", form: str 
 def digest(content: Any) -> str:
     """Hash any JSON-like content, the same on every machine and in any order of its keys.
 
+    Short enough for a parameter of a rule, or a file's name.
+
     >>> digest({"a": 1, "b": [2, 3]}) == digest({"b": [2, 3], "a": 1}) != digest({"a": 1})
     True
     """
-    return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()
+    text = json.dumps(content, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
 def sha256(path: str | Path) -> str | None:

@@ -18,4 +18,4 @@ def code_version() -> str:
     """
     paths = sorted(path for path in PACKAGE.rglob("*") if path.suffix in _SOURCE)
     # The version counts commits: another one is no other code.
-    return digest([sha256(path) for path in paths if path.name != "_version.py"])[:12]
+    return digest([sha256(path) for path in paths if path.name != "_version.py"])

@@ -239,7 +239,7 @@ def test_records_of_an_instrument_have_a_chunk_each(campaign: Campaign) -> None:
 
 @pytest.mark.slow
 def test_chunks_of_any_size_give_the_same_results(campaign: Campaign) -> None:
-    """With ``batch: 1`` a job a record: every file of a record but its logs, byte for byte."""
+    """With ``batch: 1`` a job a record: every file of a record, byte for byte."""
 
     def results() -> dict[str, bytes]:
         with gathered(Path("results"), *(stage.output for stage in STAGES.values())) as folder:

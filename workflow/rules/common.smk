@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pendpipe.configuration import jobs
 from pendpipe.configuration.load import NAME, load_campaign
-from pendpipe.files import check_writable
+from pendpipe.files import check_writable, digest
 from pendpipe.report.captions import CAPTIONS
 from pendpipe.stages import chunks
 from pendpipe.stages.watch import Watch
@@ -57,7 +57,7 @@ def source_hash(path):
 
 # Before any job has begun: while they run, results come and go.
 PLANS = {
-    (stage.name, chunk): jobs.digest(
+    (stage.name, chunk): digest(
         [
             *(chunks.settings(CAMPAIGN, stage, row, source_hash) for row in rows),
             history(stage.path(CAMPAIGN, chunk)),
@@ -109,8 +109,8 @@ wildcard_constraints:
 
 
 def record_files(stage, records=RECORDS):
-    """The files of these records that a stage leaves."""
-    return expand(f"{RESULTS}/{{record}}/{{name}}", record=records, name=stage.files)
+    """The file of each of these records that a stage leaves."""
+    return expand(f"{RESULTS}/{{record}}/{stage.output}", record=records)
 
 
 def of_stage(stage):

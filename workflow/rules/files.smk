@@ -36,7 +36,7 @@ else:
     rule record_file:
         input:
             lambda wildcards: chunk_of(
-                *(each.name for each in STAGES if wildcards.file in each.files),
+                *(each.name for each in STAGES if wildcards.file == each.output),
                 only=CHUNK_OF.get(wildcards.record, "no-such-record"),
             ),
         output:
@@ -45,7 +45,7 @@ else:
             f"{RESULTS}/logs/files-{{record}}-{{file}}.log",
         wildcard_constraints:
             record=NAME.pattern,
-            file="|".join(re.escape(name) for each in STAGES for name in each.files),
+            file="|".join(re.escape(each.output) for each in STAGES),
         localrule: True
         conda:
             environment

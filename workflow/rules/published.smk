@@ -1,5 +1,6 @@
 # A campaign in print: a row of its table has no recording, and so no job of its own.
 from pendpipe.configuration.published import load_published
+from pendpipe.files import digest
 
 PUBLISHED = checked(load_published, PLACE, config)
 RESULTS = PUBLISHED.results
@@ -27,7 +28,7 @@ rule published:
         runtime=doubled(10),
         configuration=checked(jobs.store, PUBLISHED, OURS),
     params:
-        depends=jobs.digest(PUBLISHED.model_dump(mode="json")),
+        depends=digest(PUBLISHED.model_dump(mode="json")),
         code=CODE,
     message:
         "theory beside the printed numbers, and what is missing"

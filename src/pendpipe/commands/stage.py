@@ -2,13 +2,13 @@
 
 It reads archives of the stages before and leaves one of its own, FILE. A record that is done, with
 the same settings, code and inputs, is taken over from an earlier archive; where none differs, the
-stage was asked for once more, and all are done. What a record's stage prints goes to its logs; what
-an instrument's record was made from is said to the user as well.
+stage was asked for once more, and all are done. What a record's stage prints goes to the log of the
+job; what an instrument's record was made from is said to the user as well.
 """
 
+import io
 import traceback
 from contextlib import redirect_stderr, redirect_stdout
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -19,7 +19,7 @@ from pendpipe.errors import refuse_if
 from pendpipe.files import damage_of, sha256
 from pendpipe.options import flags
 from pendpipe.provenance import code_version
-from pendpipe.stages.archive import archives, made_in, pack, unpack
+from pendpipe.stages.archive import archives, made_in, pack, take_over, unpack
 from pendpipe.stages.chunks import STAGES, Stage, chunks_of, settings
 
 
@@ -47,19 +47,13 @@ def run(arguments: Arguments) -> int:
     if out.is_file() and (damage := damage_of(out)):
         tell(f"pendpipe: {out}: {damage.problem}; {damage.set_aside()}")
     with TemporaryDirectory(prefix="pendpipe-") as place:
-        folder = Path(place)
+        folder, done = Path(place), set[str]()
         for path in arguments.reading:
-            unpack(path, folder, lambda name: "/logs/" not in name)
+            unpack(path, folder)
         given = _files(folder)
         wanted = {each.record: _made(campaign, stage, each, folder) for each in records}
-        own, done = made_in(out), dict[str, Path]()
-        if any(own.get(name) != made for name, made in wanted.items()):
-            for path in archives(campaign.folder, stage.name):
-                earlier = made_in(path)
-                done |= {n: path for n, made in wanted.items() if earlier.get(n) == made}
-        for path in set(done.values()):
-            records_in = {name for name, used in done.items() if used == path}
-            unpack(path, folder, partial(_is_of, records_in))
+        for path in archives(campaign.folder, stage.name) if made_in(out) != wanted else ():
+            done |= take_over(path, folder, wanted)
         statuses = [
             _of_record(campaign, stage, record, folder, str(arguments.campaign))
             for record in records
@@ -69,10 +63,6 @@ def run(arguments: Arguments) -> int:
         if not any(statuses):
             pack(out, folder, _files(folder) - given, wanted)
     return max(statuses, default=0)
-
-
-def _is_of(records: set[str], name: str) -> bool:
-    return name.partition("/")[0] in records
 
 
 def _files(folder: Path) -> set[Path]:
@@ -95,29 +85,21 @@ def _made(campaign: Campaign, stage: Stage, record: Record, folder: Path) -> dic
 def _of_record(
     campaign: Campaign, stage: Stage, record: Record, folder: Path, configuration: str
 ) -> int:
-    """Do the stage for one record; return the command's status."""
-    home = folder / record.record
-    log = home / stage.files[1]
-    status = _logged(log, stage.call(campaign, record, home, configuration))
-    lines = [line for line in log.read_text(encoding="utf-8").splitlines() if line.strip()]
-    if status:
-        tell("\n".join([*lines[:-1], f"{record.record}: {(lines or [f'status {status}'])[-1]}"]))
-    for line in lines if not status else ():
-        if line.startswith("pendpipe: "):
-            tell(line)
-        elif line.startswith(f"{record.record}: "):
-            print(line)
-    return status
+    """Do the stage for one record; return the command's status.
 
-
-def _logged(log: Path, words: list[str]) -> int:
-    """Run a command; what it prints goes to the log, the traceback of a fault too."""
+    What it prints goes to the log of the job under the record's name, the traceback of a fault too.
+    """
     from pendpipe.commands.main import main
 
-    log.parent.mkdir(parents=True, exist_ok=True)
-    with log.open("w", encoding="utf-8") as out, redirect_stdout(out), redirect_stderr(out):
+    name, said = record.record, io.StringIO()
+    with redirect_stdout(said), redirect_stderr(said):
         try:
-            return main(words)
+            status = main(stage.call(campaign, record, folder / name, configuration))
         except Exception:
             traceback.print_exc()
-            return 1
+            status = 1
+    for line in filter(str.strip, said.getvalue().splitlines()):
+        tell(f"{name}: {line.removeprefix(f'{name}: ')}")
+        if line.startswith(f"{name}: ") and not status:
+            print(line)
+    return status

@@ -26,11 +26,6 @@ def prepare_environment() -> None:
     leave_the_folder_out()
 
 
-def digest(content: Any) -> str:
-    """Hash what a job depends on, short enough for a parameter or a file's name."""
-    return files.digest(content)[:12]
-
-
 def store(configuration: Section, folder: str | Path) -> str:
     """Write the checked configuration under a name made of its content, unless it is there.
 
@@ -39,7 +34,7 @@ def store(configuration: Section, folder: str | Path) -> str:
     so that a change reruns only what it touches.
     """
     content = configuration.model_dump(mode="json")
-    path = Path(folder) / f"configuration-{digest(content)}.json"
+    path = Path(folder) / f"configuration-{files.digest(content)}.json"
     if not path.exists():
         files.write_json(path, content)
     return path.as_posix()
@@ -67,14 +62,14 @@ def acquisition(campaign: Campaign, row: Record, sha256: Hash) -> str:
             "geometry": (geometry := campaign.geometry(row)) and geometry.model_dump(),
             "fluid": settings.fluids[row.fluid].model_dump(),
         }
-    return digest(content)
+    return files.digest(content)
 
 
 def caliper(campaign: Campaign, sha256: Hash) -> str:
     """Digest all that the sensor's calibration depends on."""
     settings, source = campaign.configuration, caliper_source(campaign)
     truth = settings.simulated
-    return digest(
+    return files.digest(
         {
             "run": settings.calibration and settings.calibration.model_dump(),
             "seed": settings.seed,
@@ -95,7 +90,7 @@ def theory(campaign: Campaign) -> str:
     content = campaign.configuration.model_dump(
         include={"title", "apparatus", "geometries", "fluids", "typical_record"}
     )
-    return digest([content, [vars(record) for record in campaign.records]])
+    return files.digest([content, [vars(record) for record in campaign.records]])
 
 
 def environment(folder: str | Path, template: str | Path) -> str:
@@ -108,7 +103,7 @@ def environment(folder: str | Path, template: str | Path) -> str:
     origin = json.loads(distribution("pendpipe").read_text("direct_url.json") or "{}")
     wanted = f" @ {origin['url']}" if "url" in origin else f"=={version('pendpipe')}"
     content += f"  - pip:\n      - pendpipe{wanted}\n"
-    path = Path(folder, f"environment-{digest(content)}.yaml").absolute()
+    path = Path(folder, f"environment-{files.digest(content)}.yaml").absolute()
     if not path.exists():
         files.write_whole(path, content)
     return path.as_posix()

@@ -85,6 +85,15 @@ def made_in(path: Path) -> dict[str, Made]:
     return found
 
 
+def take_over(path: Path, folder: Path, wanted: Mapping[str, Made]) -> set[str]:
+    """Write the files of the records that were made with what is wanted, and name them."""
+    made = made_in(path)
+    same = {name for name in wanted if made.get(name) == wanted[name]}
+    if same:
+        unpack(path, folder, lambda name: name.partition("/")[0] in same)
+    return same
+
+
 def archives(results: Path, stage: str) -> list[Path]:
     """The archives that a stage has left, the newest last."""
     found = (Path(results, FOLDER)).glob(f"{stage}-*.zip")
@@ -92,12 +101,12 @@ def archives(results: Path, stage: str) -> list[Path]:
 
 
 def gather(results: Path, folder: Path, names: Container[str]) -> None:
-    """Write these files of all records (``fit.json``), or of one (``one/fit.json``), into `folder`.
+    """Write these files of all records (``fit.json``) into `folder`.
 
     Of a record that is in two archives (`batch` or `only` has changed) the newest counts.
     """
     for path in archives(results, "*"):
-        unpack(path, folder, lambda name: name in names or name.partition("/")[2] in names)
+        unpack(path, folder, lambda name: name.partition("/")[2] in names)
 
 
 @contextmanager
@@ -106,9 +115,6 @@ def gathered(results: Path, *names: str) -> Iterator[Path]:
 
     Without archives that of the results: it may be all that somebody has of a campaign.
     """
-    if not archives(results, "*"):
-        yield results
-        return
     with TemporaryDirectory(prefix="pendpipe-") as place:
         gather(results, Path(place), names)
-        yield Path(place)
+        yield Path(place) if archives(results, "*") else results

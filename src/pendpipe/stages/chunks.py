@@ -41,7 +41,7 @@ class Stage:
     inputs
         The files of a record's folder that it reads.
     output
-        The file there that the following stages read; others (`files`) are its log, a refusal.
+        The file there that the following stages read; beside it there may be a refusal, figures.
     options
         Options of its command that are no files.
     """
@@ -55,11 +55,6 @@ class Stage:
     def rule(self) -> str:
         """The name of its rule."""
         return self.name.replace("-", "_")
-
-    @property
-    def files(self) -> tuple[str, ...]:
-        """What it leaves of every record, refused or not."""
-        return self.output, f"logs/{self.rule}.log"
 
     def path(self, campaign: Campaign, chunk: str) -> Path:
         """The archive that the job of a chunk leaves."""
@@ -168,7 +163,7 @@ def settings(campaign: Campaign, stage: Stage, record: Record, hash_of: jobs.Has
 
 def extras(campaign: Campaign, stage: Stage, archive: Path) -> list[str]:
     """Files in the records' folders that an archive has of some: a refusal, figures."""
-    own = [name for name in members(archive) if name.partition("/")[2] not in stage.files]
+    own = [name for name in members(archive) if name.partition("/")[2] != stage.output]
     return [name for name in own if (campaign.folder / name).is_file()]
 
 
@@ -203,7 +198,7 @@ def tidy(campaign: Campaign) -> None:
     """
     made = _archives_of(campaign)
     for path, stage in made.items() if is_small(campaign) else ():
-        names = [name for name in members(path) if name.partition("/")[2] in stage.files]
+        names = [name for name in members(path) if name.partition("/")[2] == stage.output]
         if any(_is_older(campaign.folder / name, path) for name in names):
             unpack(path, campaign.folder)
     if not campaign.configuration.only:

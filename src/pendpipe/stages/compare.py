@@ -11,10 +11,9 @@ from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import Arguments, command, load
 from pendpipe.campaign.fit import InertiaSds, inertia_sds, joint_values
 from pendpipe.campaign.values import Line, Values, campaign_values
-from pendpipe.configuration.jobs import digest
 from pendpipe.configuration.load import Campaign
 from pendpipe.estimate import Estimate
-from pendpipe.files import read_json, write_json, writing
+from pendpipe.files import digest, read_json, write_json, writing
 from pendpipe.options import INPUT, OUTPUT, flags
 from pendpipe.physics import inertia_from_frequency
 from pendpipe.provenance import code_version
