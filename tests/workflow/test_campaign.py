@@ -313,6 +313,11 @@ def test_an_added_row_and_a_changed_library_rerun_what_they_concern(
     assert [planned[name] for name in ("caliper", *STAGE_NAMES)] == [1, *[unsplit] * 6]
 
 
+def test_every_figure_of_a_campaign_with_theory_is_drawn(campaign: Campaign) -> None:
+    """Also those that need the readings of the typical record."""
+    assert read_json(campaign.results / "figures/drawn.json")["left_out"] == {}
+
+
 def test_the_results_name_no_path_of_the_machine(campaign: Campaign) -> None:
     for path in (campaign.results / "report.html", campaign.results / "campaign.json"):
         text = path.read_text(encoding="utf-8")

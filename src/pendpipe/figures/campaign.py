@@ -48,7 +48,7 @@ from pendpipe.figures.style import (
     styled,
     words,
 )
-from pendpipe.files import read_json
+from pendpipe.files import read_json, without_folders
 from pendpipe.levels import FALSE_ALARM
 from pendpipe.quantities import axis_unit, with_error
 from pendpipe.recording import read_plain
@@ -113,9 +113,9 @@ def draw_all(
         try:
             files += save(draw(), out / name)
         except NothingToDrawError as fault:
-            left_out[name] = str(fault)
+            left_out[name] = without_folders(str(fault))
             if has_theory and (together or name != "causes"):
-                files += save(placeholder(str(fault)), out / name)
+                files += save(placeholder(left_out[name]), out / name)
     return Drawn(files, left_out)
 
 

@@ -101,12 +101,12 @@ def archives(results: Path, stage: str) -> list[Path]:
 
 
 def gather(results: Path, folder: Path, names: Container[str]) -> None:
-    """Write these files of all records (``fit.json``) into `folder`.
+    """Write these files of all records (``fit.json``), or of one (``one/fit.json``), into `folder`.
 
     Of a record that is in two archives (`batch` or `only` has changed) the newest counts.
     """
     for path in archives(results, "*"):
-        unpack(path, folder, lambda name: name.partition("/")[2] in names)
+        unpack(path, folder, lambda name: name in names or name.partition("/")[2] in names)
 
 
 @contextmanager
