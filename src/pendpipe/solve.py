@@ -731,8 +731,6 @@ def _scaled(normal: FloatArray, free: IntArray) -> tuple[FloatArray, FloatArray]
 
 CHI2_95: Final = 3.841458820694124
 """95 % point of chi^2 with one degree of freedom."""
-_CORNERS: Final = 50
-"""Places on the way to the end of an interval at which another value meets or leaves its bound."""
 
 
 @np.errstate(over="ignore")  # a corner may be beyond all numbers
@@ -801,7 +799,7 @@ def _end(
     # A value is stuck at its upper bound (1), at its lower one (-1), or free (0).
     pull = gradient - normal @ best
     wall = 1.0 * ((step >= room.upper) & (pull > 0.0)) - ((step <= room.lower) & (pull < 0.0))
-    for _ in range(_CORNERS):
+    for _ in range(10 * len(best) + 10):
         free, way = np.flatnonzero(follows & (wall == 0.0)), np.zeros(len(step))
         way[index], rows = side * (index not in held[1:]), normal[free]
         way[free] = np.linalg.solve(rows[:, free], -way[index] * rows[:, index])
@@ -810,11 +808,10 @@ def _end(
         missing = max(CHI2_95 + float(step @ (pull + gradient)), 0.0)
         last = (slope + math.sqrt(slope**2 + bend * missing)) / bend
         corner = np.full(len(step), np.inf)
-        ahead = np.where(way > 0.0, room.upper - step, room.lower - step)
+        ahead = np.where(way > 0.0, room.upper, room.lower) - step
         np.divide(ahead, way, out=corner, where=way != 0.0)
         np.divide(pull, change, out=corner, where=follows & (wall * change > 0.0))
-        k = int(np.argmin(corner))
-        if k == index or not (go := max(float(corner[k]), 0.0)) < last:
+        if (k := int(np.argmin(corner))) == index or not (go := max(float(corner[k]), 0.0)) < last:
             break
         # From there on it is stuck, or no longer.
         wall[k], step = np.sign(way[k]), room.clip(step + go * way)

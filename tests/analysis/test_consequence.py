@@ -127,8 +127,8 @@ def test_a_loss_is_doubted_only_where_more_than_noise_is_left(
     large = fit.decrement_check[0]
     chance = large._replace(seen=large.fitted / 1.08, seen_sd=0.08 * large.fitted / 1.08 / 2.6)
     checks = (chance, *fit.decrement_check[1:])
-    agreement = replace(fit.agreement, fit_p_value=p_value)
-    off, unseen = unsure(replace(fit, decrement_check=checks, agreement=agreement))
+    agreement = replace(fit.agreement, fit_p_value=p_value, decrement_check=checks)
+    off, unseen = unsure(replace(fit, agreement=agreement))
     assert [checks.index(each) for each in off] == doubted
     assert not unseen
 

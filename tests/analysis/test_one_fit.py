@@ -117,7 +117,9 @@ def test_a_loss_within_its_error_shows_no_q() -> None:
     first, *_, last = fit.decrement_check
     sd = np.where(fit.backbone.amplitude_rad > last.amplitude_rad, 1e-3, 1.0)
     shown = replace(fit.backbone, decrement_sd=sd)
-    (seen,) = seen_qualities(replace(fit, shown=shown, decrement_check=(first, last)))
+    (seen,) = seen_qualities(
+        replace(fit, shown=shown, agreement=replace(fit.agreement, decrement_check=(first, last)))
+    )
     assert seen.quality_factor.value == pytest.approx(5.0 / (2.0 * 0.02), rel=0.02)
 
 

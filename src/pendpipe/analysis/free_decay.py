@@ -29,7 +29,7 @@ from pendpipe.analysis.half_cycles import (
 from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.find import find_turning_points
 from pendpipe.analysis.turning_points.table import Cut, TurningPoints
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, median
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.quantities import after_number, with_error
 from pendpipe.recording import Recording
@@ -101,7 +101,7 @@ class Run:
     @property
     def half_period_s(self) -> float:
         """The usual half period."""
-        return float(np.median(np.diff(self.middle_s)))
+        return float(median(np.diff(self.middle_s)))
 
     @property
     def worth(self) -> float:
@@ -204,9 +204,11 @@ def _over(cycles: HalfCycles, at: int, here: int, top: float, usual: Sequence[fl
 
 def _running_median(values: FloatArray) -> FloatArray:
     """The median of each value and its two neighbours to each side, fewer at the ends."""
-    padded = np.pad(values, 2, constant_values=np.nan)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 5)
-    return np.asarray(np.nanmedian(windows, axis=1))
+    padded = np.concatenate([np.full(2, np.nan), values, np.full(2, np.nan)])
+    # What is no number is sorted behind the others.
+    windows = np.sort(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
+    rows, count = np.arange(len(values)), 5 - np.count_nonzero(np.isnan(windows), axis=1)
+    return np.asarray(0.5 * (windows[rows, (count - 1) // 2] + windows[rows, count // 2]))
 
 
 def _regular(cycles: HalfCycles, chain: list[int]) -> bool:
@@ -215,14 +217,14 @@ def _regular(cycles: HalfCycles, chain: list[int]) -> bool:
     half = np.diff(cycles.middle_s[chain])[one_on]
     if len(half) < LEAST_HALF_CYCLES - 1:
         return False
-    usual = float(np.median(swing))
+    usual = float(median(swing))
     blur = cycles.step / usual
     # Where the sides differ, half cycles two apart are alike; of a few that says too little.
     apart = 2 if len(half) > 6 else 1
-    waver = float(np.median(np.abs(half[apart:] - half[:-apart]))) / float(np.median(half))
+    waver = float(median(np.abs(half[apart:] - half[:-apart]))) / float(median(half))
     # Viscous loss takes the same share of each half cycle, Coulomb friction the same amount: a
     # strong one of either bends what is even under the other.
-    kinks = float(np.min(np.median(_bends(swing, usual), axis=1)))
+    kinks = float(np.min(median(_bends(swing, usual))))
     if kinks >= _WAVER and len(swing) > 6:
         # A zero that drifts shortens and lengthens swings in turn, and not the means of neighbours.
         means = 0.5 * (swing[1:] + swing[:-1])
@@ -259,7 +261,7 @@ def _undriven(run: Run) -> Run:
     ahead = np.minimum(np.maximum(4, k // 2), count - 1 - k)
     # Medians of seven: a disturbed half cycle inside the run is no drive.
     padded = np.pad(swing, 3, mode="reflect", reflect_type="odd")
-    smooth: FloatArray = np.median(np.lib.stride_tricks.sliding_window_view(padded, 7), axis=1)
+    smooth = median(np.lib.stride_tricks.sliding_window_view(padded, 7))
     falls = smooth[k] - smooth[k + ahead]
     expected = k * falls / ahead
     lost = smooth[0] - smooth[k]
@@ -426,14 +428,11 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     ]
     most = max((run.worth for run in found), default=0.0)
     # A drive that comes or goes may tell as much, but does not fall.
-    told = max(
-        found,
-        key=lambda run: (run.worth > _AS_MUCH * most and _falls(run, least), run.worth),
-        default=None,
-    )
+    falls = {run: run.worth > _AS_MUCH * most and _falls(run, least) for run in found}
+    told = max(found, key=lambda run: (falls[run], run.worth), default=None)
     used = _chained(found, told) if told else []
     unused = sum(run.worth for run in found if run not in used)
-    alone = told and unused <= 0.3 * told.worth and _falls(told, least)
+    alone = told and unused <= 0.3 * told.worth and falls[told]
     ends = (float(told.middle_s[0]), float(told.middle_s[-1])) if told else (math.inf, math.inf)
     held = told is not None and told.driven
     beat = _beating(
@@ -448,7 +447,9 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
             " unless by chance",
             "handling, a clamp or a drive can't be analysed",
         )
-    _refuse_without_fall(place, time[told.piece], values[told.piece], told, least)
+    _refuse_without_fall(
+        place, time[told.piece], values[told.piece], told, least, falls=falls[told]
+    )
     others = [run for run in found if run.worth > 0.05 * told.worth and run not in used]
     may_turn_over = recording.quantity == "angle_rad"
     return _described(time, values, used, others, least, may_turn_over=may_turn_over)
@@ -546,12 +547,12 @@ def _flat_turns(time: FloatArray, values: FloatArray, run: Run) -> int | None:
     near = max(_FLAT * abs(float(turns[1] - turns[0])), run.cycles.step)
     for side in (0, 1):
         own, other = turns[side::2], turns[1 - side :: 2]
-        floor = float(np.median(own[:_FEW_FLAT]))
+        floor = float(median(own[:_FEW_FLAT]))
         count = int(np.argmax(np.append(np.abs(own - floor) > near, True)))
         if count < _FEW_FLAT or count >= len(other) or abs(other[0] - other[count]) < 3.0 * near:
             continue
         inside = (time >= when[0]) & (time <= when[2 * count - 2 + side])
-        swing = abs(float(np.median(other[:count])) - floor)
+        swing = abs(float(median(other[:count])) - floor)
         expected = math.acos(1.0 - 2.0 * near / swing) / math.pi
         if np.mean(np.abs(values[inside] - floor) < near) > _LONG * expected:
             return 2 * count + side
@@ -620,15 +621,13 @@ def _beating(
     if len(cycles) < _MANY:
         return None
     half = np.diff(cycles.middle_s)
-    steady = np.flatnonzero(np.abs(np.log(half / np.median(half))) < _STEADY)
+    steady = np.flatnonzero(np.abs(np.log(half / median(half))) < _STEADY)
     blocks = np.split(steady, np.flatnonzero(np.diff(steady) > _NODE) + 1)
     block = max(blocks, key=len)
     if len(block) < _MANY:
         return None
     first, last = int(block[0]), int(block[-1]) + 1
-    smooth = np.median(
-        np.lib.stride_tricks.sliding_window_view(cycles.swing[first:last], 5), axis=1
-    )
+    smooth = median(np.lib.stride_tricks.sliding_window_view(cycles.swing[first:last], 5))
     rises = np.max(smooth - np.minimum.accumulate(smooth)) > 0.2 * np.max(smooth)
     if not (rises or held):
         return None
@@ -639,7 +638,7 @@ def _beating(
     from pendpipe.effects.two_modes import two_modes
 
     inside = (time >= start) & (time <= stop)
-    usual = float(np.median(half))
+    usual = float(median(half))
     modes = two_modes(time[inside], values[inside], usual, may_be_one=not driven, decay_s=decay_s)
     if modes is None:
         return None
@@ -673,8 +672,9 @@ def _falls(run: Run, least: float) -> bool:
     fall = float(np.mean(swing[:third]) - np.mean(swing[-third:]))
     scatter = float(np.std(np.diff(swing))) / np.sqrt(2.0)
     # The most that swings grow again after having been smaller, over blocks that calm noise.
-    blocks = np.array_split(swing, _BLOCKS) if len(swing) >= 2 * _BLOCKS else [swing[:1]]
-    means = np.array([float(np.mean(part)) for part in blocks])
+    blocks = _BLOCKS if len(swing) >= 2 * _BLOCKS else 1
+    edges = np.linspace(0, len(swing), blocks + 1).astype(np.int64)
+    means = np.add.reduceat(swing, edges[:-1]) / np.diff(edges)
     rise = float(np.max(means - np.minimum.accumulate(means)))
     few = max(3.0 * scatter / np.sqrt(third), rise, 0.3 * least, 1e-4 * float(swing[0]))
     return bool(fall > few)
@@ -686,6 +686,8 @@ def _refuse_without_fall(
     values: FloatArray,
     run: Run,
     least: float,
+    *,
+    falls: bool,
 ) -> None:
     """Refuse motion that does not decay, or that hardly exceeds noise and step."""
     swing = run.swing
@@ -697,7 +699,7 @@ def _refuse_without_fall(
         "record with a larger amplitude",
         NotAnalysableError,
     )
-    if _falls(run, least):
+    if falls:
         return
     fall, sd = _fall_of_all(time, values, run.middle_s)
     refuse_if(
@@ -737,7 +739,7 @@ def _before_catch(time: FloatArray, run: Run) -> Run:
     rest = float(time[run.piece.stop - 1]) - float(run.cycles.turn_time_s[run.last + 1])
     if not run.fades or run.legs < _CATCHABLE or rest < 1.5 * run.half_period_s:
         return run
-    loss = max(float(np.median(-np.diff(swing[-_CATCHABLE:-2]))), 0.0)
+    loss = max(float(median(-np.diff(swing[-_CATCHABLE:-2]))), 0.0)
     last = len(swing) - 1
     while last > 3 and swing[last] < swing[last - 1] - _SPOILT * loss - step:
         last -= 1
@@ -748,7 +750,7 @@ def _before_catch(time: FloatArray, run: Run) -> Run:
 
 def _stop(time: FloatArray, run: Run) -> float:
     """When a run of half cycles ends, within its piece of the record."""
-    end, half = float(time[run.piece.stop - 1]), float(np.median(np.diff(run.middle_s[-4:])))
+    end, half = float(time[run.piece.stop - 1]), float(median(np.diff(run.middle_s[-4:])))
     # Half a period after its last middle the pendulum has turned and swung back once more.
     stop = float(run.middle_s[-1]) + (1.5 if run.fades else 0.5) * half
     return end if end - stop < 0.3 * half else stop

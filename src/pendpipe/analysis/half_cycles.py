@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.noise import noise_rms
-from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.arrays import FloatArray, IntArray, median
 from pendpipe.dynamics.kernel import kernel
 from pendpipe.levels import deviations
 
@@ -152,7 +152,7 @@ def usual_half_period(time_s: FloatArray, values: FloatArray) -> float | None:
     for share in (0.2, 0.05, 0.02):
         turns = without_ripples(values, find_extremes(values, share * span))
         if len(turns) > LEAST_HALF_CYCLES:
-            return float(np.median(np.diff(time_s[turns])))
+            return float(median(np.diff(time_s[turns])))
     return None
 
 
@@ -166,7 +166,7 @@ def thinned(
     """
     step = half_period_s / _PER_HALF_CYCLE
     every = max(1, len(time_s) // _SOME)
-    interval = float(np.median(time_s[1::every] - time_s[:-1:every]))
+    interval = float(median(time_s[1::every] - time_s[:-1:every]))
     if interval > 0.5 * step:
         return time_s, _without_wild(values, math.pi * interval / half_period_s)
     # The grid hangs on the first sample's clock, not on its place: rest before changes nothing.

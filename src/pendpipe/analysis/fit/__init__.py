@@ -120,7 +120,8 @@ def fit_recording(
         # What its turning points lose is no mode's loss, and their period none's.
         why = f"two modes beat: {points.beats}; Eq. 8 has one"
         form, beat = replace(result.form, other_frequency=None), Verdict("red", why, "beat")
-        return replace(result, form=form, verdict=beat, decrement_check=(), shown=None)
+        agreement = replace(result.agreement, decrement_check=())
+        return replace(result, form=form, agreement=agreement, verdict=beat, shown=None)
     by_points = result.method == "turning-points"
     swing = result["amplitude"].value if by_points else 0.5 * float(np.ptp(samples.values))
     missed = result.residual_rms_rad / abs(swing)

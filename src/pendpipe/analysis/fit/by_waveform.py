@@ -376,10 +376,11 @@ def _settled(found: Fitted, samples: Samples) -> Fitted:
         problem = found.problem
         if not math.isfinite(found.chi2):
             return found
-        noise = max(found.noise_rms, _EXACT * float(np.max(np.abs(problem.values))))
-        if not noise < _OTHER * problem.noise_rms:
+        # Below what motions are computed to, rounding errors would lead the search.
+        exact = _EXACT * float(np.max(np.abs(problem.values)))
+        if not exact < found.noise_rms < _OTHER * problem.noise_rms:
             break
-        problem = replace(problem, noise_rms=noise)
+        problem = replace(problem, noise_rms=found.noise_rms)
         found = _fitted(problem, found.value, found.held, found.start)
     return _rounded(found, samples)
 
@@ -465,7 +466,7 @@ def waveform_result(
         goodness=goodness,
         said=said,
         fixed=fixed,
-        form=Form(baseline, drag_form=form),
+        form=Form(baseline, drag_form=form, zero_drift=drift),
         agreement=Agreement(
             residual_rms_rad=math.sqrt(float(residual @ residual) / len(residual)),
             samples=len(residual),
@@ -476,7 +477,6 @@ def waveform_result(
             and (OMEGA in fitted.held or matrix[3, 3] > 0.0),
         ),
         method="waveform",
-        zero_drift=drift,
         minimum=(problem.eq8, fitted.value[: len(BASELINE)].copy()),
     )
 

@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, cast
 
 import numpy as np
 
@@ -91,6 +92,8 @@ class Form:
     other_frequency
         Eq. 8's frequency with the other torque, where the readings can't
         decide between the two and the frequencies differ by more than their error.
+    zero_drift
+        By how much the zero rises in a second, where the readings ask for it.
     """
 
     baseline: Baseline = "eq8"
@@ -102,6 +105,7 @@ class Form:
     quality_factor_viscous: Estimate | None = None
     torque_odds: float | None = field(default=None, metadata={"json": "torque_log_odds"})
     other_frequency: Estimate | None = None
+    zero_drift: Estimate | None = None
 
 
 @dataclass(frozen=True)
@@ -115,6 +119,8 @@ class Agreement:
         comparison.
     fit_p_value
         Of the one test of fit, over all its questions (`goodness`, `decrement`).
+    decrement_check
+        The law's loss beside that of the turning points, the large amplitude first.
     samples, turning_points
         How many of each were used.
     settled
@@ -127,6 +133,7 @@ class Agreement:
     residual_rms_rad: float = math.nan
     chi2_per_dof: float = math.nan
     fit_p_value: float | None = None
+    decrement_check: tuple[Check, ...] = ()
     samples: int = 0
     turning_points: int = 0
     settled: bool = field(default=True, metadata=_APART)
@@ -176,6 +183,11 @@ class Told:
     gravity: Estimate | None = None
 
 
+def view(path: str, words: str) -> property:
+    """What is a field of a part: read, without a copy."""
+    return property(attrgetter(path), doc=words)
+
+
 @dataclass(frozen=True, repr=False)
 class Fitted:
     """What was fitted of one recording, with its errors, and how far it may be believed.
@@ -193,10 +205,6 @@ class Fitted:
         Of the parameters in their order, shape (7, 7).
     form, agreement, verdict, told
         Which law; how it agrees; how far to believe it; what the user says of the apparatus.
-    decrement_check
-        The law's loss beside that of the turning points, the large amplitude first.
-    zero_drift
-        By how much the zero rises in a second, where the readings ask for it.
     cuts
         Spans left out: ``start_s``, ``stop_s``, ``reason``.
     provenance, warnings
@@ -222,8 +230,6 @@ class Fitted:
     agreement: Agreement = field(default_factory=Agreement, compare=False, metadata=_AMONG)
     verdict: Verdict = field(default_factory=Verdict, metadata=_AMONG)
     told: Told = field(default_factory=Told, metadata=_AMONG)
-    decrement_check: tuple[Check, ...] = ()
-    zero_drift: Estimate | None = None
     cuts: tuple[Mapping[str, Any], ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
@@ -236,80 +242,35 @@ class Fitted:
     decay: Recording | None = field(default=None, compare=False, metadata=_APART)
     drawn_by: Callable[[], Any] | None = field(default=None, compare=False, metadata=_APART)
 
-    @property
-    def baseline(self) -> Baseline:
-        """The model's name."""
-        return self.form.baseline
-
-    @property
-    def restoring(self) -> Restoring:
-        """The torque that the numbers belong to."""
-        return self.form.restoring
-
-    @property
-    def drag_form(self) -> DragForm:
-        """The form of the drag that the readings prefer."""
-        return self.form.drag_form
-
-    @property
-    def noise_rms_rad(self) -> float:
-        """Noise of one reading."""
-        return self.agreement.noise_rms_rad
-
-    @property
-    def residual_rms_rad(self) -> float:
-        """What the model leaves."""
-        return self.agreement.residual_rms_rad
-
-    @property
-    def chi2_per_dof(self) -> float:
-        """Of the readings."""
-        return self.agreement.chi2_per_dof
-
-    @property
-    def fit_p_value(self) -> float | None:
-        """Of the one test of fit."""
-        return self.agreement.fit_p_value
-
-    @property
-    def samples(self) -> int:
-        """How many readings were used."""
-        return self.agreement.samples
-
-    @property
-    def turning_points(self) -> int:
-        """How many turning points were used."""
-        return self.agreement.turning_points
-
-    @property
-    def light(self) -> Light:
-        """How far the numbers may be believed."""
-        return self.verdict.light
-
-    @property
-    def light_reason(self) -> str:
-        """Why."""
-        return self.verdict.light_reason
-
-    @property
-    def hindered(self) -> Hindrance:
-        """Why a law tells little of the decay."""
-        return self.verdict.hindered
-
-    @property
-    def quotable(self) -> tuple[str, ...]:
-        """What may be quoted."""
-        return self.verdict.quotable
-
-    @property
-    def length(self) -> Estimate | None:
-        """Of a simple pendulum, where it was given."""
-        return self.told.length
-
-    @property
-    def gravity(self) -> Estimate | None:
-        """Where it was given."""
-        return self.told.gravity
+    # Views of the parts.
+    baseline = cast("Baseline", view("form.baseline", "The model's name."))
+    restoring = cast("Restoring", view("form.restoring", "The torque that the numbers belong to."))
+    drag_form = cast(
+        "DragForm", view("form.drag_form", "The form of the drag that the readings prefer.")
+    )
+    noise_rms_rad = cast("float", view("agreement.noise_rms_rad", "Noise of one reading."))
+    residual_rms_rad = cast("float", view("agreement.residual_rms_rad", "What the model leaves."))
+    chi2_per_dof = cast("float", view("agreement.chi2_per_dof", "Of the readings."))
+    fit_p_value = cast("float | None", view("agreement.fit_p_value", "Of the one test of fit."))
+    decrement_check = cast(
+        "tuple[Check, ...]",
+        view("agreement.decrement_check", "The law's loss beside that of the turning points."),
+    )
+    samples = cast("int", view("agreement.samples", "How many readings were used."))
+    turning_points = cast(
+        "int", view("agreement.turning_points", "How many turning points were used.")
+    )
+    light = cast("Light", view("verdict.light", "How far the numbers may be believed."))
+    light_reason = cast("str", view("verdict.light_reason", "Why."))
+    hindered = cast("Hindrance", view("verdict.hindered", "Why a law tells little of the decay."))
+    quotable = cast("tuple[str, ...]", view("verdict.quotable", "What may be quoted."))
+    length = cast(
+        "Estimate | None", view("told.length", "Of a simple pendulum, where it was given.")
+    )
+    zero_drift = cast(
+        "Estimate | None", view("form.zero_drift", "By how much the zero rises in a second.")
+    )
+    gravity = cast("Estimate | None", view("told.gravity", "Where it was given."))
 
     @property
     def quality_factor_limit(self) -> Estimate | None:

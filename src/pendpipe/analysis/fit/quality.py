@@ -203,7 +203,7 @@ def quality_by_law(result: Fitted, amplitude: float) -> Quality:
     by_rate = np.array([amplitude, 1.0, 1.0 / amplitude]) * value
     return Quality(
         amplitude,
-        Estimate(value, value * relative_loss_sd(result, amplitude), "s"),
+        Estimate(value, value * _sd(np.ones(3), covariance), "s"),
         period,
         {
             name: _share(
@@ -248,9 +248,11 @@ def _covariance_of_losses(result: Fitted, amplitude: float) -> FloatArray:
 
 def period_of(result: Fitted, amplitude: float) -> float:
     """Period at one amplitude, s; that of small amplitudes where the law cannot swing there."""
-    swings = result.restoring == "sine" and 0.0 < amplitude < math.pi
-    quarter = elliptic(np.array(math.sin(0.5 * amplitude) ** 2 if swings else 0.0))[0]
-    return 2.0 / math.pi * float(quarter) / result.value("frequency")
+    period = 1.0 / result.value("frequency")
+    if not (result.restoring == "sine" and 0.0 < amplitude < math.pi):
+        return period
+    quarter = elliptic(np.array(math.sin(0.5 * amplitude) ** 2))[0]
+    return 2.0 / math.pi * float(quarter) * period
 
 
 def mean_square(result: Fitted) -> float:

@@ -246,7 +246,6 @@ class FitResult(Fitted):
         covariance[np.ix_(places, places)] = np.array(known["matrix"], dtype=np.float64)
         found |= {
             "parameters": {name: _read(each) for name, each in content["parameters"].items()},
-            "decrement_check": tuple(Check(**check) for check in content["decrement_check"]),
             "shown": shown and Backbone.from_json(shown),
             "covariance": covariance,
         }
@@ -267,10 +266,12 @@ def _fields_in(kind: Any, content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _read(entry: Any) -> Any:
-    """Return an estimate, told by its keys, a tuple, or what else an entry is."""
+    """Return an estimate or a check, told by its keys, a tuple, or what else an entry is."""
     if isinstance(entry, dict) and "sd" in entry:
         return Estimate.from_json(entry)
-    return tuple(entry) if isinstance(entry, list) else entry
+    if isinstance(entry, dict) and "seen_sd" in entry:
+        return Check(**entry)
+    return tuple(map(_read, entry)) if isinstance(entry, list) else entry
 
 
 _MIXED: Final = 0.95
@@ -349,8 +350,8 @@ def result_of(
             chi2_per_dof=goodness.chi2_per_dof,
             fit_p_value=combined(p_values),
             bent=goodness.bent,
+            decrement_check=checks,
         ),
-        decrement_check=checks,
         **rest,
     )
     result = judged(result, points, law, misfit=goodness.misfit)

@@ -14,7 +14,7 @@ from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.eq8 import Restoring
-from pendpipe.physics.decay import amplitude, time_at
+from pendpipe.physics.decay import time_at
 
 _SLIP: Final = 0.7
 """Phase in rad by which the law's turning points may part from the measured ones."""
@@ -27,6 +27,8 @@ _SLIPPED: Final = (
 )
 _HIGH: Final = 2.0
 """Amplitude in rad beyond which no turning point before the first is looked for with sin x."""
+_MOST: Final = 0.4
+"""Of ln amplitude in a half period back: a larger loss is no swing's."""
 _STOP: Final = 6.0
 """In widths delta = pi c/(2 omega) of the Coulomb stop: amplitudes below are left out."""
 
@@ -87,11 +89,13 @@ def _release(
     half_period = math.pi / omega
     before = max(1, math.ceil((first_s - points.start_s) / half_period + 0.05))
     earlier, back = y0, 0.0
-    for step in range(before):
-        last = earlier
-        earlier = float(amplitude(-(step + 1.0) * half_period, y0, a, b, c))
-        if not earlier < 1.5 * last:
-            earlier = last * math.exp(min((a * last + b + c / last) * half_period, 0.4))
+    for _ in range(before):
+        last, total = earlier, 0.0
+        # One of Runge and Kutta's steps of ln y.
+        for share, part in ((0.5, 1.0), (0.5, 2.0), (1.0, 2.0), (0.0, 1.0)):
+            rate = a * earlier + b + c / earlier
+            total += part / 6.0 * rate
+            earlier = last * math.exp(min((share * rate if share else total) * half_period, _MOST))
         if restoring == "sine" and earlier > _HIGH:
             return side * y0, first_s, 0
         lasts = float(swing_phase(np.array([earlier, last]), restoring)[0]) / omega

@@ -37,7 +37,7 @@ from pendpipe.analysis.turning_points.measure import (
     shape_error,
 )
 from pendpipe.analysis.turning_points.table import TurningPoints
-from pendpipe.arrays import BoolArray, FloatArray, IntArray
+from pendpipe.arrays import BoolArray, FloatArray, IntArray, median
 from pendpipe.dynamics.kernel import kernel
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.recording import Recording
@@ -46,8 +46,6 @@ _ENOUGH: Final = 24
 """Readings in a half cycle that a first look needs, and half cycles from which it is worth it."""
 _LOOK: Final = 200_000
 """Readings by which the usual half period is found: of a long record its beginning will do."""
-_AT_ONCE: Final = 1 << 13
-"""Half cycles that are smoothed together."""
 _WIDEST: Final = 80
 """Half cycles whose times are smoothed together at most, by a parabola."""
 _GAP: Final = 0.4
@@ -89,19 +87,19 @@ def numbered(samples: Samples) -> tuple[Rough, int]:
         index = np.searchsorted(since_s, time - 1e-9 * half_period)
         time = samples.time_s[0] + time
     if len(index) > _ENOUGH and not counts:
-        stride = max(1, int(np.median(np.diff(index))) // _ENOUGH)
+        stride = max(1, int(median(np.diff(index))) // _ENOUGH)
     side = np.sign(np.diff(value, prepend=value[1:2])).astype(np.int64)
     if len(index) >= LEAST_HALF_CYCLES:
         whole, gap_before = _beside_gaps(samples.time_s, index)
         time, value, side = time[whole], value[whole], side[whole]
     if len(time) < LEAST_HALF_CYCLES:
-        return Rough(np.arange(len(time)), time, side, float(np.median(piece))), stride
+        return Rough(np.arange(len(time)), time, side, float(median(piece))), stride
     # A beat may begin at a node, and bursts of noise tear half cycles apart: of those that hang
     # together the ones with the most energy are taken.
     number, begin, most, cut = np.zeros(len(time), dtype=np.int64), 0, -1.0, slice(0, 0)
     while len(time) - begin >= LEAST_HALF_CYCLES:
         rest = slice(begin, None)
-        usual = float(np.median(np.diff(time[begin : begin + 6])))
+        usual = float(median(np.diff(time[begin : begin + 6])))
         count = count_half_cycles(time[rest], side[rest], gap_before[rest], usual, number[rest])
         energy = float(np.sum(np.diff(value[begin : begin + count]) ** 2))
         if energy > most:
@@ -112,7 +110,7 @@ def numbered(samples: Samples) -> tuple[Rough, int]:
 
 def _beside_gaps(time: FloatArray, index: IntArray) -> tuple[np.ndarray, IntArray]:
     """Which extremes stand clear of gaps in the data; and which of these have one before them."""
-    half_period = float(np.median(np.diff(time[index[: min(12, len(index))]])))
+    half_period = float(median(np.diff(time[index[: min(12, len(index))]])))
     gaps = np.flatnonzero(np.diff(time) > _GAP * half_period)
     # An extreme at the very edge of a gap is where the data end, not where they turn.
     edges = time[np.concatenate([gaps, gaps + 1])]
@@ -126,7 +124,7 @@ def _level(value: FloatArray) -> float:
     """Middle of the swings, free of a steady decay: (e + 2 e' + e'')/4."""
     if len(value) < LEAST_HALF_CYCLES:
         return float(np.mean(value))
-    return float(np.median(0.25 * (value[:-2] + 2.0 * value[1:-1] + value[2:])))
+    return float(median(0.25 * (value[:-2] + 2.0 * value[1:-1] + value[2:])))
 
 
 _OF_A_PARABOLA: Final = 5
@@ -147,35 +145,49 @@ def smooth_times(
     centre_s, half_period_s
         Smoothed time and slope at each number in `at`.
     """
-    if len(at) > _AT_ONCE:
-        pieces = np.array_split(at, len(at) // _AT_ONCE + 1)
-        both = [smooth_times(number, time_s, weight, wanted, piece) for piece in pieces]
-        return np.concatenate([c for c, _ in both]), np.concatenate([h for _, h in both])
-    last, middle = len(number) - 1, np.searchsorted(number, at)
-    low, high = np.maximum(middle - 2, 0), np.minimum(middle + 2, last)
-    low, high = np.minimum(low, high - 3), np.maximum(high, low + 3)
-    low, high = np.maximum(low, 0), np.minimum(high, last)
-    total, grown = np.append(0.0, np.cumsum(weight)), np.zeros_like(low)
-    # By how many neighbours to each side: the weights only add up, so that a bit at a time tells.
-    for more in (64, 32, 16, 8, 4, 2, 1):
-        start, stop = (
-            np.maximum(low - grown - more + 1, 0),
-            np.minimum(high + grown + more - 1, last),
-        )
-        grown += more * ((total[stop + 1] - total[start] < wanted) & (stop - start < _WIDEST))
-    low, high = np.maximum(low - grown, 0), np.minimum(high + grown, last)
-    near = low[:, None] + np.arange(np.max(high - low, initial=0) + 1)
-    inside, near = near <= high[:, None], np.minimum(near, last)
-    u, since = (number[near] - at[:, None]).astype(np.float64), time_s[low]
-    columns = np.stack([np.ones_like(u), u, u * u])
-    few = high - low + 1 < _OF_A_PARABOLA
-    columns[2, few] = 0.0
-    weighted = columns * (weight[near] * inside)
-    normal = np.einsum("pkn,qkn->kpq", weighted, columns)
-    normal[:, 2, 2] += few
-    right = np.einsum("pkn,kn->kp", weighted, time_s[near] - since[:, None])
-    found = np.linalg.solve(normal, right[..., None])[..., 0]
-    return since + found[:, 0], found[:, 1]
+    centre, slope = np.empty(len(at)), np.empty(len(at))
+    running, middle = np.append(0.0, np.cumsum(weight)), np.searchsorted(number[:-1], at)
+    _smooth(number, time_s, weight, running, wanted, at, middle, centre, slope)
+    return centre, slope
+
+
+@kernel()
+def _smooth(
+    number: IntArray,
+    time_s: FloatArray,
+    weight: FloatArray,
+    running: FloatArray,
+    wanted: float,
+    at: IntArray,
+    middle: IntArray,
+    centre: FloatArray,
+    slope: FloatArray,
+) -> None:
+    """Fill `centre` and `slope`; `middle` is the first neighbour that is not before each.
+
+    `running` are the weights of all before, summed.
+    """
+    last = number.size - 1
+    for k in range(at.size):
+        low, high, first_s = max(middle[k] - 2, 0), min(middle[k] + 2, last), time_s[middle[k]]
+        low, high = max(min(low, high - 3), 0), min(max(high, low + 3), last)
+        while running[high + 1] - running[low] < wanted and high - low < min(_WIDEST, last):
+            low, high = max(low - 1, 0), min(high + 1, last)
+        w, u, uu, uuu, uuuu, t, ut, uut = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for j in range(low, high + 1):
+            off, late = float(number[j] - at[k]), time_s[j] - first_s
+            first, second = weight[j] * off, weight[j] * off * off
+            w, u, uu = w + weight[j], u + first, uu + second
+            uuu, uuuu = uuu + second * off, uuuu + second * off * off
+            t, ut, uut = t + weight[j] * late, ut + first * late, uut + second * late
+        # Through few goes a line; else a parabola, its bend first.
+        spread, by_line = uu - u * u / w, ut - u * t / w
+        if high - low + 1 >= _OF_A_PARABOLA:
+            skew, by_bend = uuu - u * uu / w, uut - uu * t / w
+            bend = (by_bend - skew * by_line / spread) / (uuuu - uu * uu / w - skew * skew / spread)
+            by_line, t = by_line - bend * skew, t - bend * uu
+        slope[k] = by_line / spread
+        centre[k] = first_s + (t - slope[k] * u) / w
 
 
 @kernel()
@@ -256,7 +268,7 @@ def resmoothed(places: Places, measured: Measured, noise: float) -> Places:
     known = weight > 0.0
     if not known.any():
         return places
-    wanted = float(np.median(places.angular_frequency) / _PHASE_WANTED) ** 2
+    wanted = float(median(places.angular_frequency) / _PHASE_WANTED) ** 2
     centre, half_period = smooth_times(
         places.number[known], time[known], weight[known], wanted, places.number
     )
@@ -366,7 +378,7 @@ def _of_few(samples: Samples, fine: Between, place: str | Path) -> TurningPoints
     points = _measured(replace(dense, noise_rms=max(fine.noise_rms, least)), place)
     noise = fine.noise_rms
     sd = np.hypot(points.angle_sd_rad, 2.0 * noise / math.sqrt(fine.window))
-    pace = math.pi / float(np.median(np.diff(points.time_s) / np.diff(points.half_cycle)))
+    pace = math.pi / float(median(np.diff(points.time_s) / np.diff(points.half_cycle)))
     clear = np.maximum(np.abs(points.angle_rad), sd)
     return replace(
         points,
@@ -382,7 +394,7 @@ def _measured(samples: Samples, place: str | Path) -> TurningPoints:
     """Measure half cycle by half cycle."""
     rough, stride = numbered(samples)
     _refuse_few(samples, len(rough.number), place)
-    gaps = np.diff(samples.time_s) > _GAP * float(np.median(np.diff(rough.time_s)))
+    gaps = np.diff(samples.time_s) > _GAP * float(median(np.diff(rough.time_s)))
     refuse_if(
         2 * np.count_nonzero(gaps) > len(rough.number),
         place,
@@ -663,10 +675,10 @@ def last_seen(measured: Measured, noise: float) -> int:
 
     Neighbours are on opposite sides: together they cancel an error of the level.
     """
-    amplitude = np.nan_to_num(measured.amplitude)
+    both, told = (measured.amplitude, measured.variance), np.isfinite(measured.amplitude)
+    amplitude, variance = np.where(told, both, [[0.0], [np.inf]])
     around = np.convolve(amplitude, [0.25, 0.5, 0.25], "same")
-    sd = noise * np.sqrt(np.nan_to_num(measured.variance, nan=np.inf))
-    seen = around > np.maximum(_SEEN * sd, 1e-6 * float(np.max(amplitude)))
+    seen = around > np.maximum(_SEEN * noise * np.sqrt(variance), 1e-6 * float(np.max(amplitude)))
     return int(np.max(np.flatnonzero(seen), initial=-1))
 
 
@@ -676,12 +688,12 @@ _NEAR: Final = 5
 
 def _usual(coverage: FloatArray) -> FloatArray:
     """What is usual among the neighbours."""
-    middle = float(np.median(coverage[coverage > 0.0])) if coverage.any() else 0.0
+    middle = float(median(coverage[coverage > 0.0])) if coverage.any() else 0.0
     if len(coverage) < 2 * _NEAR + 2 or np.max(np.abs(coverage[1:-1] - middle)) < 0.3 * middle:
         return np.full(len(coverage), middle)
     padded = np.pad(coverage, _NEAR, mode="reflect")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEAR + 1)
-    return np.asarray(np.median(windows, axis=1))
+    return np.asarray(median(windows))
 
 
 def _notes(samples: Samples, keep: BoolArray, level: Level) -> tuple[str, ...]:

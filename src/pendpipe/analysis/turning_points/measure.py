@@ -27,7 +27,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.noise import noise_rms
-from pendpipe.arrays import BoolArray, FloatArray, IntArray
+from pendpipe.arrays import BoolArray, FloatArray, IntArray, median
 from pendpipe.dynamics.kernel import IntMatrix, Matrix, Stack, kernel
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.readings import decimal_step, find_step, motion_of
@@ -624,7 +624,7 @@ def even_times(time_s: FloatArray) -> FloatArray:
     low, high = float(intervals.min()), float(intervals.max())
     if high - low < _EVEN * high or (digit := decimal_step(time_s)) is None:
         return time_s
-    usual = float(np.median(intervals))
+    usual = float(median(intervals))
     single = float(np.mean(intervals[intervals < 1.5 * usual + digit]))
     number = np.concatenate([[0.0], np.cumsum(np.rint(intervals / single))])
     line = np.polynomial.Polynomial.fit(number, time_s, 1)
@@ -672,8 +672,10 @@ def _one_row_a_count(time: FloatArray, values: FloatArray, step: float) -> bool:
     change = np.abs(np.diff(piece))
     intervals = np.diff(when)
     single = float(np.mean(np.abs(change - step) < 0.1 * step))
-    uneven = float(np.percentile(intervals, 90)) > 1.5 * float(np.percentile(intervals, 10))
-    return len(piece) > _COUNTS and single > 1.0 - 1.0 / _COUNTS and uneven
+    if not (len(piece) > _COUNTS and single > 1.0 - 1.0 / _COUNTS):
+        return False
+    low, high = np.percentile(intervals, (10, 90))
+    return bool(high > 1.5 * low)
 
 
 def _new_readings(values: FloatArray, step: float | None) -> BoolArray | None:
@@ -713,4 +715,4 @@ def _when_measured(time: FloatArray, new: BoolArray) -> FloatArray:
     found = time[new]
     order = np.arange(len(found))
     even = np.polynomial.Polynomial.fit(order, found, 1)(order)
-    return even if np.ptp(found - even) < 1.1 * float(np.median(np.diff(time))) else found
+    return even if np.ptp(found - even) < 1.1 * float(median(np.diff(time))) else found
