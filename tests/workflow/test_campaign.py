@@ -476,4 +476,6 @@ def test_no_number_is_null_where_another_file_has_it(
             if path.name != "fit.json" or name not in HELD:
                 found[stands].add((owner, name))
     assert (None, "loss_torque/water") in found[True]
+    rows = read_json(results / "campaign.json")["records"]
+    assert min(row["moment_of_inertia"]["sd"] for row in rows) > 0.0
     assert not found[True] & found[False]

@@ -9,6 +9,7 @@ import numpy as np
 from pendpipe.analysis.compare import amplitude_misfit, tail_fits
 from pendpipe.analysis.turning_points import read_turning_points
 from pendpipe.arguments import Arguments, command, load
+from pendpipe.campaign.design import design_of
 from pendpipe.campaign.fit import InertiaSds, inertia_sds, joint_values
 from pendpipe.campaign.values import Line, Values, campaign_values
 from pendpipe.configuration.load import Campaign
@@ -53,7 +54,14 @@ def compare_campaign(campaign: Campaign, folder: Path, separated: dict[str, Any]
     """Compare the losses of the records, whose results are in `folder`, with Eq. 16."""
     results = read_results(campaign, folder)
     together = campaign_data(campaign, results, separated["left_out"])
-    spread = inertia_sds(together[0]) if together else {}
+    # Of all that were built, also those that nothing of the campaign is made from.
+    built = [
+        each.record
+        for each in results
+        if each.fit and each.record.fluid and campaign.geometry(each.record)
+    ]
+    told = built and campaign.configuration.apparatus
+    spread = inertia_sds(design_of(campaign, built)) if told else {}
     values = together and campaign_values(*together)
     found = values if values and values.wet and is_line(values) else None
     split = {entry["record"]: entry for entry in separated["records"]}
