@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.polynomial import Polynomial
 from scipy.fft import prev_fast_len
+from scipy.special import ndtr
 
 from pendpipe.analysis.noise import before_rounding, scatter
 from pendpipe.analysis.turning_points.measure import Samples
@@ -53,8 +54,9 @@ class Data:
     fold
         Number of original readings in each mean.
     lattice
-        If rounding is coarse: a reading's remainder modulo the step, and the noise before
-        rounding (rad); None if noise makes rounding errors random.
+        The mean rounding error of each reading, rad, shape (n,): of a model that was fitted before,
+        so that chi^2 stays that of numbers that are linear in the motion. None if noise makes
+        rounding errors random.
     anchor
         A time in s near the beginning, and the phase of the readings then, so that whole turns
         are counted the same way for every model.
@@ -77,7 +79,7 @@ class Data:
     time_noise: bool = False
     noise_rms: float = 0.0
     fold: int = 1
-    lattice: tuple[float, float] | None = None
+    lattice: FloatArray | None = None
     anchor: tuple[float, float] | None = None
     row: int = 0
     every: int = 1
@@ -99,11 +101,9 @@ class Data:
         return np.asarray(first[:, None] + np.arange(self.fold))
 
     def residual(self, reading: FloatArray) -> FloatArray:
-        """Return readings minus model, with the mean rounding error of the model."""
-        if self.lattice is None:
-            return self.values - reading
-        origin, noise = self.lattice
-        return self.values - reading - rounding_bias(reading - origin, self.step, noise)
+        """Return readings minus model, less their mean rounding error."""
+        left = self.values - reading
+        return left if self.lattice is None else left - self.lattice
 
     def rms_left(self, reading: FloatArray) -> float:
         """Return the rms of what a model leaves of the readings that count."""
@@ -132,6 +132,7 @@ class Data:
             time_s=self.time_s[:count],
             values=self.values[:count],
             weight=self.weight[:count],
+            lattice=None if self.lattice is None else self.lattice[:count],
         )
 
     def masked(self, bad: BoolArray) -> Data:
@@ -142,18 +143,16 @@ class Data:
 def rounding_bias(angle: FloatArray, step: float, noise_rms: float) -> FloatArray:
     """Return the mean rounding error of a noisy reading, rad.
 
-    round(x) - x is a sawtooth; Gaussian noise reduces its harmonic k by the factor
-    exp(-2 pi^2 k^2 (noise/step)^2) (Widrow).
+    A reading is n steps where x and Gaussian noise add to a value within half a step of n. Steps
+    beyond five of the noise's standard deviations are never read.
     """
-    total = np.zeros_like(angle)
-    turn = 2.0 * np.pi * angle / step
-    for harmonic in range(1, 9):
-        left = np.exp(-2.0 * (np.pi * harmonic * noise_rms / step) ** 2)
-        if left < 1e-4:
-            break
-        sign = -1.0 if harmonic % 2 else 1.0
-        total += sign * step / (np.pi * harmonic) * left * np.sin(harmonic * turn)
-    return total
+    turn = angle / step
+    below = np.floor(turn)
+    far = 1 + math.ceil(5.0 * noise_rms / step)
+    edges = below[:, None] + np.arange(-far, far + 1) + 0.5
+    # The mean of round(x): the lowest that is read, and one for each edge that is passed.
+    passed = ndtr((turn[:, None] - edges) * (step / noise_rms)).sum(axis=1)
+    return np.asarray(step * (below - far + passed - turn))
 
 
 def with_lattice(data: Data, reading: FloatArray) -> Data:
@@ -178,7 +177,7 @@ def with_lattice(data: Data, reading: FloatArray) -> Data:
     turn = 2.0 * np.pi * data.values / data.step
     origin = float(np.angle(np.mean(np.exp(1j * turn)))) * data.step / (2.0 * np.pi)
     noise = before_rounding(scatter(float(off @ off), len(off)), data.step)
-    finer = replace(data, lattice=(origin, noise))
+    finer = replace(data, lattice=rounding_bias(reading - origin, data.step, noise))
     left = finer.residual(reading)[data.weight > 0.0]
     gain = len(off) * float(np.log(np.mean(off**2) / np.mean(left**2)))
     return finer if gain > _NEEDED_GAIN else replace(data, lattice=None)

@@ -281,6 +281,8 @@ def settled(
     if is_gross(fit, data) and gross:
         return fit, data, noise
     for _ in range(_ROUNDS):
+        # The rounding of a better model, too.
+        finer = replace(with_lattice(finer, better.at.reading), noise_rms=finer.noise_rms)
         again = noise_of_residual(better, finer, red=red)
         if again.rms > _ESTIMATE_AGAIN * left.rms:
             break

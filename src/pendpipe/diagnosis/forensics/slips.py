@@ -40,6 +40,8 @@ _MOST: Final = 150
 """Slips at most."""
 _CHOICE: Final = 6.0
 """Price of a slip beside the places where it may have been (2 ln n)."""
+_LENGTHS: Final = 16
+"""Of stretches between two slips, from 2 readings to half of them: each twice the last or less."""
 _FEWEST: Final = 4
 """Slips: that four are whole by chance, each within a quarter, has a probability of 1/16."""
 _NEIGHBOURS: Final = 11
@@ -138,41 +140,82 @@ def whole_steps(evidence: Evidence, unit: FloatArray) -> Slips | None:
     basis = np.empty((len(slow), known + _MOST), order="F")
     basis[:, :known] = slow
     left = whole_left - slow @ (slow.T @ whole_left)
-    whole = _later(unit**2)
-    alone = whole - np.sum(_later(unit[:, None] * slow) ** 2, axis=1)
+    # Counts that are lost and gained again soon after make two steps that are seen together only.
+    lengths = [len(left), *np.unique(np.geomspace(2, max(len(left) // 2, 2), _LENGTHS).astype(int))]
+    whole = {length: _between(unit**2, length) for length in lengths}
+    alone = {
+        length: whole[length] - np.sum(_between(unit[:, None] * slow, length) ** 2, axis=1)
+        for length in lengths
+    }
     found: list[int] = []
-    for _ in range(_MOST):
-        seen = alone > 1e-6 * whole[0]
-        gain = np.where(seen, _later(unit * left) ** 2 / np.where(seen, alone, 1.0), 0.0)
-        row = int(np.argmax(gain))
-        if gain[row] < (2.0 * math.log(len(left)) + _CHOICE) * spread(left) ** 2:
+    while len(found) < _MOST - 1:
+        price = (2.0 * math.log(len(left)) + _CHOICE) * spread(left) ** 2
+        best, length, row = -1.0, 0, 0
+        for each, free in alone.items():
+            seen = free > 1e-6 * whole[len(left)][0]
+            gain = np.where(seen, _between(unit * left, each) ** 2 / np.where(seen, free, 1.0), 0.0)
+            gain = gain - price * np.where(np.arange(len(left)) + each < len(left), 2.0, 1.0)
+            if gain.max() > best:
+                best, length, row = float(gain.max()), each, int(np.argmax(gain))
+        if best < 0.0:
             break
-        found.append(row)
-        column = _steps(np.array([row]), unit)[:, 0]
-        # Twice, lest rounding leave a part of what is known.
-        for _ in range(2):
-            column = column - basis[:, :known] @ (basis[:, :known].T @ column)
-        column /= np.linalg.norm(column)
-        left = left - column * float(column @ left)
-        alone -= _later(unit * column) ** 2
-        basis[:, known] = column
-        known += 1
+        for edge in (row, row + length)[: 1 + (row + length < len(left))]:
+            found.append(edge)
+            column = _steps(np.array([edge]), unit)[:, 0]
+            # Twice, lest rounding leave a part of what is known.
+            for _ in range(2):
+                column = column - basis[:, :known] @ (basis[:, :known].T @ column)
+            column /= np.linalg.norm(column)
+            left = left - column * float(column @ left)
+            for each in alone:
+                alone[each] -= _between(unit * column, each) ** 2
+            basis[:, known] = column
+            known += 1
     rows = np.sort(np.array(found, dtype=np.int64))
-    # All sizes together, beside what varies slowly.
+    # All sizes together, beside what varies slowly; again where each has its best place.
+    left, placed = whole_left - slow @ (slow.T @ whole_left), False
     while len(rows) >= _FEWEST:
         columns = _steps(rows, unit)
         columns -= slow @ (slow.T @ columns)
-        sizes = np.asarray(np.linalg.lstsq(columns, whole_left, rcond=1e-10)[0], dtype=np.float64)
+        sizes = np.asarray(np.linalg.lstsq(columns, left, rcond=1e-10)[0], dtype=np.float64)
         kept = np.abs(sizes) > 0.5
-        if kept.all():
+        if kept.all() and placed:
             return Slips(rows, sizes)
-        rows = rows[kept]
+        rows, placed = rows[kept], bool(kept.all())
+        if placed:
+            rows = _at_best_places(rows, np.round(sizes), unit, slow, left)
     return None
 
 
-def _later(columns: FloatArray) -> FloatArray:
-    """Sum each column from every reading on."""
-    return np.asarray(np.cumsum(columns[::-1], axis=0)[::-1])
+def _at_best_places(
+    rows: IntArray, sizes: FloatArray, unit: FloatArray, slow: FloatArray, left: FloatArray
+) -> IntArray:
+    """Move each step to the reading that leaves least, the others where they are.
+
+    A search that adds one step after the other has placed the first ones without the last.
+    """
+    count = len(unit)
+    squares = _between(unit**2, count) - np.sum(_between(unit[:, None] * slow, count) ** 2, axis=1)
+
+    def column(number: int) -> FloatArray:
+        step = sizes[number] * _steps(moved[[number]], unit)[:, 0]
+        return np.asarray(step - slow @ (slow.T @ step))
+
+    moved = rows.copy()
+    left = left - sum(map(column, range(len(rows))))
+    for number in [*range(len(rows)), *range(len(rows))]:
+        left = left + column(number)
+        gain = 2.0 * sizes[number] * _between(unit * left, count) - sizes[number] ** 2 * squares
+        moved[number] = np.argmax(gain)
+        left = left - column(number)
+    return np.sort(moved)
+
+
+def _between(columns: FloatArray, length: int) -> FloatArray:
+    """Sum each column over `length` readings from every reading on."""
+    later = np.cumsum(columns[::-1], axis=0)[::-1]
+    later[:-length] = later[:-length] - later[length:]
+    return np.asarray(later)
 
 
 def spread(left: FloatArray) -> float:
