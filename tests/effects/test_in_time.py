@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -406,6 +407,22 @@ def test_a_beat_may_begin_at_its_node_or_at_its_top(phase: float) -> None:
 HELD_TIME_S = np.arange(600) / 15.0
 VALUE = np.array([7.2e-3, 9.6e-3, 1.3e-4, 0.4, 2.0 * np.pi * 0.9, 0.15, -0.3, 0.01])
 RATE = {HYSTERETIC: 0.4 * 9.6e-3, VISCOUS: 0.6 * 9.6e-3}
+
+
+@pytest.mark.parametrize("exponential", [0.0, 1.0])
+@pytest.mark.parametrize("amplitude", [0.2, 1.0, 2.0])
+def test_a_support_that_tilts_slowly_is_an_offset_that_drifts(
+    amplitude: float, exponential: float
+) -> None:
+    """Gravity turns with it, whatever the swing: but for what the start of the creep excites."""
+    size, tau = 0.02, 30.0
+    swing = Model(TIME, float(TIME[1]), order=32, restoring="sine")
+    creeping = replace(swing, effects=(by_identifier("equilibrium-creep"),))
+    base = baseline(b=0.01, start=amplitude)
+    found = creeping.reading(np.append(base, (size, tau, exponential)))
+    level = size * np.vectorize(crept(tau, exponential))(TIME)
+    rate = size / tau / OMEGA
+    assert np.max(np.abs(found - level - swing.reading(base))) < 5.0 * rate
 
 
 def model_with(*parts: str) -> Model:

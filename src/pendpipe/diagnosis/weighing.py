@@ -167,6 +167,9 @@ def fault_named(found: Hypothesis, finding: Finding) -> FoundEffect:
 
     effect = by_identifier(finding.identifier)
     doubt = math.exp(-0.5 * _clean_charge(found))
+    if finding.identifier in _SEEN_IN_RESIDUAL and found.unexplained <= FALSE_ALARM:
+        # What is left besides may be what each of these tests answers to.
+        doubt = float(len(_SEEN_IN_RESIDUAL))
     if finding.confirmed is not None:
         doubt *= finding.confirmed.p_value
     doubt += math.exp(-0.5 * finding.margin)

@@ -426,7 +426,7 @@ def _crept_at_the_end(values: FloatArray, duration_s: float) -> float:
     identifier="equilibrium-creep",
     name="creep of the equilibrium",
     equation=(
-        r"\omega^2 x \to \omega^2 (x - x_\mathrm{eq}), \quad x_\mathrm{eq} ="
+        r"\tau(x) \to \tau(x - x_\mathrm{eq}), \quad x_\mathrm{eq} ="
         r" s \left[(1 - p) \ln(1 + t/\tau) + p\, (1 - e^{-t/\tau})\right]"
     ),
     parameters=(
@@ -447,10 +447,11 @@ def equilibrium_creep(
 ) -> FloatArray:
     """The equilibrium creeps: x_eq = s ln(1 + t/tau), or s (1 - exp(-t/tau)).
 
-    `exponential` 0 is the logarithm (linear where tau is long), 1 the exponential.
+    `exponential` 0 is the logarithm (linear where tau is long), 1 the exponential. The torque turns
+    with it, as that of gravity does where a support tilts.
     """
-    crept = _crept(since_release(motion, pendulum) / tau, exponential)
-    return np.asarray(size * pendulum.angular_frequency**2 * crept)
+    crept = size * _crept(since_release(motion, pendulum) / tau, exponential)
+    return np.asarray(pendulum.torque(motion.angle) - pendulum.torque(motion.angle - crept))
 
 
 @enters(
