@@ -27,6 +27,7 @@ from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.found import Confirmation, Finding, Location
 from pendpipe.diagnosis.refine import CLEAN, Fit, alignment, span_of
 from pendpipe.estimate import Estimate
+from pendpipe.levels import FALSE_ALARM
 
 _SIGNIFICANT_SD: Final = 7.0
 """Standard deviations from which a step is significant."""
@@ -72,10 +73,13 @@ class Slips(NamedTuple):
         The first reading after each, shape (k,).
     sizes
         As they were fitted, in units.
+    free
+        The same before any was placed as if it were whole, where some were: their test.
     """
 
     rows: IntArray
     sizes: FloatArray
+    free: Slips | None = None
 
     @property
     def whole(self) -> FloatArray:
@@ -94,6 +98,8 @@ class Slips(NamedTuple):
         Of many, the sum of cosines is normal. Of few, the distances from whole numbers are as near
         as that in a ball within the cube of side 1 in which they lie (at most: it may stick out).
         """
+        if self.free is not None:
+            return self.free.p_value
         half = 0.5 * len(self.sizes)
         near = float(np.sum(np.cos(2.0 * math.pi * self.sizes)))
         squares = max(2.0 * half * self.scatter**2, 1e-300)
@@ -110,7 +116,7 @@ class Slips(NamedTuple):
         first = [group[np.argmax(np.abs(self.sizes[group]))] for group in groups]
         sizes = np.array([np.sum(self.sizes[group]) for group in groups])
         kept = np.abs(sizes) > 0.5
-        return Slips(self.rows[first][kept], sizes[kept])
+        return Slips(self.rows[first][kept], sizes[kept], self.free and self.free.joined())
 
     def staircase(self, count: int) -> FloatArray:
         """Return the sum of the whole steps at each of `count` readings."""
@@ -134,88 +140,98 @@ def whole_steps(evidence: Evidence, unit: FloatArray) -> Slips | None:
     data, fit = evidence.data, evidence.fit
     if fit.chi2 <= CLEAN * data.used and not evidence.noise.coloured:
         return None
-    unit, whole_left = unit * data.weight, data.residual(fit.at.reading) * data.weight
+    unit, whole_left = unit * data.weight, evidence.error * data.weight
     slow = _slow(data, fit)
     known = slow.shape[1]
     basis = np.empty((len(slow), known + _MOST), order="F")
     basis[:, :known] = slow
     left = whole_left - slow @ (slow.T @ whole_left)
-    # Counts that are lost and gained again soon after make two steps that are seen together only.
-    lengths = [len(left), *np.unique(np.geomspace(2, max(len(left) // 2, 2), _LENGTHS).astype(int))]
-    whole = {length: _between(unit**2, length) for length in lengths}
-    alone = {
-        length: whole[length] - np.sum(_between(unit[:, None] * slow, length) ** 2, axis=1)
-        for length in lengths
-    }
+    whole = _later(unit**2)
+    alone = whole - np.sum(_later(unit[:, None] * slow) ** 2, axis=1)
     found: list[int] = []
-    while len(found) < _MOST - 1:
-        price = (2.0 * math.log(len(left)) + _CHOICE) * spread(left) ** 2
-        best, length, row = -1.0, 0, 0
-        for each, free in alone.items():
-            seen = free > 1e-6 * whole[len(left)][0]
-            gain = np.where(seen, _between(unit * left, each) ** 2 / np.where(seen, free, 1.0), 0.0)
-            gain = gain - price * np.where(np.arange(len(left)) + each < len(left), 2.0, 1.0)
-            if gain.max() > best:
-                best, length, row = float(gain.max()), each, int(np.argmax(gain))
-        if best < 0.0:
+    for _ in range(_MOST):
+        seen = alone > 1e-6 * whole[0]
+        gain = np.where(seen, _later(unit * left) ** 2 / np.where(seen, alone, 1.0), 0.0)
+        row = int(np.argmax(gain))
+        if gain[row] < (2.0 * math.log(len(left)) + _CHOICE) * spread(left) ** 2:
             break
-        for edge in (row, row + length)[: 1 + (row + length < len(left))]:
-            found.append(edge)
-            column = _steps(np.array([edge]), unit)[:, 0]
-            # Twice, lest rounding leave a part of what is known.
-            for _ in range(2):
-                column = column - basis[:, :known] @ (basis[:, :known].T @ column)
-            column /= np.linalg.norm(column)
-            left = left - column * float(column @ left)
-            for each in alone:
-                alone[each] -= _between(unit * column, each) ** 2
-            basis[:, known] = column
-            known += 1
+        found.append(row)
+        column = _steps(np.array([row]), unit)[:, 0]
+        # Twice, lest rounding leave a part of what is known.
+        for _ in range(2):
+            column = column - basis[:, :known] @ (basis[:, :known].T @ column)
+        column /= np.linalg.norm(column)
+        left = left - column * float(column @ left)
+        alone -= _later(unit * column) ** 2
+        basis[:, known] = column
+        known += 1
     rows = np.sort(np.array(found, dtype=np.int64))
     # All sizes together, beside what varies slowly; again where each has its best place.
-    left, placed = whole_left - slow @ (slow.T @ whole_left), False
+    left, free = whole_left - slow @ (slow.T @ whole_left), None
     while len(rows) >= _FEWEST:
         columns = _steps(rows, unit)
         columns -= slow @ (slow.T @ columns)
         sizes = np.asarray(np.linalg.lstsq(columns, left, rcond=1e-10)[0], dtype=np.float64)
-        kept = np.abs(sizes) > 0.5
-        if kept.all() and placed:
-            return Slips(rows, sizes)
-        rows, placed = rows[kept], bool(kept.all())
-        if placed:
-            rows = _at_best_places(rows, np.round(sizes), unit, slow, left)
+        kept, slips = np.abs(sizes) > 0.5, Slips(rows, sizes, free)
+        if not kept.all():
+            rows = rows[kept]
+        elif free or slips.p_value > FALSE_ALARM:
+            return slips
+        else:
+            rows, free = _at_best_places(slips, unit, slow, left), slips
     return None
 
 
-def _at_best_places(
-    rows: IntArray, sizes: FloatArray, unit: FloatArray, slow: FloatArray, left: FloatArray
-) -> IntArray:
-    """Move each step to the reading that leaves least, the others where they are.
+def _at_best_places(slips: Slips, unit: FloatArray, slow: FloatArray, left: FloatArray) -> IntArray:
+    """Return where whole steps leave least, and units that are lost and soon regained.
 
-    A search that adds one step after the other has placed the first ones without the last.
+    A search that adds one step after the other has placed the first ones without the last, and sees
+    no two that make good for each other.
     """
-    count = len(unit)
-    squares = _between(unit**2, count) - np.sum(_between(unit[:, None] * slow, count) ** 2, axis=1)
+    rows, sizes, count = slips.rows, slips.whole, len(unit)
+    lengths = np.unique(np.geomspace(2, count // 2, _LENGTHS).astype(np.int64)).tolist()
+    alone = {
+        length: _between(unit**2, length)
+        - np.sum(_between(unit[:, None] * slow, length) ** 2, axis=1)
+        for length in (count, *lengths)
+    }
 
-    def column(number: int) -> FloatArray:
-        step = sizes[number] * _steps(moved[[number]], unit)[:, 0]
-        return np.asarray(step - slow @ (slow.T @ step))
+    def beside(rows: IntArray, sizes: FloatArray) -> FloatArray:
+        steps = _steps(rows, unit) @ sizes
+        return np.asarray(steps - slow @ (slow.T @ steps))
 
-    moved = rows.copy()
-    left = left - sum(map(column, range(len(rows))))
+    def gain(size: float, length: int) -> FloatArray:
+        """By how much it lowers the squares, shape (n,), from each reading on."""
+        return np.asarray(2.0 * size * _between(unit * left, length) - size**2 * alone[length])
+
+    left = left - beside(rows, sizes)
+    price = 2.0 * (2.0 * math.log(count) + _CHOICE) * spread(left) ** 2
+    for _ in range(_MOST - len(rows)):
+        tried = [(gain(s, length)[:-length], s, length) for s in (-1.0, 1.0) for length in lengths]
+        gains, size, length = max(tried, key=lambda each: float(each[0].max()))
+        if gains.max() < price:
+            break
+        edges = np.argmax(gains) + np.array([0, length])
+        left = left - beside(edges, size * np.array([1.0, -1.0]))
+        rows, sizes = np.append(rows, edges), np.append(sizes, (size, -size))
     for number in [*range(len(rows)), *range(len(rows))]:
-        left = left + column(number)
-        gain = 2.0 * sizes[number] * _between(unit * left, count) - sizes[number] ** 2 * squares
-        moved[number] = np.argmax(gain)
-        left = left - column(number)
-    return np.sort(moved)
+        one = slice(number, number + 1)
+        left = left + beside(rows[one], sizes[one])
+        rows = rows.copy()
+        rows[one] = np.argmax(gain(float(sizes[number]), count))
+        left = left - beside(rows[one], sizes[one])
+    return np.sort(rows)
+
+
+def _later(columns: FloatArray) -> FloatArray:
+    """Sum each column from every reading on."""
+    return np.asarray(np.cumsum(columns[::-1], axis=0)[::-1])
 
 
 def _between(columns: FloatArray, length: int) -> FloatArray:
     """Sum each column over `length` readings from every reading on."""
-    later = np.cumsum(columns[::-1], axis=0)[::-1]
-    later[:-length] = later[:-length] - later[length:]
-    return np.asarray(later)
+    later = _later(columns)
+    return np.concatenate([later[:-length] - later[length:], later[-length:]])
 
 
 def spread(left: FloatArray) -> float:
