@@ -411,6 +411,22 @@ def test_counts_are_lost_from_an_encoder_that_is_read_at_fixed_times(swing: Swin
     assert abs(lost["number"].value - len(rows)) <= 3
 
 
+def test_a_count_that_is_lost_and_soon_regained_is_undone_too(swing: Swing) -> None:
+    """Two that are seen together only, in 20 and 25 readings of 750 that tell a level."""
+    count, random = 2e-3, np.random.default_rng(6)
+    time_s, angle = swing.time_s[::16], swing.angle[::16]
+    level = np.zeros(len(time_s))
+    level[np.sort(random.choice(np.arange(200, 3500), 14, replace=False))] = 1.0
+    level[[1500, 2600]], level[[1520, 2625]] = -1.0, 1.0
+    dithered = angle / count + 0.3 * random.standard_normal(len(level))
+    readings = [count * np.round(dithered + lost) for lost in (np.cumsum(level), 0.0)]
+    samples = Samples(time_s, readings[0], "rad", count, 0.3 * count)
+    corrected, finding = found("count-slips", samples)
+    assert finding.parameters["number"].value == np.count_nonzero(level)
+    off = corrected.values - readings[1]
+    assert np.mean(np.abs(off - np.median(off)) > 0.5 * count) < 0.005
+
+
 @pytest.mark.parametrize(("readings", "kept"), [(19, 19), (20, 20), (21, 11), (40, 20), (41, 14)])
 def test_of_uneven_readings_every_second_or_third_is_kept_where_they_are_too_many(
     readings: int, kept: int
