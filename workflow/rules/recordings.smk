@@ -24,12 +24,12 @@ if WATCH:
 
 
 # Of a module Snakemake runs no hook. Nothing depends on these: a copy of what Snakemake deletes
-# before the job that makes it again, a line instead of several, and no leftovers.
+# before the job that makes it again (what no job of this run makes, the next does), a line instead
+# of several, and no leftovers.
 onstart:
     checked(check_writable, RESULTS)
     for damage in WATCH.damages:
         logger.warning(f"pendpipe: {damage.path}: {checked(damage.set_aside)}")
-    chunks.restore(CAMPAIGN, {damage.path for damage in WATCH.damages})
 
 
 onsuccess:

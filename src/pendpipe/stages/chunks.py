@@ -9,7 +9,7 @@ out of it: always in a campaign of up to `SMALL` records, else when they are ask
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -181,12 +181,6 @@ def refused(campaign: Campaign) -> list[str]:
     """The records that were refused."""
     names = (name.split("/", 1) for path in _archives_of(campaign) for name in members(path))
     return sorted({record for record, name in names if name == "refused.json"})
-
-
-def restore(campaign: Campaign, paths: Collection[Path]) -> None:
-    """Write files of the records' folders anew, as their archives have them."""
-    for path in _archives_of(campaign) if paths else ():
-        unpack(path, campaign.folder, lambda name: campaign.folder / name in paths)
 
 
 def tidy(campaign: Campaign) -> None:
