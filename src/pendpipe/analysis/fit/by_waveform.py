@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple, cast
 
 import numpy as np
 
-from pendpipe.analysis.fit.fitted import Agreement, Baseline, DragForm, Form
+from pendpipe.analysis.fit.fitted import Agreement, Baseline, DragForm, Form, view
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness, Left, combined, judge
 from pendpipe.analysis.fit.result import FitResult, result_of
@@ -132,11 +132,6 @@ class Waveform(Eq8Model):
         seen = turns < 2.0 * len(self.values) and bool(np.isfinite(law.stop_rad))
         return seen and release.time_s <= self.time_s[0]
 
-    @property
-    def problem(self) -> Problem[Summed]:
-        """What is minimised."""
-        return Problem(self.at, self.bounds, moved=self.curved)
-
     def at(self, value: FloatArray) -> Summed | None:
         """chi^2 at some values; None where nothing moves, or it is overdamped."""
         try:
@@ -195,15 +190,8 @@ class Fitted:
     held: tuple[int, ...]
     start: Start
 
-    @property
-    def value(self) -> FloatArray:
-        """The nine parameters."""
-        return self.minimum.value
-
-    @property
-    def chi2(self) -> float:
-        """Of the readings, in units of the noise that was weighed with."""
-        return self.minimum.chi2
+    value = cast("FloatArray", view("minimum.point.value", "The nine parameters."))
+    chi2 = cast("float", view("minimum.point.chi2", "In units of the noise that was weighed with."))
 
     @property
     def noise_rms(self) -> float:
@@ -226,10 +214,6 @@ class Fitted:
             return 0.5 * (others - own)
         own, others = own * self.problem.noise_rms**2, others * other.problem.noise_rms**2
         return 0.5 * (others - own) / min(self.noise_rms, other.noise_rms) ** 2
-
-    def rival(self, value: FloatArray, **law: Any) -> Fitted:
-        """Another law beside this one: of the same readings and noise, at the share they favour."""
-        return _fitted(replace(self.problem, **law), value, self.held, self.start, self.chi2)
 
     def quadratic(self, goodness: Goodness | None = None) -> Quadratic:
         """Chi^2 there, for the noise that a test of fit found.
@@ -333,7 +317,9 @@ def _with_drag(found: Fitted, samples: Samples, points: TurningPoints) -> Forms:
     without, plain = found.value[A] <= 0.0, goodness.misfit == 1.0
     if A in found.held or not found.minimum.converged or (without and plain):
         return Forms(found, goodness, None)
-    speed = found.rival(found.start.value if without else found.value, drag="speed")
+    begun = found.start.value if without else found.value
+    other = replace(found.problem, drag="speed")
+    speed = _fitted(other, begun, found.held, found.start, found.chi2)
     if not plain or speed.better_by(found) > -ODDS:
         speed = _settled(speed, samples)
     if not speed.minimum.converged:
@@ -358,7 +344,7 @@ def _fitted(
     low[TIME] = value[TIME] - math.pi / value[OMEGA]
     try:
         minimum = minimise(
-            replace(problem.problem, bounds=Bounds(low, high)),
+            Problem(problem.at, Bounds(low, high), moved=problem.curved),
             value,
             held=held,
             tolerance=_TOLERANCE,

@@ -223,17 +223,20 @@ def losses_of(law: Eq8, amplitude: float) -> tuple[float, FloatArray]:
 @lru_cache(maxsize=16)
 def _cycle(law: Eq8, amplitude: float) -> tuple[float, float] | None:
     """Where a cycle with `amplitude` in its middle starts, and its loss; None where none is."""
-    start = amplitude
+    # By Eq. 13, half a period before.
+    half, loss = math.pi / law.angular_frequency, law.hysteretic + law.viscous
+    loss += law.quadratic * amplitude
+    start = amplitude * math.exp(min(half * loss, 1.0)) + half * law.coulomb
     for _ in range(4):
         try:
             cycle = turning_points(law, Release(0.0, start), count=_OF_A_CYCLE)
         except ValueError:
             # Overdamped.
             return None
-        if len(cycle.time_s) < _OF_A_CYCLE or not abs(cycle.angle_rad[2]) > 0.0:
+        if len(cycle.time_s) < _OF_A_CYCLE or not cycle.angle_rad[2] > 0.0:
             # It stops within the cycle.
             return None
-        found = start, math.log(start / abs(float(cycle.angle_rad[2]))) / float(cycle.time_s[2])
+        found = start, math.log(start / float(cycle.angle_rad[2])) / float(cycle.time_s[2])
         # Friction that does not depend on the speed takes the same from any start: one step.
         missed = amplitude - abs(float(cycle.angle_rad[1]))
         if abs(missed) < _MISSED * amplitude:
