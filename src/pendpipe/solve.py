@@ -765,8 +765,9 @@ def intervals95(
     if not np.isfinite(normal).all():
         # A search that got to where nothing moves tells nothing.
         return [(float(value[j]), float(value[j])) for j in indices]
-    part, scale = _scaled(normal, np.arange(len(value)))
-    part, room = part + _HAIR * np.eye(len(value)), bounds.about(value)
+    # By its root, since rounding may have made the matrix indefinite.
+    root, scale, *_ = of_normal(normal, gradient)
+    part, room = root.T @ root + _HAIR * np.eye(len(value)), bounds.about(value)
     best = bounded_step(normal, gradient, room, held) * scale
     way, pull = Bounds(room.lower * scale, room.upper * scale), gradient / scale
     found = []
@@ -791,8 +792,7 @@ def _end(
 
     The others follow within their bounds, straight on from one corner to the next, at which a
     value meets its bound or comes off it. So chi^2 is a parabola between corners, and the end is
-    the root of one: the first, where no bound is met. A matrix that rounding made indefinite bends
-    no parabola downwards (`_HAIR`).
+    the root of one: the first, where no bound is met.
     """
     index, step, follows = held[0], best, np.ones(len(best), dtype=bool)
     follows[list(held)], last = False, 0.0

@@ -323,6 +323,12 @@ def test_what_readings_do_not_tell_apart_stays_within_its_bounds() -> None:
     step = bounded_step(normal, 5.0 * column, bounds)
     assert np.all((step >= bounds.lower) & (step <= bounds.upper))
     assert column @ step == pytest.approx(5.0, rel=1e-4)
+    ends = intervals95(np.zeros(3), normal, np.zeros(3), bounds, range(3))
+    assert ends == [
+        (-0.1, 0.1),
+        pytest.approx((-0.2 - HALF_95 / 2, 0.2 + HALF_95 / 2)),
+        (-0.1, 0.1),
+    ]
 
 
 @pytest.mark.slow
