@@ -98,7 +98,7 @@ def _of_record(
         except Exception:
             traceback.print_exc()
             status = 1
-    for line in filter(str.strip, said.getvalue().splitlines()):
+    for line in filter(str.strip, said.getvalue().replace(f"{folder}/", "").splitlines()):
         tell(f"{name}: {line.removeprefix(f'{name}: ')}")
         if line.startswith(f"{name}: ") and not status:
             print(line)
