@@ -11,7 +11,7 @@ from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.recording import Quantity, Recording
 
-from ..effects.integration import swung
+from ..effects.integration import integrate, swung
 from ..effects.test_two_planes import TIME, spherical
 
 
@@ -98,3 +98,39 @@ def test_one_force_is_one_cause(effect: str, frequency_hz: float) -> None:
     assert found[0].parameters["f_d" if driven else "f_h"].value == pytest.approx(
         frequency_hz, abs=4e-4
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", ["kicks", "hum near the motion", "gain"])
+def test_lines_of_one_family_are_one_cause(family: str) -> None:
+    """A comb, a fold of 50 Hz within half a beat of the swing, and two side bands."""
+    time_s = np.arange(0.0, 240.0, 240.0 / round(240.0 * (50.0 - 0.803) / 2.0))
+    kicks = tuple((5.1 + 8.3 * k, 0.0, -0.008) for k in range(29))
+    readings = integrate(
+        lambda _t, y, _s, _x0: -((2.0 * math.pi * 0.8) ** 2) * math.sin(y[0]) - 0.016 * y[1],
+        *(0.18, 0.0, time_s),
+        kicks=kicks if family == "kicks" else (),
+    )
+    if family == "gain":
+        readings *= 1.0 + 4e-3 * np.cos(2.0 * math.pi * 0.1 * time_s)
+    elif family != "kicks":
+        readings += 1.5e-3 * np.cos(2.0 * math.pi * 50.0 * time_s)
+    readings += noise(6, len(time_s), 1e-4)
+    found = diagnose_recording(Recording(time_s, readings, "angle_rad"))
+    assert [each.identifier for each in found.missing] == [
+        {"kicks": "periodic-drive", "gain": "gain-drift"}.get(family, "tone-pickup")
+    ]
+    assert found.missing[0].probability > 0.5
+    if family == "kicks":
+        assert found.missing[0].parameters["period"].value == pytest.approx(8.3, abs=1e-3)
+
+
+@pytest.mark.slow
+def test_positions_on_an_image_have_a_perspective_and_a_lens() -> None:
+    """A camera turned by 0.2 rad at five lengths, with 2 % of distortion at the ends."""
+    time_s = np.arange(0.0, 120.0, 1.0 / 30.0)
+    place = 9.81 / 4.0**2 * np.sin(swung(time_s, 0.25, 4.0, 0.006)[0])
+    seen = place * math.cos(0.2) / (1.0 + place * math.sin(0.2) / 3.0)
+    seen *= 1.0 + 0.02 * (seen / 0.15) ** 2
+    readings = seen + noise(7, len(time_s), 3e-4)
+    assert first(time_s, readings, "displacement_m")[0] == "camera-geometry"

@@ -358,11 +358,13 @@ def test_a_bent_sensor_has_a_harmonic_and_no_frequency_shift(
 
 
 def test_a_rolling_shutter_reads_the_motion_later_on_one_side() -> None:
-    """y(t) = x(t + kappa x(t)), looked up on a fine grid."""
+    """y(t) = x(t + kappa y(t)), looked up on a fine grid."""
     kappa, base = -0.01, baseline(b=0.005, start=0.6)
     fine = times(41.0, 0.001)
     own = plain(base, MIDDLE_TIME)
-    expected = np.interp(MIDDLE_TIME + kappa * own, fine, plain(base, fine))
+    moving, expected = plain(base, fine), own
+    for _ in range(9):
+        expected = np.interp(MIDDLE_TIME + kappa * expected, fine, moving)
     found = reading("rolling-shutter", (kappa,), base, MIDDLE_TIME)
     # Half of the angular acceleration times (kappa x)^2 b/omega is left.
     np.testing.assert_allclose(found[1:-1], expected[1:-1], 0.0, 2e-5)

@@ -28,6 +28,7 @@ from pendpipe.dynamics.eq8 import OMEGA
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import plane_band_hz
 from pendpipe.effects.curves import Curve
+from pendpipe.effects.effect import Span
 from pendpipe.effects.model import Model
 from pendpipe.estimate import Z95
 from pendpipe.score import Trials, trials_of
@@ -458,14 +459,14 @@ class Scanner:
         Of the readings.
     basis
         Orthonormal, of the model's tangent space among all readings, shape (n + 1, p).
-    spectral, scans
-        The effects that are tones, and the scans for them, steady or decaying.
+    lines, scans
+        The effects that make a line, and the scans for them, steady or decaying.
     """
 
     bank: Bank
     noise: Noise
     basis: FloatArray
-    spectral: tuple[Effect, ...] = ()
+    lines: tuple[Effect, ...] = ()
     scans: tuple[ToneScan, ...] = ()
 
     def tones(self, residual: FloatArray) -> list[FloatArray]:
@@ -479,11 +480,11 @@ class Scanner:
 
 def prepare(fit: Fit, data: Data, noise: Noise, effects: Sequence[Effect]) -> Scanner:
     """Compute the derivatives by all effects."""
-    spectral = tuple(effect for effect in effects if effect.spectral)
-    bank = build_bank(fit, noise, [effect for effect in effects if effect not in spectral])
+    lines = tuple(effect for effect in effects if effect.has_lines)
+    bank = build_bank(fit, noise, [effect for effect in effects if not effect.spectral])
     basis = bank.basis if len(bank.basis) == len(fit.residual) else tangent_basis(fit)
     scans: list[ToneScan] = []
-    if spectral and data.uniform:
+    if lines and data.uniform:
         since = data.time_s - data.time_s[0]
         own = fit.value[OMEGA] / (2.0 * math.pi)
         steady = Band(_FEWEST_CYCLES / float(since[-1]), own, plane_band_hz(fit.at.span))
@@ -492,7 +493,7 @@ def prepare(fit: Fit, data: Data, noise: Noise, effects: Sequence[Effect]) -> Sc
             tone_scan(data, noise, basis, part * float(since[-1]), Band(_LOWEST_MODE * own, own))
             for part in _DECAY_TIMES
         ]
-    return Scanner(bank, noise, basis, spectral, tuple(scans))
+    return Scanner(bank, noise, basis, lines, tuple(scans))
 
 
 def draw_chance(scanner: Scanner, seed: int, draws: int = DRAWS) -> Chance:
@@ -562,7 +563,12 @@ def detect(scanner: Scanner, fit: Fit, *, seed: int, known: Detection | None = N
     chance = few or draw_chance(scanner, seed, FEW_DRAWS)
     if chance.draws < DRAWS and chance.everywhere.global_p_value(smallest) < _CLEARLY_CHANCE:
         chance = draw_chance(scanner, seed)
-    leads = [*_bank_leads(bank, scores, chance.own), *_tone_leads(scanner, tones, local)]
+    leads = [
+        *_bank_leads(bank, scores, chance.own),
+        *_tone_leads(scanner, tones, local, fit.at.span),
+    ]
+    # One that makes lines near and far is led by the larger score.
+    leads = list({each.effect.key: each for each in sorted(leads, key=lambda e: e.score)}.values())
     leads.sort(key=lambda lead: (lead.p_value, -lead.score))
     return Detection(tuple(leads), chance.everywhere.global_p_value(smallest), chance)
 
@@ -586,17 +592,17 @@ def _bank_leads(bank: Bank, scores: FloatArray, own: dict[str, Trials]) -> list[
 
 
 def _tone_leads(
-    scanner: Scanner, tones: Sequence[FloatArray], local: Sequence[FloatArray]
+    scanner: Scanner, tones: Sequence[FloatArray], local: Sequence[FloatArray], span: Span
 ) -> list[Lead]:
     """Return the strongest tone, steady or decaying, for each effect that is a tone."""
     leads = []
-    for effect in scanner.spectral:
+    for effect in scanner.lines:
         found = []
         for scan, scores, p_values in zip(scanner.scans, tones, local, strict=True):
             # What a strong line leaks bounds its p-value, beside it: there the scores decide.
             sure = p_values <= max(float(p_values.min()), _SURE)
             index = int(np.argmax(np.where(sure, scores, -np.inf)))
-            shape = effect.tone(float(scan.frequency_hz[index]), scan.decay_s)
+            shape = effect.tone(float(scan.frequency_hz[index]), scan.decay_s, span)
             if shape is not None:
                 trials = Trials(0.5 * len(scores), 0.0)
                 p_value = trials.global_p_value(float(p_values[index]))

@@ -35,9 +35,14 @@ from pendpipe.dynamics.eq8 import OMEGA, Restoring
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import resonant_drive, slow_modulation
 from pendpipe.effects.catalogue.reading import (
+    PERSPECTIVE,
     SoftClipping,
     camera_beyond_a_quarter,
     camera_geometry,
+    gain_modulation,
+    hum_near_the_motion,
+    tone_pickup,
+    tone_with_harmonics,
 )
 from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN, circular_error
 from pendpipe.effects.curves import CURVES, Curve
@@ -327,9 +332,13 @@ def applicable(
             named = [camera_beyond_a_quarter if e is camera_geometry else e for e in named]
         return list(fit.model.admitted(named))
     keys = {effect.key for effect in fit.model.effects}
-    forms: list[Effect | None] = [SoftClipping(), resonant_drive, slow_modulation]
+    forms: list[Effect | None] = [SoftClipping(), resonant_drive, slow_modulation, gain_modulation]
     if any(effect.identifier == circular_error.identifier for effect in catalogue):
         forms.append(CIRCULAR_ERROR_IN.get(unit))
+    if tone_pickup.identifier not in used:
+        forms += (tone_with_harmonics, hum_near_the_motion)
+    if unit in ("m", "pixels") and camera_geometry.identifier not in used:
+        forms += PERSPECTIVE
     named += [form for form in forms if form and form.key not in keys]
     return [*fit.model.admitted(named), *undrawn(CURVES, fit)]
 

@@ -15,6 +15,7 @@ from pendpipe.diagnosis.refine import LARGE_PHASE_ERROR, Fit
 from pendpipe.diagnosis.values import last_in
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
+from pendpipe.effects.catalogue.reading import MAINS_HZ, MAINS_SD, folded, hum_near_the_motion
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, listed, with_error
 
@@ -52,7 +53,7 @@ def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
     harmonics = _harmonics(sampled.phase, difference)
     frequency = sampled.motion.angular_frequency / (2.0 * math.pi)
     lines: tuple[float, ...] = tuple(round(h * frequency, 9) for h in harmonics if h > 0)
-    tone = last_in(after, effect, "Hz") if effect.spectral else None
+    tone = _line(after, effect)
     if tone is not None:
         lines, harmonics = (tone.value,), ()
     mains = mains_of(tone, data) if tone is not None else ""
@@ -64,9 +65,12 @@ def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
     return replace(found, summary=summary)
 
 
-_MAINS_HZ: Final = (50.0, 60.0)  # of the world's grids
-_MAINS_SD: Final = 4e-4
-"""Relative standard deviation of a grid's frequency: 20 mHz at 50 Hz."""
+def _line(fit: Fit, effect: Effect) -> Estimate | None:
+    """Return the frequency of what is a tone, by its scan or near the motion; None for others."""
+    tone = effect.spectral or effect is hum_near_the_motion
+    return last_in(fit, effect, "Hz") if tone else None
+
+
 _BY_CHANCE: Final = 0.05
 """Largest part of all frequencies that the lines of the mains may take: else any line is one."""
 
@@ -74,8 +78,7 @@ _BY_CHANCE: Final = 0.05
 def mains_of(line: Estimate, data: Data) -> str:
     """Return which harmonic of 50 or 60 Hz is seen at a line's frequency; "" for none.
 
-    At f readings a second what has the frequency F is seen at ``|F - n f|``, n the nearest whole
-    number. A line is taken for it within two of its own and the grid's standard deviations.
+    A line is taken for one within two of its own and the grid's standard deviations.
 
     >>> even = Data(np.arange(900) / 46.61, np.zeros(900), 1 / 46.61, True, np.ones(900))
     >>> mains_of(Estimate(3.3854, 4e-5, "Hz"), even)
@@ -85,16 +88,16 @@ def mains_of(line: Estimate, data: Data) -> str:
         return ""
     rate, taken = (len(data) - 1) / float(data.time_s[-1] - data.time_s[0]), 0.0
     for order in itertools.count(1):
-        for mains in (order * each for each in _MAINS_HZ):
-            within = 2.0 * math.hypot(line.sd, _MAINS_SD * mains)
+        for mains in (order * each for each in MAINS_HZ):
+            within = 2.0 * math.hypot(line.sd, MAINS_SD * mains)
             taken += 4.0 * within / rate
             if taken > _BY_CHANCE:
                 return ""
-            if abs(abs(mains - rate * round(mains / rate)) - line.value) < within:
+            if abs(folded(mains, rate) - line.value) < within:
                 recorded = rate * data.fold * data.every  # the means of some are analysed
-                folded = f" folded at {recorded:.4g} readings a second"
-                folded = folded if mains > 0.5 * recorded else ""
-                return f"{mains:g} Hz{folded or ' of the mains'}"
+                said = f" folded at {recorded:.4g} readings a second"
+                said = said if mains > 0.5 * recorded else " of the mains"
+                return f"{mains:g} Hz{said}"
     return ""
 
 
@@ -161,7 +164,7 @@ def beat_of(fit: Fit, effect: Effect) -> float | None:
     phase, time = fit.at.sampled.phase, fit.at.sampled.time_s
     own = float(phase[-1] - phase[0]) / float(time[-1] - time[0]) / (2.0 * math.pi)
     beside = isinstance(effect, PlaneCoupling)
-    found = last_in(fit, effect, "Hz") if beside or effect.spectral else None
+    found = last_in(fit, effect, "Hz") if beside else _line(fit, effect)
     if found is None:
         return None
     off = abs(found.value if beside else found.value - own)

@@ -108,7 +108,7 @@ def with_other_noise(state: Hypothesis, task: Task) -> Hypothesis:
 def _not_red(fit: Fit, state: Hypothesis, task: Task) -> list[Effect]:
     """Return the names that red noise could be, beside those of a fit."""
     named = task.asked(fit, state.data.unit)
-    return [each for each in named if each.kind != "unnamed" and not each.spectral]
+    return [each for each in named if each.kind != "unnamed" and not each.has_lines]
 
 
 def _without_red_noise(state: Hypothesis, task: Task) -> tuple[float, Data, Noise] | None:

@@ -243,6 +243,11 @@ class Effect:
         return "rad" if unit == "rad/s" and on_motion else unit
 
     @property
+    def has_lines(self) -> bool:
+        """Whether a scan over frequency may find it (`tone`)."""
+        return type(self).tone is not Effect.tone
+
+    @property
     def one_sided(self) -> bool:
         """Whether it has one size, which is never negative."""
         positive = self.parameter_free or (bool(self.parameters) and self.parameters[0].low >= 0.0)
@@ -314,7 +319,7 @@ class Effect:
         """Return shapes about one that stands out in a scan, where a fit alone would get stuck."""
         return ()
 
-    def tone(self, frequency_hz: float, decay_time_s: float) -> Sequence[float] | None:
+    def tone(self, frequency_hz: float, decay_time_s: float, span: Span) -> Sequence[float] | None:
         """Return the shape of a tone that a scan has found; None if this effect makes none such.
 
         `decay_time_s` is inf for a steady tone.

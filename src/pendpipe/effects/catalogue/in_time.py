@@ -31,6 +31,7 @@ from pendpipe.effects.effect import (
     unusual_drift,
     without_template,
 )
+from pendpipe.effects.kicks import between_kicks, corner, pulse, repeated_kick
 from pendpipe.effects.two_modes import two_modes
 from pendpipe.effects.two_planes import planes, two_planes, waveform
 
@@ -90,7 +91,7 @@ def plane_band_hz(span: Span) -> float:
     discriminating_test=(
         "put a second sensor on the stand or on another point of the rod; release it again"
     ),
-    tone=lambda frequency_hz, decay_time_s: (
+    tone=lambda frequency_hz, decay_time_s, _: (
         None if math.isinf(decay_time_s) else (frequency_hz, decay_time_s)
     ),
     shapes=lambda span: rows(
@@ -234,7 +235,7 @@ class SteadyTone(Effect):
     sizes = 2
     spectral = True
 
-    def tone(self, frequency_hz: float, decay_time_s: float) -> tuple[float] | None:
+    def tone(self, frequency_hz: float, decay_time_s: float, span: Span) -> tuple[float] | None:
         """A steady tone."""
         return (frequency_hz,) if math.isinf(decay_time_s) else None
 
@@ -278,14 +279,14 @@ periodic_drive: Final = _drive(
     ),
 )
 
-_APART: Final = 0.8
+APART: Final = 0.8
 """Of 1/duration between frequencies near resonance: half of it from one, two thirds of the power of
 a steady tone are seen."""
 
 
 def _near_resonance(span: Span) -> list[tuple[float, ...]]:
     """On both sides of the pendulum's frequency, where the scan for tones leaves it alone."""
-    beats = np.arange(0.5 * _APART, plane_band_hz(span) * span.duration_s, _APART)
+    beats = np.arange(0.5 * APART, plane_band_hz(span) * span.duration_s, APART)
     own = 1.0 / span.period_s
     return rows(own + np.array([*(-beats[::-1]), *beats]) / span.duration_s)
 
@@ -296,8 +297,65 @@ def _near_by_chance(values: FloatArray, span: Span) -> float:
     return -2.0 * math.log(min(max(2.0 * apart, 1e-6), 1.0))
 
 
+def _kicked(
+    time_s: FloatArray, values: FloatArray, pendulum: Pendulum, about_s: float
+) -> Start | None:
+    """Start at the kicks that stand out of the readings, a period apart."""
+    sine = pendulum.restoring == "sine"
+    found = repeated_kick(time_s, values, pendulum.angular_frequency, sine=sine)
+    if found is None:
+        return None
+    law = Eq8(found.omega, 0.0, 0.5 * found.loss, 0.5 * found.loss, restoring=pendulum.restoring)
+    turns = round((found.phase_rad + found.omega * (about_s - time_s[0])) / math.pi)
+    late = (turns * math.pi - found.phase_rad) / found.omega
+    size = (-1.0) ** turns * found.amplitude * math.exp(-found.loss * late)
+    at = Release(float(time_s[0]) + late, size)
+    return Start(repeated_kicks, law, at, np.array([found.kick, found.period_s, found.first_s]))
+
+
+def _anywhere(values: FloatArray, span: Span) -> float:
+    """Twice the logarithm of the periods and instants tried, a quarter of a cycle apart."""
+    instants = 4.0 * np.array([span.duration_s, float(values[1])]) / span.period_s
+    return 2.0 * float(np.log(np.maximum(instants, 1.0)).sum())
+
+
+@enters(
+    "acceleration",
+    identifier="periodic-drive",
+    key="periodic-drive:kicks",
+    name="kick that is repeated",
+    equation=r"\ddot x \mathrel{+}= \Delta v \sum_k \delta(t - t_1 - k T_k)",
+    parameters=(
+        Parameter("dv", "rad/s", -100.0, 100.0, word="change of velocity"),
+        Parameter("period", "s", 1e-2, 1e6, word="every"),
+        Parameter("first", "s", -math.inf, math.inf, word="first at"),
+    ),
+    nodes=30,
+    discriminating_test="record the pendulum at rest: it must begin to swing at the same instants",
+    prior_penalty=_anywhere,
+    reading=lambda sampled, pendulum, values: (
+        values[0] * corner(between_kicks(sampled.time_s, *values[1:]), pendulum.angular_frequency)
+    ),
+)
+def repeated_kicks(
+    motion: Motion, pendulum: Pendulum, kick: float, period_s: float, first_s: float
+) -> FloatArray:
+    """A knock again and again: one cause of lines at all multiples of 1/T_k.
+
+    The form of `periodic-drive` at which a restart begins. Each kick takes an eighth of a cycle in
+    the motion, and the reading has the corner that a sharp one makes.
+    """
+    late = between_kicks(motion.time_s, period_s, first_s)
+    pulses = pulse(late, pendulum.angular_frequency) * (since_release(motion, pendulum) > 0.0)
+    return np.asarray(kick * pulses)
+
+
 resonant_drive: Final = _drive(
-    Effect, key="periodic-drive:near", shapes=_near_resonance, prior_penalty=_near_by_chance
+    Effect,
+    key="periodic-drive:near",
+    shapes=_near_resonance,
+    prior_penalty=_near_by_chance,
+    restart=_kicked,
 )
 """The form that is looked for near resonance: it beats with the motion, and does not decay."""
 
@@ -308,10 +366,11 @@ def _keeps_in_step(values: FloatArray, span: Span) -> float:
     return -2.0 * math.log(min(max(4.0 * slipped, 1e-6), 1.0))
 
 
-def _parametric(**more: Any) -> Effect:
+def _parametric(base: type[Effect], **more: Any) -> Effect:
     """Declare the parametric drive; `more` is what distinguishes a form of it."""
     return enters(
         "acceleration",
+        base,
         identifier="parametric-drive",
         name="parametric drive",
         equation=r"\omega^2 x \to \omega^2 x (1 + h_c \cos 2\pi f_h t + h_s \sin 2\pi f_h t)",
@@ -339,22 +398,50 @@ def _modulated(
 
 
 parametric_drive: Final = _parametric(
+    Effect,
     example=(2e-4, 1e-4, 1.85),
     shapes=lambda span: rows(2.0 / span.period_s - np.ravel(_detunings(span))),
     prior_penalty=_keeps_in_step,
 )
 
-slow_modulation: Final = _parametric(
-    key="parametric-drive:slow",
-    shapes=lambda span: rows(
-        np.arange(_SLOWEST, plane_band_hz(span) * span.duration_s, _APART) / span.duration_s
-    ),
-    # Of less than one cycle it is a drift.
-    prior_penalty=lambda values, span: (
-        -2.0 * math.log(min(max(float(values[2]) * span.duration_s, 1e-6), 1.0))
-    ),
-)
-"""The form that is looked for at slow changes of the stiffness."""
+
+def slow_rates(span: Span) -> list[tuple[float, ...]]:
+    """Frequencies of a slow modulation, whose side bands lie where no tone is looked for."""
+    cycles = np.arange(_SLOWEST, plane_band_hz(span) * span.duration_s, APART)
+    return rows(cycles / span.duration_s)
+
+
+def less_than_a_cycle(values: FloatArray, span: Span) -> float:
+    """Twice the logarithm by which a modulation is less likely as slow: that is a drift."""
+    return -2.0 * math.log(min(max(float(values[2]) * span.duration_s, 1e-6), 1.0))
+
+
+class Modulation(Effect):
+    """What makes two lines at equal distances from the motion's frequency.
+
+    Within some lines' widths of it these are looked for at once, farther out a scan over frequency
+    finds either of them.
+    """
+
+    sizes = 2
+
+    def shapes(self, span: Span) -> list[tuple[float, ...]]:
+        """Frequencies whose side bands lie where no tone is looked for."""
+        cycles = np.arange(_SLOWEST, plane_band_hz(span) * span.duration_s, APART)
+        return rows(cycles / span.duration_s)
+
+    def tone(self, frequency_hz: float, decay_time_s: float, span: Span) -> tuple[float] | None:
+        """The distance of a line from the motion's frequency."""
+        steady = math.isinf(decay_time_s) and frequency_hz < 2.0 / span.period_s
+        return (abs(frequency_hz - 1.0 / span.period_s),) if steady else None
+
+    def prior_penalty(self, values: FloatArray, span: Span) -> float:
+        """Of less than one cycle it is a drift."""
+        return -2.0 * math.log(min(max(float(values[2]) * span.duration_s, 1e-6), 1.0))
+
+
+slow_modulation: Final = _parametric(Modulation, key="parametric-drive:slow")
+"""The form that is looked for at changes of the stiffness that are slower than the motion."""
 
 
 broadband_drive: Final[Effect] = without_template(

@@ -1,5 +1,6 @@
 """What stands between the motion and the file: sensor, time base, noise."""
 
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any, Final
@@ -8,7 +9,14 @@ import numpy as np
 
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.any_law import Sampled
-from pendpipe.effects.catalogue.in_time import SteadyTone, tone_at, tried_frequencies
+from pendpipe.effects.catalogue.in_time import (
+    APART,
+    Modulation,
+    SteadyTone,
+    plane_band_hz,
+    tone_at,
+    tried_frequencies,
+)
 from pendpipe.effects.effect import (
     INSTANT,
     RELAXATION,
@@ -68,15 +76,20 @@ def _camera(**more: Any) -> Callable[[Callable[..., Any]], Effect]:
     return enters(
         "reading",
         identifier="camera-geometry",
-        name="geometry of the camera (pivot, obliquity), or an encoder's eccentricity",
-        rare=True,
-        angular=True,
         discriminating_test="move the camera, or turn the encoder on its shaft by a quarter turn",
         **more,
     )
 
 
+_ANGLES: Final = {
+    "name": "geometry of the camera (pivot, obliquity), or an encoder's eccentricity",
+    "rare": True,
+    "angular": True,
+}
+
+
 @_camera(
+    **_ANGLES,
     equation=r"y = x + e_1 (\cos x - 1) + e_2 \sin 2x",
     parameters=_MISPLACED,
     sizes=2,
@@ -97,6 +110,7 @@ def _misplaced(angle: FloatArray, e_1: float, e_2: float) -> FloatArray:
 
 
 @_camera(
+    **_ANGLES,
     key="camera-geometry:wide",
     equation=r"y = x + e_1 (\cos x - 1) + e_2 \sin 2x + e_3 (\cos 2x - 1)",
     parameters=(*_MISPLACED, Parameter("e_3", "rad", -0.5, 0.5, word="cos 2x term")),
@@ -112,6 +126,47 @@ def camera_beyond_a_quarter(
     """
     angle = sampled.angle
     return np.asarray(_misplaced(angle, e_1, e_2) + e_3 * (np.cos(2.0 * angle) - 1.0))
+
+
+_PERSPECTIVE: Final = Parameter("p", "1/rad", -0.5, 0.5, word="perspective")
+
+
+_BY_CAMERA: Final = 3.2
+"""2 ln 5: of twelve collections of others' positions ten are by video, one each by echo and laser,
+so that a curved scale of positions is rather a camera's than another sensor's."""
+
+
+def _on_an_image(key: str, **more: Any) -> Effect:
+    """Declare a form of the camera's geometry in positions; `more` is what distinguishes it."""
+    name = "perspective of the camera, or its lens"
+    return _camera(key=f"camera-geometry:{key}", name=name, prior=_BY_CAMERA, **more)(
+        _seen_obliquely
+    )
+
+
+def _seen_obliquely(sampled: Sampled, pendulum: Pendulum, p: float, k: float = 0.0) -> FloatArray:
+    """The position on an image: what comes nearer is larger, and a lens bends what is far out.
+
+    A camera at a distance D that looks at the plane of swing from an angle beta has
+    p = sin(beta)/D; a lens adds the cube of the distance from its centre.
+    """
+    x = sampled.angle
+    return np.asarray(-p * x * x / (1.0 + p * x) + k * (x * x * x))
+
+
+PERSPECTIVE: Final = (
+    _on_an_image("position", equation=r"y = \frac{x}{1 + p x}", parameters=(_PERSPECTIVE,)),
+    _on_an_image(
+        "lens",
+        equation=r"y = \frac{x}{1 + p x} + k x^3",
+        parameters=(
+            _PERSPECTIVE,
+            Parameter("k", "1/rad^2", -0.5, 0.5, word="distortion of the lens"),
+        ),
+        sizes=2,
+    ),
+)
+"""The forms that are looked for in positions."""
 
 
 @enters(
@@ -171,6 +226,37 @@ def gain_drift(sampled: Sampled, pendulum: Pendulum, rate: float, tau: float) ->
     return np.asarray(rate * relaxed(elapsed(sampled.time_s), tau) * sampled.angle)
 
 
+_CYCLES: Final = 3.0
+"""Of a gain's change within the recording at least: any smooth curve of six numbers has three."""
+
+
+@enters(
+    "reading",
+    Modulation,
+    identifier="gain-drift",
+    key="gain-drift:periodic",
+    name="gain that changes periodically",
+    equation=r"y = x (1 + g_c \cos 2\pi f_g t + g_s \sin 2\pi f_g t)",
+    parameters=(
+        Parameter("g_cosine", "1", -1.0, 1.0, word="relative amplitude"),
+        Parameter("g_sine", "1", -1.0, 1.0, 0.0, word="relative amplitude"),
+        Parameter("f_g", "Hz", 0.0, 1e6, word="frequency"),
+    ),
+    # Fewer cycles are a drift, which curves follow as well.
+    bounds=lambda duration_s=math.inf: [(-1.0, 1.0), (-1.0, 1.0), (_CYCLES / duration_s, 1e6)],
+    discriminating_test=type(gain_drift).discriminating_test,
+)
+def gain_modulation(
+    sampled: Sampled, pendulum: Pendulum, cosine: float, sine: float, f_g: float
+) -> FloatArray:
+    """The sensor's constant goes up and down: side bands that are in phase with the motion.
+
+    Those of a stiffness that does are in quadrature, and the farther apart the smaller.
+    """
+    phase = 2.0 * math.pi * f_g * elapsed(sampled.time_s)
+    return np.asarray(tone_at(cosine, sine, phase) * sampled.angle)
+
+
 @enters(
     "reading",
     identifier="ac-coupling",
@@ -196,28 +282,99 @@ def ac_coupling(sampled: Sampled, pendulum: Pendulum, level: float, tau: float) 
     return np.asarray(level * np.exp(-elapsed(sampled.time_s) / tau))
 
 
-@enters(
-    "reading",
-    SteadyTone,
-    identifier="tone-pickup",
-    name="tone in the reading",
-    equation=r"y = x + a_c \cos 2\pi f_a t + a_s \sin 2\pi f_a t",
-    parameters=(
-        Parameter("a_cosine", "rad", -10.0, 10.0, word="amplitude"),
-        Parameter("a_sine", "rad", -10.0, 10.0, 0.0, word="amplitude"),
-        Parameter("f_a", "Hz", 0.0, 1e6, word="frequency"),
-    ),
-    example=(1e-3, 5e-4, 3.3),
-    discriminating_test=(
-        "record with the pendulum held, and at another sampling rate: an alias moves"
-    ),
-    shapes=lambda span: rows(tried_frequencies(span, 0.2 / span.period_s)),
+_AMPLITUDES: Final = (
+    Parameter("a_cosine", "rad", -10.0, 10.0, word="amplitude"),
+    Parameter("a_sine", "rad", -10.0, 10.0, 0.0, word="amplitude"),
 )
-def tone_pickup(
+_FREQUENCY: Final = Parameter("f_a", "Hz", 0.0, 1e6, word="frequency")
+_HARMONICS: Final = 3
+"""Of a hum: mains, rectified mains, and the third of a magnetising current, which is saturated."""
+MAINS_HZ: Final = (50.0, 60.0)  # of the world's grids
+MAINS_SD: Final = 4e-4
+"""Relative standard deviation of a grid's frequency: 20 mHz at 50 Hz."""
+
+
+def _pickup(base: type[Effect], **more: Any) -> Callable[[Callable[..., Any]], Effect]:
+    """Declare a form of the tone; `more` is what distinguishes it."""
+    return enters(
+        "reading",
+        base,
+        identifier="tone-pickup",
+        discriminating_test=(
+            "record with the pendulum held, and at another sampling rate: an alias moves"
+        ),
+        **more,
+    )
+
+
+def _tone(
     sampled: Sampled, pendulum: Pendulum, cosine: float, sine: float, f_a: float
 ) -> FloatArray:
     """A steady tone in the reading, the alias of the mains for instance."""
     return tone_at(cosine, sine, 2.0 * math.pi * f_a * elapsed(sampled.time_s))
+
+
+tone_pickup: Final = _pickup(
+    SteadyTone,
+    name="tone in the reading",
+    equation=r"y = x + a_c \cos 2\pi f_a t + a_s \sin 2\pi f_a t",
+    parameters=(*_AMPLITUDES, _FREQUENCY),
+    example=(1e-3, 5e-4, 3.3),
+    shapes=lambda span: rows(tried_frequencies(span, 0.2 / span.period_s)),
+)(_tone)
+
+
+def folded(frequency_hz: float, rate_hz: float) -> float:
+    """Return where a frequency is seen by readings at a rate: at abs(F - n f), n the nearest."""
+    return abs(frequency_hz - rate_hz * round(frequency_hz / rate_hz))
+
+
+def _near_the_motion(span: Span) -> list[tuple[float, ...]]:
+    """Where the mains fold onto the motion, whose neighbourhood the scan for tones leaves alone."""
+    found = list[tuple[float, ...]]()
+    for order, each in itertools.product(range(1, _HARMONICS + 1), MAINS_HZ):
+        within, step = 2.0 * MAINS_SD * order * each, APART / span.duration_s
+        tried = folded(order * each, 1.0 / span.interval_s) + np.arange(-within, within, step)
+        found += rows(tried[np.abs(tried - 1.0 / span.period_s) < plane_band_hz(span)])
+    return found
+
+
+_FAMILY: Final = tuple(
+    each._replace(name=f"{each.name}_{order}")
+    for order in range(1, _HARMONICS + 1)
+    for each in _AMPLITUDES
+)
+
+
+@_pickup(
+    SteadyTone,
+    key="tone-pickup:harmonics",
+    name="tone in the reading, with its harmonics",
+    equation=(r"y = x + \sum_{k=1}^3 (a_{ck} \cos 2\pi k f_a t + a_{sk} \sin 2\pi k f_a t)"),
+    parameters=(*_FAMILY, _FREQUENCY),
+    sizes=len(_FAMILY),
+    shapes=type(tone_pickup).shapes,
+)
+def tone_with_harmonics(sampled: Sampled, pendulum: Pendulum, *values: float) -> FloatArray:
+    """A tone with its harmonics, one cause: the sampling folds each of them to its own place.
+
+    The harmonics of a folded tone are those of the tone, folded.
+    """
+    phase = 2.0 * math.pi * values[-1] * elapsed(sampled.time_s)
+    pairs = zip(values[0:-1:2], values[1:-1:2], strict=True)
+    parts = [tone_at(*pair, order * phase) for order, pair in enumerate(pairs, 1)]
+    return np.asarray(np.sum(parts, axis=0))
+
+
+hum_near_the_motion: Final = _pickup(
+    Effect,
+    key="tone-pickup:near",
+    name="mains hum that the sampling folds onto the motion",
+    equation=type(tone_pickup).equation,
+    parameters=type(tone_pickup).parameters,
+    sizes=2,
+    shapes=_near_the_motion,
+)(_tone)
 
 
 clipping: Final[Effect] = without_template(
@@ -414,11 +571,15 @@ def dropped_samples(time_s: FloatArray, late_s: float, instant_s: float) -> Floa
     return np.asarray(late_s * reading_step(time_s, instant_s))
 
 
+_ROWS: Final = 4
+"""Times that a row is read where the mark was found: an error of (omega kappa x)^5 is left."""
+
+
 @enters(
     "reading",
     identifier="rolling-shutter",
     name="rolling shutter",
-    equation=r"y(t) = x(t + \kappa x)",
+    equation=r"y(t) = x(t + \kappa y)",
     parameters=(Parameter("kappa", "s/rad", -1.0, 1.0, word="delay"),),
     rare=True,
     example=(0.005,),
@@ -431,8 +592,10 @@ def rolling_shutter(sampled: Sampled, pendulum: Pendulum, kappa: float) -> Float
     -omega kappa y^2/2 sin 2 psi.
     """
     omega = pendulum.angular_frequency
-    turned = omega * kappa * sampled.angle
-    moved = sampled.angle * (np.cos(turned) - 1.0) + sampled.velocity / omega * np.sin(turned)
+    moved = np.zeros_like(sampled.angle)
+    for _ in range(_ROWS):
+        turned = omega * kappa * (sampled.angle + moved)
+        moved = sampled.angle * (np.cos(turned) - 1.0) + sampled.velocity / omega * np.sin(turned)
     return np.asarray(moved)
 
 
