@@ -25,7 +25,9 @@ _QUIET: Final = 0.2
 _FEWEST: Final = 4
 """Kicks at least: two instants and a size are fitted, and one is told."""
 _AROUND: Final = 15
-"""Cycles of which the median says what changes without a kick: a kick is in two of three."""
+"""Cycles whose median is the usual change: of four from kick to kick, two have none of it."""
+_MOST: Final = 600
+"""Cycles that are searched, the first ones: 20,000 periods are tried on them."""
 _CLEAR: Final = 5.5
 """Largest mean over its standard deviation: 1e6 periods and instants give 5.2 by chance, and a comb
 about (kicks cycles_between)^(1/2), since its own kicks are the scatter."""
@@ -63,9 +65,9 @@ def repeated_kick(
         Whether the torque is that of a pendulum, which swings the slower the wider.
     """
     time, cycle = time_s - time_s[0], 2.0 * math.pi / omega
-    edges = np.searchsorted(time, np.arange(0.0, time[-1], cycle))
+    edges = np.searchsorted(time, np.arange(0.0, time[-1], cycle)[:_MOST])
     slow = slow_amplitude(omega * time, values, edges.tolist())
-    if len(slow) < max(2 * _AROUND, _FEWEST * _SHORTEST) or not np.all(np.abs(slow) > 0.0):
+    if len(slow) < 2 * _AROUND or not np.all(np.abs(slow) > 0.0):
         return None
     steps = slow[1:] / slow[:-1]
     grown, turned = np.log(np.abs(steps)), np.angle(steps)
@@ -75,14 +77,13 @@ def repeated_kick(
     if found is None:
         return None
     size, period, first = found
-    first = first % period
     square = np.abs(slow[:-1]) ** 2
     quicker = float(np.median(usual.imag / cycle + (omega * square / 16.0 if sine else 0.0)))
     own = slow[0] * np.exp(-0.5 * usual[0])
     return Found(
         size * omega,
         period,
-        float(time_s[0]) + first,
+        float(time_s[0]) + first % period,
         omega + quicker,
         -float(np.median(usual.real)) / cycle,
         float(abs(own)),
