@@ -54,7 +54,7 @@ def locate(before: Fit, after: Fit, data: Data, effect: Effect) -> Location:
     frequency = sampled.motion.angular_frequency / (2.0 * math.pi)
     lines: tuple[float, ...] = tuple(round(h * frequency, 9) for h in harmonics if h > 0)
     tone = _line(after, effect)
-    if tone is not None:
+    if tone is not None and effect.spectral:  # near the motion the fit without it has a part
         lines, harmonics = (tone.value,), ()
     mains = mains_of(tone, data) if tone is not None else ""
     found = Location(time, amplitude, phase, lines, harmonics, mains=mains)
