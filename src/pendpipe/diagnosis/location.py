@@ -1,6 +1,5 @@
 """Where an effect shows: time, amplitude, phase of the cycle, frequency, harmonic."""
 
-import itertools
 import math
 from dataclasses import replace
 from typing import Final
@@ -15,7 +14,7 @@ from pendpipe.diagnosis.refine import LARGE_PHASE_ERROR, Fit
 from pendpipe.diagnosis.values import last_in
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
-from pendpipe.effects.catalogue.reading import MAINS_HZ, MAINS_SD, folded, hum_near_the_motion
+from pendpipe.effects.catalogue.reading import hum_near_the_motion, mains_lines
 from pendpipe.estimate import Estimate
 from pendpipe.quantities import after_number, listed, with_error
 
@@ -71,14 +70,8 @@ def _line(fit: Fit, effect: Effect) -> Estimate | None:
     return last_in(fit, effect, "Hz") if tone else None
 
 
-_BY_CHANCE: Final = 0.05
-"""Largest part of all frequencies that the lines of the mains may take: else any line is one."""
-
-
 def mains_of(line: Estimate, data: Data) -> str:
     """Return which harmonic of 50 or 60 Hz is seen at a line's frequency; "" for none.
-
-    A line is taken for one within two of its own and the grid's standard deviations.
 
     >>> even = Data(np.arange(900) / 46.61, np.zeros(900), 1 / 46.61, True, np.ones(900))
     >>> mains_of(Estimate(3.3854, 4e-5, "Hz"), even)
@@ -86,18 +79,12 @@ def mains_of(line: Estimate, data: Data) -> str:
     """
     if not data.uniform:
         return ""
-    rate, taken = (len(data) - 1) / float(data.time_s[-1] - data.time_s[0]), 0.0
-    for order in itertools.count(1):
-        for mains in (order * each for each in MAINS_HZ):
-            within = 2.0 * math.hypot(line.sd, MAINS_SD * mains)
-            taken += 4.0 * within / rate
-            if taken > _BY_CHANCE:
-                return ""
-            if abs(folded(mains, rate) - line.value) < within:
-                recorded = rate * data.fold * data.every  # the means of some are analysed
-                said = f" folded at {recorded:.4g} readings a second"
-                said = said if mains > 0.5 * recorded else " of the mains"
-                return f"{mains:g} Hz{said}"
+    rate = (len(data) - 1) / float(data.time_s[-1] - data.time_s[0])
+    for mains, seen, within in mains_lines(rate, line.sd):
+        if abs(seen - line.value) < within:
+            recorded = rate * data.fold * data.every  # the means of some are analysed
+            folded = f" folded at {recorded:.4g} readings a second"
+            return f"{mains:g} Hz{folded if mains > 0.5 * recorded else ' of the mains'}"
     return ""
 
 

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -289,9 +289,27 @@ _AMPLITUDES: Final = (
 _FREQUENCY: Final = Parameter("f_a", "Hz", 0.0, 1e6, word="frequency")
 _HARMONICS: Final = 3
 """Of a hum: mains, rectified mains, and the third of a magnetising current, which is saturated."""
-MAINS_HZ: Final = (50.0, 60.0)  # of the world's grids
-MAINS_SD: Final = 4e-4
+_MAINS_HZ: Final = (50.0, 60.0)  # of the world's grids
+_MAINS_SD: Final = 4e-4
 """Relative standard deviation of a grid's frequency: 20 mHz at 50 Hz."""
+_BY_CHANCE: Final = 0.05
+"""Largest part of all frequencies that the lines of the mains may take: else any line is one."""
+
+
+def mains_lines(rate_hz: float, sd_hz: float = 0.0) -> Iterator[tuple[float, float, float]]:
+    """Yield the harmonics of 50 and 60 Hz: the frequency, where it is seen, and how far about that.
+
+    At f readings a second what has the frequency F is seen at ``|F - n f|``, n the nearest whole
+    number, within two standard deviations of the grid's and of the line's own, `sd_hz`.
+    """
+    taken = 0.0
+    for order in itertools.count(1):
+        for mains in (order * each for each in _MAINS_HZ):
+            within = 2.0 * math.hypot(sd_hz, _MAINS_SD * mains)
+            taken += 4.0 * within / rate_hz
+            if taken > _BY_CHANCE:
+                return
+            yield mains, abs(mains - rate_hz * round(mains / rate_hz)), within
 
 
 def _pickup(base: type[Effect], **more: Any) -> Callable[[Callable[..., Any]], Effect]:
@@ -324,17 +342,11 @@ tone_pickup: Final = _pickup(
 )(_tone)
 
 
-def folded(frequency_hz: float, rate_hz: float) -> float:
-    """Return where a frequency is seen by readings at a rate: at abs(F - n f), n the nearest."""
-    return abs(frequency_hz - rate_hz * round(frequency_hz / rate_hz))
-
-
 def _near_the_motion(span: Span) -> list[tuple[float, ...]]:
     """Where the mains fold onto the motion, whose neighbourhood the scan for tones leaves alone."""
     found = list[tuple[float, ...]]()
-    for order, each in itertools.product(range(1, _HARMONICS + 1), MAINS_HZ):
-        within, step = 2.0 * MAINS_SD * order * each, APART / span.duration_s
-        tried = folded(order * each, 1.0 / span.interval_s) + np.arange(-within, within, step)
+    for _, seen, within in mains_lines(1.0 / span.interval_s):
+        tried = seen + np.arange(-within, within, APART / span.duration_s)
         found += rows(tried[np.abs(tried - 1.0 / span.period_s) < plane_band_hz(span)])
     return found
 
