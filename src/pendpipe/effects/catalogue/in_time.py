@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
@@ -424,10 +424,18 @@ class Modulation(Effect):
     """
 
     sizes = 2
+    fewest: ClassVar[float] = 0.0
+    """Cycles within the recording at least."""
+
+    def bounds(self, duration_s: float = math.inf) -> list[tuple[float, float]]:
+        """Fewer cycles are a drift, which curves follow as well."""
+        *sizes, (_, fastest) = super().bounds(duration_s)
+        return [*sizes, (self.fewest / duration_s, fastest)]
 
     def shapes(self, span: Span) -> list[tuple[float, ...]]:
         """Frequencies whose side bands lie where no tone is looked for."""
-        cycles = np.arange(_SLOWEST, plane_band_hz(span) * span.duration_s, APART)
+        slowest = max(self.fewest, _SLOWEST)
+        cycles = np.arange(slowest, plane_band_hz(span) * span.duration_s, APART)
         return rows(cycles / span.duration_s)
 
     def tone(self, frequency_hz: float, decay_time_s: float, span: Span) -> tuple[float] | None:

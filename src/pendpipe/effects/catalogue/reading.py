@@ -226,10 +226,6 @@ def gain_drift(sampled: Sampled, pendulum: Pendulum, rate: float, tau: float) ->
     return np.asarray(rate * relaxed(elapsed(sampled.time_s), tau) * sampled.angle)
 
 
-_CYCLES: Final = 3.0
-"""Of a gain's change within the recording at least: any smooth curve of six numbers has three."""
-
-
 @enters(
     "reading",
     Modulation,
@@ -242,8 +238,8 @@ _CYCLES: Final = 3.0
         Parameter("g_sine", "1", -1.0, 1.0, 0.0, word="relative amplitude"),
         Parameter("f_g", "Hz", 0.0, 1e6, word="frequency"),
     ),
-    # Fewer cycles are a drift, which curves follow as well.
-    bounds=lambda duration_s=math.inf: [(-1.0, 1.0), (-1.0, 1.0), (_CYCLES / duration_s, 1e6)],
+    # Any smooth curve of six numbers has three.
+    fewest=3.0,
     discriminating_test=type(gain_drift).discriminating_test,
 )
 def gain_modulation(
