@@ -556,7 +556,6 @@ def test_a_period_that_lengthens_as_a_pendulum_s_tells_the_unit(factor: float) -
 # What may follow a half cycle freely, to within a few percent of each limit.
 
 HALF = 0.7
-EVERYTHING = slice(0, 1000)
 
 
 def half_cycles(
@@ -579,7 +578,7 @@ def decay(count: int = 30, share: float = 0.02) -> np.ndarray:
 
 def ends(cycles: HalfCycles) -> list[tuple[int, int]]:
     """First and last half cycle of each run, in the order of time."""
-    return sorted((run.first, run.last) for run in best_runs(cycles, EVERYTHING))
+    return sorted((run.first, run.last) for run in best_runs(cycles))
 
 
 def kicked(factor: float, at: int = 15) -> np.ndarray:
@@ -694,7 +693,7 @@ def held_up(count: int, after: int = 40) -> np.ndarray:
 def test_a_front_held_up_is_cut_where_the_fall_begins(
     swing: np.ndarray, step: float, begins: int | None
 ) -> None:
-    (run,) = best_runs(half_cycles(swing, step=step), EVERYTHING)
+    (run,) = best_runs(half_cycles(swing, step=step))
     assert run.driven == (begins is not None)
     assert run.first == pytest.approx(begins or 0, abs=3 if begins else 0)
 
@@ -715,7 +714,7 @@ LAST = decay()[-1]
 def test_a_decay_fades_unless_the_record_ends_in_a_pull(
     step: float, ending: float, fades: bool
 ) -> None:
-    (run,) = best_runs(half_cycles(decay(), step=step, ending=ending), EVERYTHING)
+    (run,) = best_runs(half_cycles(decay(), step=step, ending=ending))
     assert run.fades == fades
 
 
@@ -760,7 +759,7 @@ def test_wild_half_cycles_are_bridged_and_counted() -> None:
     swing = decay(40)
     swing[[10, 11, 12]] = [0.05, 1.5, 0.05]
     swing[[25, 26]] = [1.5, 0.05]
-    (run,) = best_runs(half_cycles(swing), EVERYTHING)
+    (run,) = best_runs(half_cycles(swing))
     assert (run.first, run.last, run.bridged) == (0, 39, 5)
 
 
@@ -768,7 +767,7 @@ def test_wild_half_cycles_are_bridged_and_counted() -> None:
 def test_a_run_before_a_rest_fades_and_before_a_knock_does_not(pause: float, fades: bool) -> None:
     swing, half = np.concatenate((decay(20), 3.0 * decay(20))), np.full(39, HALF)
     half[19] *= pause
-    found = {run.first: run.fades for run in best_runs(half_cycles(swing, half), EVERYTHING)}
+    found = {run.first: run.fades for run in best_runs(half_cycles(swing, half))}
     assert found[0] == fades
 
 

@@ -29,7 +29,7 @@ from pendpipe.analysis.half_cycles import (
 from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.find import find_turning_points
 from pendpipe.analysis.turning_points.table import Cut, TurningPoints
-from pendpipe.arrays import FloatArray, median
+from pendpipe.arrays import BoolArray, FloatArray, IntArray, median
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.quantities import after_number, with_error
 from pendpipe.recording import Recording
@@ -56,8 +56,12 @@ _SMOOTH: Final = 0.03
 """Of means of neighbours, which chance makes smooth as well."""
 
 
+_FEW_LINKS: Final = 6
+"""Links in a row of which those two apart are too few to tell how even all are."""
 _PRICE: Final = 2.0
 """Of two half cycles that go on, which a disturbance costs: fewer behind it show nothing."""
+_COUNTLESS: Final = 4.5
+"""Half periods of a disturbance up to which the motion's phase shows by itself."""
 _NEAR: Final = 5
 """Half cycles back to which a motion goes on, disturbed ones among them."""
 
@@ -68,23 +72,23 @@ class Run:
 
     Parameters
     ----------
-    piece
-        The readings of the record, between gaps, that they are in.
     cycles
-        All half cycles of that piece.
+        All half cycles of the record.
     bridged
         Disturbed half cycles inside.
+    score
+        How freely they follow one another.
     fades
         Whether it ends in its own rest or with the record, rather than in something else.
     driven
         Whether the amplitude was held up before.
     """
 
-    piece: slice
     cycles: HalfCycles
     first: int
     last: int
     bridged: int = 0
+    score: float = 0.0
     fades: bool = False
     driven: bool = False
 
@@ -119,20 +123,23 @@ class Run:
         return self.last - self.first + 1
 
 
-def best_runs(cycles: HalfCycles, piece: slice) -> list[Run]:
-    """Find the runs among the half cycles of a piece of the record, the most telling first."""
+def best_runs(cycles: HalfCycles, gaps_s: Sequence[float] | FloatArray = ()) -> list[Run]:
+    """Find the runs among the half cycles of a record with gaps at some times, the best first."""
     if len(cycles) < LEAST_HALF_CYCLES:
         return []
-    chains = [chain for chain in _chains(cycles) if _regular(cycles, chain)]
-    runs = (Run(piece, cycles, one[0], one[-1], one[-1] - one[0] + 1 - len(one)) for one in chains)
+    runs = (
+        Run(cycles, one[0], one[-1], one[-1] - one[0] + 1 - len(one), score)
+        for score, one in _chains(cycles, np.searchsorted(gaps_s, cycles.middle_s).tolist())
+        if len(one) >= LEAST_HALF_CYCLES
+    )
     return sorted((_undriven(_fading(run)) for run in runs), key=lambda run: -run.worth)
 
 
-def _chains(cycles: HalfCycles) -> list[list[int]]:
+def _chains(cycles: HalfCycles, piece: Sequence[int]) -> list[tuple[float, list[int]]]:
     """Align half cycles to chains, each of one free motion: a chain ends where its score is most.
 
     (Smith and Waterman's alignment of pieces.) A half cycle goes on from the one before at a score
-    of up to 1, or over disturbed ones, at a price.
+    of up to 1, or over disturbed ones, or a gap to the next `piece` of the record, at a price.
     """
     half = _running_median(np.diff(cycles.middle_s))
     follows, usual = _follows(cycles, half).tolist(), half.tolist()
@@ -145,7 +152,11 @@ def _chains(cycles: HalfCycles) -> list[list[int]]:
         links = [(score[at] + follows[at], at)]
         if follows[at] < 0.0 or size > _RISE * floor[at] + _TAIL * first[at] + step:
             links = [
-                (score[at] + _over(cycles, at, here, top[at], usual), at)
+                (
+                    score[at]
+                    + _over(cycles, at, here, top[at], usual, gap=piece[at] < piece[here]),
+                    at,
+                )
                 for at in range(max(0, here - _NEAR), here)
             ]
         # What is smaller than the next, and begins the motion, is a pull.
@@ -157,7 +168,7 @@ def _chains(cycles: HalfCycles) -> list[list[int]]:
             score[here], before[here], first[here], top[here] = most, at, first[at], three[-1]
             # Of the least a wild one is none.
             floor[here] = min(floor[at], three[1])
-    chains, free = list[list[int]](), [True] * len(swing)
+    chains, free = list[tuple[float, list[int]]](), [True] * len(swing)
     for last in sorted(range(len(swing)), key=score.__getitem__, reverse=True):
         chain, at = [last], before[last]
         while at >= 0 and free[last]:
@@ -165,7 +176,7 @@ def _chains(cycles: HalfCycles) -> list[list[int]]:
             at = before[at]
         if all(free[chain[-1] : last + 1]) and len(chain) > 1:
             free[chain[-1] : last + 1] = [False] * (last + 1 - chain[-1])
-            chains.append(chain[::-1])
+            chains.append((score[last], chain[::-1]))
     return chains
 
 
@@ -184,22 +195,37 @@ def _follows(cycles: HalfCycles, usual: FloatArray) -> FloatArray:
     low = np.minimum(_FALL * before, before - 1.6 * loss - step)
     change = after - before
     off = np.where(change > 0.0, change / ((_RISE - 1.0) * before + step), change / (before - low))
-    return np.asarray(1.0 - np.maximum(late**2, off**2))
+    worst = np.maximum(late**2, off**2)
+    return np.asarray(1.0 - np.maximum(worst, _uneven(cycles, worst > 1.0) ** 2))
 
 
-def _over(cycles: HalfCycles, at: int, here: int, top: float, usual: Sequence[float]) -> float:
-    """Score whether a motion goes on over a disturbance (a tracking error, lost samples).
+def _over(
+    cycles: HalfCycles, at: int, here: int, top: float, usual: Sequence[float], *, gap: bool
+) -> float:
+    """Score whether a motion goes on over a disturbance (a tracking error, lost samples), or a gap.
 
     `top` is the largest of the last three swings before: where a turning point is lost in a gap,
-    the swings beside it are too small.
+    the swings beside it are too small. In a longer gap the half cycles must be countable: half
+    periods before and behind it say the same whole number, and the side that of that number. So
+    must their loss.
     """
     size, pause = float(cycles.swing[here]), float(cycles.middle_s[here] - cycles.middle_s[at])
     # Half periods of the five half cycles before, and behind.
     behind, ahead = usual[max(at - 3, 0)], usual[min(here + 2, len(usual) - 1)]
     off = math.log(size / top) / math.log(1.15 if size > top else 2.0)
-    alike = abs(ahead / behind - 1.0) < _PERIOD and abs(off) < 1.0
-    goes_on = alike and size > 3.0 * cycles.step and pause < 4.5 * behind
-    return 1.0 - off**2 - _PRICE if goes_on else -math.inf
+    short, alike = pause < _COUNTLESS * behind, abs(ahead / behind - 1.0) < _PERIOD
+    if not (gap or short) or not alike or size < 3.0 * cycles.step:
+        return -math.inf
+    if short:
+        return 1.0 - off**2 - _PRICE if abs(off) < 1.0 else -math.inf
+    before, after = cycles.swing[max(at - _BLOCKS, 0) : at + 1], cycles.swing[here : here + _BLOCKS]
+    counts = pause / behind, pause / ahead
+    number = round(0.5 * sum(counts))
+    losses = [-float(np.mean(np.diff(part))) for part in (before, after) if len(part) > 1]
+    few, many = 0.5 * number * min(losses, default=0.0), 2.0 * number * max(losses, default=0.0)
+    agree = max(abs(count - number) for count in counts) < _COUNTED
+    falls = few - cycles.step < top - size < many + cycles.step
+    return 1.0 - _PRICE if agree and falls and (here - at - number) % 2 == 0 else -math.inf
 
 
 def _running_median(values: FloatArray) -> FloatArray:
@@ -211,25 +237,34 @@ def _running_median(values: FloatArray) -> FloatArray:
     return np.asarray(0.5 * (windows[rows, (count - 1) // 2] + windows[rows, count // 2]))
 
 
-def _regular(cycles: HalfCycles, chain: list[int]) -> bool:
-    """Say whether periods and amplitudes go on as smoothly as a pendulum's do."""
-    swing, one_on = cycles.swing[chain], np.diff(chain) == 1
-    half = np.diff(cycles.middle_s[chain])[one_on]
-    if len(half) < LEAST_HALF_CYCLES - 1:
-        return False
+def _uneven(cycles: HalfCycles, broken: BoolArray) -> FloatArray:
+    """How unevenly half cycles follow between links that are `broken`, shape (m - 1,)."""
+    uneven, edges = (
+        np.zeros(len(broken)),
+        [0, *(np.flatnonzero(broken) + 1).tolist(), len(broken) + 1],
+    )
+    for first, last in pairwise(edges):
+        if last - first >= LEAST_HALF_CYCLES:
+            swing, half = cycles.swing[first:last], np.diff(cycles.middle_s[first:last])
+            uneven[first : last - 1] = _wavering(swing, half, cycles.step)
+    return uneven
+
+
+def _wavering(swing: FloatArray, half: FloatArray, step: float) -> float:
+    """How far periods and amplitudes waver, over what a pendulum's may."""
     usual = float(median(swing))
-    blur = cycles.step / usual
+    blur = step / usual
     # Where the sides differ, half cycles two apart are alike; of a few that says too little.
-    apart = 2 if len(half) > 6 else 1
+    apart = 2 if len(half) > _FEW_LINKS else 1
     waver = float(median(np.abs(half[apart:] - half[:-apart]))) / float(median(half))
     # Viscous loss takes the same share of each half cycle, Coulomb friction the same amount: a
     # strong one of either bends what is even under the other.
     kinks = float(np.min(median(_bends(swing, usual))))
-    if kinks >= _WAVER and len(swing) > 6:
+    if kinks >= _WAVER and len(half) > _FEW_LINKS:
         # A zero that drifts shortens and lengthens swings in turn, and not the means of neighbours.
         means = 0.5 * (swing[1:] + swing[:-1])
         kinks = _WAVER / _SMOOTH * float(np.min(np.mean(_bends(means, usual), axis=1)))
-    return waver < _WAVER + 0.5 * blur and kinks < _WAVER + 2.0 * blur
+    return max(waver / (_WAVER + 0.5 * blur), kinks / (_WAVER + 2.0 * blur))
 
 
 def _bends(swing: FloatArray, usual: float) -> FloatArray:
@@ -345,12 +380,10 @@ _MANY: Final = 18
 """Half cycles that follow one another by no accident, however small they are."""
 _STEADY: Final = 0.2
 """By which the half periods of a beat may differ from the usual one, but at its nodes."""
-_CATCHABLE: Final = 9
-"""Half cycles of a decay whose last ones tell what the next would have lost."""
 _SPOILT: Final = 3.0
 """Of the usual loss: what loses more in a half cycle was caught, and what has less left rests."""
 _AS_MUCH: Final = 0.2
-"""Of what the most telling run tells, from which one is preferred that falls."""
+"""What a run that does not fall counts beside one that does, for what it tells."""
 _COUNTED: Final = 0.25
 """Half cycles by which the count across a gap may be off."""
 _NODE: Final = 4
@@ -411,32 +444,25 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
         When there is no free decay of at least three half cycles: one line that says why.
     """
     time, values, least, half_period = _looked_at(recording, place)
+    cycles = half_cycles(time, values, least, half_period)
     # A gap of a period parts the record: in it the motion could have done anything.
-    edges = (np.flatnonzero(np.diff(time) > 2.0 * half_period) + 1).tolist()
-    parted = pairwise([0, *edges, len(time)])
-    pieces = [slice(first, last) for first, last in parted if last - first >= _FEWEST]
-    parts = [half_cycles(time[piece], values[piece], least, half_period) for piece in pieces]
-    gapless = pieces == [slice(0, len(time))]
-    whole = parts[0] if gapless else half_cycles(time, values, least, half_period)
-    every = sum(map(len, parts))
-    # Of so many others some fall in turn by chance: k of them one time in k!.
+    edges = np.flatnonzero(np.diff(time) > 2.0 * half_period)
+    # Of so many others some fall in turn by chance, k of them one time in k!; each link tells as
+    # much as it scores.
     found = [
         run
-        for cycles, piece in zip(parts, pieces, strict=True)
-        for run in best_runs(cycles, piece)
-        if every - run.legs <= math.factorial(min(run.legs, _MANY))
+        for run in best_runs(cycles, time[edges])
+        if math.log(max(len(cycles) - run.legs, 1)) <= math.lgamma(run.score + 2.0)
     ]
-    most = max((run.worth for run in found), default=0.0)
     # A drive that comes or goes may tell as much, but does not fall.
-    falls = {run: run.worth > _AS_MUCH * most and _falls(run, least) for run in found}
-    told = max(found, key=lambda run: (falls[run], run.worth), default=None)
-    used = _chained(found, told) if told else []
-    unused = sum(run.worth for run in found if run not in used)
+    falls = {run: _falls(run, least) for run in found}
+    told = max(found, key=lambda run: run.worth * (1.0 if falls[run] else _AS_MUCH), default=None)
+    unused = sum(run.worth for run in found if run is not told)
     alone = told and unused <= 0.3 * told.worth and falls[told]
     ends = (float(told.middle_s[0]), float(told.middle_s[-1])) if told else (math.inf, math.inf)
     held = told is not None and told.driven
     beat = _beating(
-        time, values, whole, half_period, place, driven=not alone, held=held, decay_s=ends
+        time, values, cycles, half_period, place, driven=not alone, held=held, decay_s=ends
     )
     if beat is not None:
         return beat
@@ -447,12 +473,10 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
             " unless by chance",
             "handling, a clamp or a drive can't be analysed",
         )
-    _refuse_without_fall(
-        place, time[told.piece], values[told.piece], told, least, falls=falls[told]
-    )
-    others = [run for run in found if run.worth > 0.05 * told.worth and run not in used]
+    _refuse_without_fall(place, time, values, told, least, falls=falls[told])
+    others = [run for run in found if run.worth > 0.05 * told.worth and run is not told]
     may_turn_over = recording.quantity == "angle_rad"
-    return _described(time, values, used, others, least, may_turn_over=may_turn_over)
+    return _described(time, values, edges, told, others, least, may_turn_over=may_turn_over)
 
 
 def _looked_at(
@@ -497,19 +521,21 @@ def _looked_at(
 def _described(
     time: FloatArray,
     values: FloatArray,
-    used: list[Run],
+    edges: IntArray,
+    run: Run,
     others: list[Run],
     least: float,
     *,
     may_turn_over: bool,
 ) -> FreeDecay:
     """Say where a decay begins and ends, what is cut off it, and what else was noticed."""
-    used = [*used[:-1], _before_catch(time, used[-1])]
-    run = used[0]
-    flat = _flat_turns(time[run.piece], values[run.piece], run)
+    flat = _flat_turns(time, values, run)
     if flat is not None and run.legs - flat > _MANY:
-        run = used[0] = replace(run, first=run.first + flat)
-    start, stop = _start(time[run.piece], values[run.piece], run), _stop(time, used[-1])
+        run = replace(run, first=run.first + flat)
+    piece = time[np.append(edges, len(time) - 1)], time[np.append(0, edges + 1)]
+    stop = _stop(float(piece[0][np.searchsorted(piece[0], run.middle_s[-1])]), run)
+    first = int(np.searchsorted(time, piece[1][np.searchsorted(piece[1], run.middle_s[0]) - 1]))
+    start = _start(time[first:], values[first:], run)
     half, swing = run.half_period_s, float(run.swing[0])
     before = "driven: the amplitude is held up" if run.driven else _BY_HAND
     centre = float(np.mean(run.cycles.turn[run.first : run.first + 2]))
@@ -520,21 +546,24 @@ def _described(
         before = "it went over the top before it settled"
     quiet = max(2.0 * least, 0.02 * swing)
     cuts = stretches(time, values, start, stop, quiet=quiet, window_s=half, before=before)
-    bridged = sum(part.bridged for part in used)
-    gaps = [part.piece.stop for part in used[:-1]]
     notes = [
         *(
-            f"nothing was recorded from {time[end - 1]:.6g} to {time[end]:.6g} s; the decay goes on"
-            for end in gaps
+            f"nothing was recorded from {time[end]:.6g} to {time[end + 1]:.6g} s; the decay goes on"
+            for end in edges
+            if start < time[end] < time[end + 1] < stop
         ),
         *(
             f"another decay of {other.legs} half cycles from {other.middle_s[0]:.6g} s is not used"
             for other in others[:3]
         ),
         *([f"{len(others) - 3} more decays are not used"] if len(others) > 3 else []),
-        *([f"{bridged} disturbed half cycle(s) inside the decay are kept"] if bridged else []),
+        *(
+            [f"{run.bridged} disturbed half cycle(s) inside the decay are kept"]
+            if run.bridged
+            else []
+        ),
     ]
-    return FreeDecay(start, stop, cuts, half, sum(part.legs for part in used), notes)
+    return FreeDecay(start, stop, cuts, half, run.legs, notes)
 
 
 def _flat_turns(time: FloatArray, values: FloatArray, run: Run) -> int | None:
@@ -557,45 +586,6 @@ def _flat_turns(time: FloatArray, values: FloatArray, run: Run) -> int | None:
         if np.mean(np.abs(values[inside] - floor) < near) > _LONG * expected:
             return 2 * count + side
     return None
-
-
-def _chained(found: list[Run], told: Run) -> list[Run]:
-    """The runs that one decay makes where gaps part the record, in the order of time."""
-    chain = [told]
-    for run in sorted(found, key=lambda run: run.piece.start):
-        if run.piece.start == chain[-1].piece.stop and _goes_on(chain[-1], run):
-            chain.append(run)
-    for run in sorted(found, key=lambda run: -run.piece.start):
-        if run.piece.stop == chain[0].piece.start and _goes_on(run, chain[0]):
-            chain.insert(0, run)
-    return chain
-
-
-def _goes_on(run: Run, follower: Run) -> bool:
-    """Whether a run behind a gap is the same decay: amplitude, half period and phase go on.
-
-    The half cycles in the gap must be countable: half periods before and behind it say the same
-    whole number, and the side on which the follower begins is that number's. So must their loss.
-    """
-    cycles, later = run.cycles, follower.cycles
-    if run.last + 1 < len(cycles) or follower.first > 1:
-        return False
-    before, behind = run.middle_s[-_BLOCKS:], follower.middle_s[:_BLOCKS]
-    halves = [float(np.mean(np.diff(part))) for part in (before, behind)]
-    counts = [float(behind[0] - before[-1]) / half for half in halves]
-    number = round(0.5 * sum(counts))
-    falls = later.turn[follower.first + 1] < later.turn[follower.first]
-    fell = cycles.turn[run.last + 1] < cycles.turn[run.last]
-    if (falls == fell) != (number % 2 == 0) or number == 0:
-        return False
-    losses = [
-        float(part[0] - part[-1]) / (len(part) - 1)
-        for part in (run.swing[-_BLOCKS:], follower.swing[:_BLOCKS])
-    ]
-    lost = float(run.swing[-1] - follower.swing[0])
-    few, many = 0.5 * number * min(losses), 2.0 * number * max(losses)
-    agree = max(abs(count - number) for count in counts) < _COUNTED
-    return agree and few - cycles.step < lost < many + cycles.step
 
 
 def _beating(
@@ -729,28 +719,17 @@ def _fall_of_all(time: FloatArray, values: FloatArray, middle: FloatArray) -> tu
     return float(-slope / begun), float(np.sqrt(matrix[0, 0]) / begun)
 
 
-def _before_catch(time: FloatArray, run: Run) -> Run:
-    """Cut a run that rests before its swings are used up: from the last turning point before.
+def _stop(end: float, run: Run) -> float:
+    """When a run of half cycles ends, within its piece of the record.
 
     A decay comes to rest by itself where its next swing would be none, or is not seen. One that
-    is caught would have swung on; its last half cycle is the hand's, and may be as long as others.
+    rests sooner was caught: its last half cycle is the hand's, and may be as long as others.
     """
-    swing, step = run.swing, run.cycles.step
-    rest = float(time[run.piece.stop - 1]) - float(run.cycles.turn_time_s[run.last + 1])
-    if not run.fades or run.legs < _CATCHABLE or rest < 1.5 * run.half_period_s:
-        return run
-    loss = max(float(median(-np.diff(swing[-_CATCHABLE:-2]))), 0.0)
-    last = len(swing) - 1
-    while last > 3 and swing[last] < swing[last - 1] - _SPOILT * loss - step:
-        last -= 1
-    if swing[last] < _SPOILT * (loss + step):
-        return run
-    return replace(run, last=run.first + last - 1, fades=False)
-
-
-def _stop(time: FloatArray, run: Run) -> float:
-    """When a run of half cycles ends, within its piece of the record."""
-    end, half = float(time[run.piece.stop - 1]), float(median(np.diff(run.middle_s[-4:])))
+    half = float(median(np.diff(run.middle_s[-4:])))
+    swing, turned = run.swing, run.cycles.turn_time_s[run.last : run.last + 2].tolist()
+    loss = float(median(np.abs(np.diff(swing[-_BLOCKS:])))) + run.cycles.step
+    if run.fades and end - turned[1] > 1.5 * half and swing[-1] > _SPOILT * loss:
+        return float(turned[0])
     # Half a period after its last middle the pendulum has turned and swung back once more.
     stop = float(run.middle_s[-1]) + (1.5 if run.fades else 0.5) * half
     return end if end - stop < 0.3 * half else stop
