@@ -243,7 +243,7 @@ def _covariance_of_losses(result: Fitted, amplitude: float) -> FloatArray:
     if not loss > 0.0:
         return np.diag(np.full(3, math.inf))
     relative = slope / loss
-    return relative[:, None] * result.covariance_of("a", "b", "c") * relative
+    return relative[:, None] * result.covariance[:3, :3] * relative
 
 
 def period_of(result: Fitted, amplitude: float) -> float:
