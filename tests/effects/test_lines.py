@@ -61,6 +61,7 @@ def test_a_gain_that_changes_has_two_side_bands_and_either_tells_its_rate() -> N
             assert effect.tone(line_hz, math.inf, at.span) == pytest.approx((0.07,))
         assert effect.tone(0.97, 20.0, at.span) is None
         assert effect.tone(2.5, math.inf, at.span) is None
+    assert gain_modulation.bounds(60.0)[-1] == (3.0 / 60.0, 1e6)
 
 
 @pytest.mark.parametrize("turned_rad", [0.2, -0.3])
@@ -75,13 +76,14 @@ def test_a_camera_that_looks_askew_sees_what_comes_nearer_larger(turned_rad: flo
     np.testing.assert_allclose(lens, 0.1 * x**3, 0.0, 1e-12)
 
 
-KICKS = [(4.3 + 5.7 * k, 0.0, 0.012) for k in range(10)]
+EVERY_S = tuple(4.3 + 5.7 * k for k in range(10))
 
 
-def kicked() -> FloatArray:
-    """Kicks of 12 mrad/s every 5.7 s, by scipy's integration."""
+def kicked(at_s: tuple[float, ...] = EVERY_S) -> FloatArray:
+    """Kicks of 12 mrad/s, by scipy's integration."""
+    kicks = tuple((each, 0.0, 0.012) for each in at_s)
     return integrate(
-        lambda _t, y, _s, _x0: -(OMEGA**2) * y[0] - 0.02 * y[1], 0.15, 0.0, TIME, kicks=tuple(KICKS)
+        lambda _t, y, _s, _x0: -(OMEGA**2) * y[0] - 0.02 * y[1], 0.15, 0.0, TIME, kicks=kicks
     )
 
 
@@ -107,11 +109,10 @@ def test_kicks_are_found_in_readings_and_no_others() -> None:
     assert begun.effect is repeated_kicks
     assert begun.release.time_s == pytest.approx(0.0, abs=0.01)
     assert begun.release.angle_rad == pytest.approx(0.15, rel=0.01)
-    one = np.array(KICKS[:1])
-    knocked = integrate(
-        lambda _t, y, _s, _x0: -(OMEGA**2) * y[0] - 0.02 * y[1], 0.15, 0.0, TIME, kicks=tuple(one)
-    )
-    for other in (plain(baseline(b=0.01), TIME), knocked):
+    # No kick, a gain that goes up and down, and knocks that keep no time.
+    own = plain(baseline(b=0.01), TIME)
+    gain = 1.0 + 8e-3 * np.cos(2.0 * math.pi * 0.18 * TIME)
+    for other in (own, gain * own, kicked((9.1, 23.4, 31.0))):
         noisy = other + 1e-4 * rng.standard_normal(len(TIME))
         assert repeated_kick(TIME, noisy, OMEGA, sine=False) is None
     assert repeated_kick(TIME[:300], readings[:300], OMEGA, sine=False) is None
