@@ -505,6 +505,20 @@ def test_a_cause_is_found_beside_a_record_that_disagrees() -> None:
     assert "uniform-drag-excess" in inside
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("record", "loss"), [("water-high-5", 1.3), ("water-high-4", 1.5)])
+def test_a_foreign_record_beside_a_cause_is_no_mode(record: str, loss: float) -> None:
+    """Of eight records in the water one alone would see the mode."""
+    ends = ("high-1", "high-4", "high-5", "high-8", "low-2", "low-4", "low-5", "low-7")
+    few = np.array([run.record.endswith((*ends, "air-03", "air-07")) for run in DESIGN.runs])
+    found = data(DESIGN, named("uniform-drag-excess"), (0.12,), seed=5)
+    values = found.values.copy()
+    values[[run.record for run in DESIGN.runs].index(record), 1] *= loss
+    answer = search(*only(DESIGN, found._replace(values=values), few))
+    assert [far.record for far in answer.left_out] == [record]
+    assert "uniform-drag-excess" in {one.leader.last.identifier for one in answer.found}
+
+
 def test_no_cause_is_named_where_the_scan_is_silent() -> None:
     """Off by 2 sigma from one record to the next, b makes chi^2 alarm, and no pattern."""
     found = data(DESIGN)

@@ -214,9 +214,12 @@ def _among_records(base: JointFit, level: float) -> CampaignSearch:
         # A cause that bends to a foreign record makes others far.
         each = {far: without(answer.baseline, far.record) for far in suspects}
         suspect, fewer = min(each.items(), key=lambda item: item[1].chi2)
-        better = answer.improved.chi2 - fewer.chi2
-        # A mode that one record sees is that record.
-        needed = -CLASS if answer.found and answer.found[-1].leader.last.finer else CLASS
+        better, needed = answer.improved.chi2 - fewer.chi2, CLASS
+        others = [one for one in answer.improved.added if not one.effect.finer]
+        # A mode that one record sees is that record, beside the other causes.
+        if len(others) < len(answer.improved.added):
+            alone = without(answer.baseline, suspect.record, others)
+            better, needed = answer.improved.chi2 - alone.chi2, -CLASS
         if unexplained is None and better < needed:
             answer = replace(answer, suspect=suspect if better > -CLASS else None)
             break
