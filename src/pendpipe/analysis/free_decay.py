@@ -129,19 +129,23 @@ def best_runs(cycles: HalfCycles, gaps_s: Sequence[float] | FloatArray = ()) -> 
         return []
     runs = (
         Run(cycles, one[0], one[-1], one[-1] - one[0] + 1 - len(one), score)
-        for score, one in _chains(cycles, np.searchsorted(gaps_s, cycles.middle_s).tolist())
+        for score, one in _chains(cycles, np.searchsorted(gaps_s, cycles.middle_s))
         if len(one) >= LEAST_HALF_CYCLES
     )
     return sorted((_undriven(_fading(run)) for run in runs), key=lambda run: -run.worth)
 
 
-def _chains(cycles: HalfCycles, piece: Sequence[int]) -> list[tuple[float, list[int]]]:
+def _chains(cycles: HalfCycles, piece: IntArray) -> list[tuple[float, list[int]]]:
     """Align half cycles to chains, each of one free motion: a chain ends where its score is most.
 
     (Smith and Waterman's alignment of pieces.) A half cycle goes on from the one before at a score
     of up to 1, or over disturbed ones, or a gap to the next `piece` of the record, at a price.
     """
-    half = _running_median(np.diff(cycles.middle_s))
+    # What holds a gap is no half period, and those behind it may be another motion's.
+    half, gap = np.diff(cycles.middle_s), np.diff(piece) > 0
+    parts = np.split(np.where(gap, np.nan, half), np.flatnonzero(gap) + 1)
+    known = np.concatenate([_running_median(part) for part in parts if len(part)])
+    half = np.where(np.isnan(known), median(half), known)
     follows, usual = _follows(cycles, half).tolist(), half.tolist()
     swing, step = cycles.swing.tolist(), cycles.step
     score, before = [0.0] * len(swing), [-1] * len(swing)
@@ -457,12 +461,17 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     # A drive that comes or goes may tell as much, but does not fall.
     falls = {run: _falls(run, least) for run in found}
     told = max(found, key=lambda run: run.worth * (1.0 if falls[run] else _AS_MUCH), default=None)
-    unused = sum(run.worth for run in found if run is not told)
-    alone = told and unused <= 0.3 * told.worth and falls[told]
+    alone = told and falls[told] and sum(run.worth for run in found) <= 1.3 * told.worth
     ends = (float(told.middle_s[0]), float(told.middle_s[-1])) if told else (math.inf, math.inf)
-    held = told is not None and told.driven
     beat = _beating(
-        time, values, cycles, half_period, place, driven=not alone, held=held, decay_s=ends
+        time,
+        values,
+        cycles,
+        half_period,
+        place,
+        driven=not alone,
+        held=told is not None and told.driven,
+        decay_s=ends,
     )
     if beat is not None:
         return beat
@@ -475,8 +484,9 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
         )
     _refuse_without_fall(place, time, values, told, least, falls=falls[told])
     others = [run for run in found if run.worth > 0.05 * told.worth and run is not told]
-    may_turn_over = recording.quantity == "angle_rad"
-    return _described(time, values, edges, told, others, least, may_turn_over=may_turn_over)
+    return _described(
+        time, values, edges, told, others, least, may_turn_over=recording.quantity == "angle_rad"
+    )
 
 
 def _looked_at(
