@@ -127,6 +127,8 @@ def over(number: float, estimate: Estimate, unit: str = "") -> Estimate:
 
 LISTED: Final = 0.05
 """Probability from which a description counts in an average; as from which a rival is listed."""
+NAMED: Final = 0.5
+"""Probability from which causes are named, two or three of a class together."""
 
 
 def averaged(estimates: Sequence[Estimate], probabilities: Sequence[float]) -> Estimate:

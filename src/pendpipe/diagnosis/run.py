@@ -36,7 +36,7 @@ from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.search import baseline_fitted, run_search
 from pendpipe.diagnosis.seen import Seen, seen_of
-from pendpipe.diagnosis.summary import NAMED, causes_of, class_of, jumps, test_of
+from pendpipe.diagnosis.summary import causes_of, class_of, jumps, test_of
 from pendpipe.diagnosis.values import parameters_of
 from pendpipe.diagnosis.weighing import effect_named, fault_named
 from pendpipe.dynamics.any_law import NoMotionError, sample_pieces
@@ -44,7 +44,7 @@ from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.effects.catalogue.losses import drag_form
 from pendpipe.effects.catalogue.restoring import circular_error
 from pendpipe.errors import NotAnalysableError, refuse_if
-from pendpipe.estimate import Estimate
+from pendpipe.estimate import NAMED, Estimate
 from pendpipe.levels import FALSE_ALARM
 from pendpipe.quantities import stretch, with_error
 from pendpipe.readings import motion_of

@@ -71,7 +71,7 @@ from pendpipe.dynamics.eq8_model import values_of
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES
-from pendpipe.estimate import LISTED
+from pendpipe.estimate import LISTED, NAMED
 from pendpipe.quantities import compact
 from pendpipe.score import Trials
 
@@ -446,7 +446,7 @@ def _weighed(state: Hypothesis) -> Hypothesis:
 
 
 def _likelier(found: Hypothesis) -> Hypothesis | None:
-    """Put the most likely of its class in the place of a name that is half as probable, or less.
+    """Put the most likely of its class in the place of a name, where it is told and that is not.
 
     It was the likelier beside others, or none, that were there then. What was drawn beside names
     goes, and may be drawn again.
@@ -455,7 +455,8 @@ def _likelier(found: Hypothesis) -> Hypothesis | None:
         others = zip(step.weights[1:-1], step.mates, strict=True)
         weight, mate = max(others, key=lambda each: each[0], default=(0.0, step.winner))
         released = any(isinstance(each.effect, ReleasedParameter) for each in (mate, step.winner))
-        if released or weight < max(LISTED, 2.0 * step.weights[0]):
+        # Listed, or named.
+        if released or not any(step.weights[0] < told <= weight for told in (LISTED, NAMED)):
             continue
         rivals = (mate, *(rival for rival in step.rivals if rival is not mate))
         kept = [replace(step, rivals=rivals) if each is step else each for each in found.steps]

@@ -25,15 +25,13 @@ from pendpipe.diagnosis.seen import Seen
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier, declared
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES
 from pendpipe.effects.effect import Effect
-from pendpipe.estimate import LISTED, Z95, Estimate
+from pendpipe.estimate import LISTED, NAMED, Z95, Estimate
 from pendpipe.files import fields_of
 from pendpipe.levels import FALSE_ALARM
 from pendpipe.quantities import compact, listed, with_error
 
 BASELINES: Final = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 """The baselines in words."""
-NAMED: Final = 0.5
-"""Probability from which causes are named, two or three of a class together."""
 _ALONE: Final = 0.8
 """Probability from which a cause is named without its rivals."""
 _MOST_NAMES: Final = 3

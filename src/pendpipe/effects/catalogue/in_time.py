@@ -405,17 +405,6 @@ parametric_drive: Final = _parametric(
 )
 
 
-def slow_rates(span: Span) -> list[tuple[float, ...]]:
-    """Frequencies of a slow modulation, whose side bands lie where no tone is looked for."""
-    cycles = np.arange(_SLOWEST, plane_band_hz(span) * span.duration_s, APART)
-    return rows(cycles / span.duration_s)
-
-
-def less_than_a_cycle(values: FloatArray, span: Span) -> float:
-    """Twice the logarithm by which a modulation is less likely as slow: that is a drift."""
-    return -2.0 * math.log(min(max(float(values[2]) * span.duration_s, 1e-6), 1.0))
-
-
 class Modulation(Effect):
     """What makes two lines at equal distances from the motion's frequency.
 
