@@ -6,6 +6,7 @@ import shutil
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from pendpipe.analysis.turning_points import (
 from pendpipe.diagnosis.cycles import cycles
 from pendpipe.diagnosis.run import diagnose_recording
 from pendpipe.dynamics import Eq8, Release, turning_points
+from pendpipe.effects.catalogue import CATALOGUE
 from pendpipe.estimate import Estimate
 from pendpipe.figures import OF_A_DIAGNOSIS, diagnosis
 from pendpipe.figures.data import Decay, NothingToDrawError, local_quality, read_decay
@@ -376,6 +378,18 @@ def test_no_label_of_the_map_is_cut_off(content: Shown, quieter: float) -> None:
         inside = axes.get_tightbbox()
         assert whole.x0 <= inside.x0 < inside.x1 <= whole.x1
         assert whole.y0 <= inside.y0 < inside.y1 <= whole.y1
+
+
+def test_the_key_of_the_decay_stays_within_the_figure(content: Shown) -> None:
+    """However long the name is of what is missing."""
+    found = SimpleNamespace(
+        missing=[SimpleNamespace(name=max((each.name for each in CATALOGUE), key=len))],
+        baseline=content.diagnosis.baseline,
+    )
+    figure = diagnosis.draw_decay(replace(content, diagnosis=found))
+    FigureCanvasAgg(figure).draw()
+    key = figure.axes[0].get_legend().get_window_extent()
+    assert 0.0 < key.x0 < key.x1 < figure.bbox.x1
 
 
 def test_the_spectrum_of_noise_is_the_noise_level(content: Shown) -> None:

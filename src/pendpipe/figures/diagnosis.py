@@ -88,7 +88,8 @@ class Shown:
         if self.extended is not None:
             found = [effect.name for effect in self.diagnosis.missing]
             more = f" and {len(found) - 1} more" if len(found) > 1 else ""
-            named.append((f"with {found[0]}{more}", self.extended))
+            name = f"with {found[0]}{more}"
+            named.append((name if len(name) <= _LEGEND else "with what is missing", self.extended))
         return named
 
     def residual(self, fit: Fit) -> FloatArray:
@@ -137,6 +138,8 @@ COLOURS: Final = (VERMILION, BLUE)
 """Of the baseline and of the extended model."""
 _MANY: Final = 1000
 """Readings from which on they are drawn as pixels, and the amplitude at every k-th of them."""
+_LEGEND: Final = 34
+"""Letters of a name beside two others in the width of a figure."""
 _CYCLES: Final = 4.0
 """Cycles at the end of the decay that are drawn with each reading."""
 
