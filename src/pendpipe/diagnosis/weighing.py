@@ -249,7 +249,9 @@ def refitted(without: Fit, found: Hypothesis, rival: Rival, useful: float) -> Fi
         held = effect.without(held)
     if _is_of(rival.fit, without, effect, found):
         return rival.fit
-    own = rival.fit.value[len(rival.fit.value) - effect.count :]
+    places = [place for each, place in rival.fit.model.places() if each is effect]
+    # One that was the winner may stand before effects that came later.
+    own = rival.fit.value[places[0]] if places else rival.fit.value[:0]
     start = np.concatenate([without.value, own])
     # With its shape but no size yet it begins where the fit without it ended.
     absent = start.copy()
