@@ -44,6 +44,7 @@ from .records import (
     prepared,
     recording,
     white,
+    with_effects,
 )
 
 # The rivals that share the probability of an effect: those that the final noise allows.
@@ -67,6 +68,21 @@ def test_a_jump_of_ten_times_the_noise_is_no_red_noise_and_has_no_rival() -> Non
     assert effect.delta_chi2 == pytest.approx(25.0 * len(TIME_S), rel=0.3)
     assert effect.indistinguishable == ()
     assert effect.probability > 0.9
+
+
+@pytest.mark.slow
+def test_a_winner_is_refitted_from_its_own_values_wherever_it_stands() -> None:
+    """The first of two effects, as a rival in its own place: it finds the same fit again."""
+    readings = with_effects("equilibrium-step", "tone-pickup")
+    found = diagnose_recording(recording(readings, 1), restoring="linear").search
+    effects = found.fit.model.effects
+    first = next(step for step in found.steps if step.winner.effect is effects[0])
+    assert len(effects) == 2
+    without = found.without(first)
+    rival = replace(first.winner, fit=found.fit)
+    again = weighing.refitted(without, found, rival, found.fit.chi2 + 1.0)
+    assert again.model.effects[-1] is first.winner.effect
+    assert again.chi2 == pytest.approx(found.fit.chi2, abs=0.1)
 
 
 @pytest.mark.slow
