@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from pendpipe.arrays import FloatArray
-from pendpipe.effects.catalogue.in_time import repeated_kicks, resonant_drive, slow_modulation
+from pendpipe.effects.catalogue.in_time import (
+    damping_modulation,
+    repeated_kicks,
+    resonant_drive,
+    slow_modulation,
+)
 from pendpipe.effects.catalogue.reading import (
     PERSPECTIVE,
     gain_modulation,
@@ -56,12 +61,21 @@ def test_a_gain_that_changes_has_two_side_bands_and_either_tells_its_rate() -> N
     own, turn = plain(base, TIME), 2.0 * math.pi * 0.07 * TIME
     factor = 1.0 + 2e-3 * np.cos(turn) + 1e-3 * np.sin(turn)
     np.testing.assert_allclose(at.reading, factor * own, 0.0, 1e-9)
-    for effect in (gain_modulation, slow_modulation):
+    for effect in (gain_modulation, slow_modulation, damping_modulation):
         for line_hz in (0.83, 0.97):
             assert effect.tone(line_hz, math.inf, at.span) == pytest.approx((0.07,))
         assert effect.tone(0.97, 20.0, at.span) is None
         assert effect.tone(2.5, math.inf, at.span) is None
     assert gain_modulation.bounds(60.0)[-1] == (3.0 / 60.0, 1e6)
+
+
+def test_a_loss_that_goes_up_and_down_is_a_gain_that_does_a_quarter_turn_later() -> None:
+    """exp(-integral of gamma) of a small gamma: no single sensor tells the two apart."""
+    base, gamma = baseline(b=0.01), 3e-3
+    own, pace = plain(base, TIME), 2.0 * math.pi * 0.07
+    at = with_effect(damping_modulation, (gamma, 0.0, 0.07), base)
+    factor = np.exp(-gamma / pace * np.sin(pace * TIME))
+    assert np.max(np.abs(at.reading - factor * own)) < 0.1 * gamma / pace * np.max(np.abs(own))
 
 
 @pytest.mark.parametrize("turned_rad", [0.2, -0.3])

@@ -33,7 +33,7 @@ from pendpipe.diagnosis.refine import (
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.dynamics.eq8 import OMEGA, Restoring
 from pendpipe.effects import Effect
-from pendpipe.effects.catalogue.in_time import resonant_drive, slow_modulation
+from pendpipe.effects.catalogue.in_time import damping_modulation, resonant_drive, slow_modulation
 from pendpipe.effects.catalogue.reading import (
     PERSPECTIVE,
     SoftClipping,
@@ -332,7 +332,8 @@ def applicable(
             named = [camera_beyond_a_quarter if e is camera_geometry else e for e in named]
         return list(fit.model.admitted(named))
     keys = {effect.key for effect in fit.model.effects}
-    forms: list[Effect | None] = [SoftClipping(), resonant_drive, slow_modulation, gain_modulation]
+    modulations = slow_modulation, gain_modulation, damping_modulation
+    forms: list[Effect | None] = [SoftClipping(), resonant_drive, *modulations]
     if any(effect.identifier == circular_error.identifier for effect in catalogue):
         forms.append(CIRCULAR_ERROR_IN.get(unit))
     if tone_pickup.identifier not in used:

@@ -494,6 +494,30 @@ def damping_drift(motion: Motion, pendulum: Pendulum, rate: float, tau: float) -
     return np.asarray(-2.0 * gamma * motion.velocity)
 
 
+@enters(
+    "acceleration",
+    Modulation,
+    identifier="damping-drift",
+    key="damping-drift:periodic",
+    name="damping that changes periodically",
+    equation=r"\ddot x \mathrel{+}= -2 (\gamma_c \cos 2\pi f_\gamma t"
+    r" + \gamma_s \sin 2\pi f_\gamma t)\, \dot x",
+    parameters=(
+        Parameter("gamma_cosine", "1/s", -100.0, 100.0, word="amplitude"),
+        Parameter("gamma_sine", "1/s", -100.0, 100.0, 0.0, word="amplitude"),
+        Parameter("f_gamma", "Hz", 0.0, 1e6, word="frequency"),
+    ),
+    fewest=3.0,
+    discriminating_test="read it with a second sensor: a gain that changes is the first one's",
+)
+def damping_modulation(
+    motion: Motion, pendulum: Pendulum, cosine: float, sine: float, f_gamma: float
+) -> FloatArray:
+    """A loss that goes up and down; its side bands are those of a gain that does."""
+    phase = 2.0 * math.pi * f_gamma * since_release(motion, pendulum)
+    return np.asarray(-2.0 * tone_at(cosine, sine, phase) * motion.velocity)
+
+
 def _crept(late: FloatArray, exponential: float) -> FloatArray:
     """(1 - p) ln(1 + t/tau) + p (1 - e^(-t/tau))."""
     return np.asarray((1.0 - exponential) * np.log1p(late) - exponential * np.expm1(-late))
