@@ -81,7 +81,9 @@ def test_a_table_of_fits_holds_no_formula(
         named = {str(row[0]): row for row in rows}
         assert {name.replace("\x07", "?") for name in NAMES} <= set(named)
         assert named["plain.csv"][7] == "=1+1", "the unit of its head"
-        assert {type(each) for each in named["plain.csv"]} == {str, float, type(None)}
+        # A sheet has one kind of number; a whole one is read as such.
+        kinds = {type(each) for each in named["plain.csv"]}
+        assert kinds - {int} == {str, float, type(None)}
     elif form == "csv":
         (head, *rows) = csv.reader(out.read_text(encoding="utf-8").splitlines())
         assert [original(row[0]) for row in rows] == list(NAMES)
