@@ -21,6 +21,7 @@ import numpy as np
 
 from benchmarks.journal import judge_parser
 from benchmarks.table import head, share, table_row
+from pendpipe.analysis.readings import find_step, from_below, pull_along_string, with_amplitudes
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.facts import KINDS, Fact
@@ -33,7 +34,6 @@ from pendpipe.formats.table import Column, ReadOptions, Table, swing_of
 from pendpipe.formats.times import time_base
 from pendpipe.physics.lengthening import elliptic
 from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
-from pendpipe.readings import find_step, from_below, pull_along_string, with_amplitudes
 from pendpipe.recording import Recording
 
 Rng = np.random.Generator

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
+from pendpipe.analysis.readings import motion_of
 from pendpipe.errors import refuse_if
 from pendpipe.files import distinct_names
 from pendpipe.options import (
@@ -29,7 +30,6 @@ from pendpipe.options import (
     measured_number,
 )
 from pendpipe.reading import read
-from pendpipe.readings import motion_of
 from pendpipe.recording import Recording
 
 if TYPE_CHECKING:

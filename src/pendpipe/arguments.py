@@ -134,8 +134,8 @@ def read_motion(
         ``input_sha256`` (of what came through standard input too), ``version``,
         ``volts_per_radian`` (None where none was used).
     """
+    from pendpipe.analysis.readings import motion_of
     from pendpipe.formats.reading import file_bytes
-    from pendpipe.readings import motion_of
 
     recording = read(arguments.file, **given(arguments, read))
     constant = arguments.volts_per_radian or _calibrated(arguments.calibration)

@@ -21,9 +21,9 @@ from pendpipe.acquisition.decode import decode_recording
 from pendpipe.acquisition.drivers import without_port
 from pendpipe.acquisition.line import Line, cannot_open
 from pendpipe.acquisition.raw import read_raw
+from pendpipe.analysis.readings import motion_of
 from pendpipe.cli import main
 from pendpipe.errors import InputError
-from pendpipe.readings import motion_of
 from pendpipe.recording import read_plain
 
 # ``pendpipe acquire`` as a user calls it.

@@ -12,6 +12,7 @@ from hypothesis import given, settings, strategies as st
 
 import pendpipe as pp
 from pendpipe.analysis.fit.by_points import fit_envelope, fit_period, fit_points
+from pendpipe.analysis.readings import only_falls
 from pendpipe.analysis.torque import period_excess
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
@@ -19,7 +20,6 @@ from pendpipe.cli import main
 from pendpipe.dynamics import Eq8, Release, sample, turning_points
 from pendpipe.estimate import Estimate
 from pendpipe.physics.decay import amplitude
-from pendpipe.readings import only_falls
 
 from ..recordings import white
 

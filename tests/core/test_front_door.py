@@ -25,12 +25,12 @@ from pandas import DataFrame
 import pendpipe as pp
 from pendpipe import cli
 from pendpipe.analysis.fit.result import FitResult
+from pendpipe.analysis.readings import motion_of
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError
 from pendpipe.facts import Fact
 from pendpipe.figures.style import ShownFigure
 from pendpipe.process import _AHEAD
-from pendpipe.readings import motion_of
 from pendpipe.recording import Recording, read_plain, write_plain
 
 from ..recordings import white

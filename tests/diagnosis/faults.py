@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.noise import noise_rms
+from pendpipe.analysis.readings import find_step
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
@@ -18,7 +19,6 @@ from pendpipe.diagnosis.noise import Noise, estimate_noise, white_noise
 from pendpipe.diagnosis.refine import Fit, refine
 from pendpipe.dynamics.eq8 import OMEGA
 from pendpipe.effects.model import Model
-from pendpipe.readings import find_step
 
 from .records import FREQUENCY_HZ
 

@@ -13,6 +13,7 @@ import pytest
 
 from pendpipe.analysis.fit import fit_recording
 from pendpipe.analysis.free_decay import measure_recording
+from pendpipe.analysis.readings import motion_of
 from pendpipe.analysis.turning_points.measure import prepare
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.begin import Beginning, begin
@@ -24,7 +25,6 @@ from pendpipe.diagnosis.refine import Fit, fit_in_growing_window
 from pendpipe.dynamics.eq8 import A, C, Restoring
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.formats import read
-from pendpipe.readings import motion_of
 from pendpipe.recording import Recording
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "recordings"

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import pendpipe as pp
+from pendpipe.analysis.readings import motion_of
 from pendpipe.cli import main
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.dynamics.eq8 import A as QUADRATIC, B as LINEAR, C as FRICTION
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.model import Model
 from pendpipe.effects.stack import Differs, Stack
-from pendpipe.readings import motion_of
 from pendpipe.recording import Recording
 
 AMPLITUDES = (0.05, 0.15, 0.4)

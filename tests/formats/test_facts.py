@@ -11,9 +11,9 @@ import pytest
 from benchmarks.facts import DRAWN, counted
 from scipy.stats import binom
 
+from pendpipe.analysis.readings import motion_of
 from pendpipe.facts import KINDS, Fact
 from pendpipe.formats import ReadOptions, inspect, read
-from pendpipe.readings import motion_of
 
 from .cases import swing
 from .test_dialects import motion

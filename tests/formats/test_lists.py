@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from pendpipe.analysis.readings import find_step
 from pendpipe.arrays import FloatArray
 from pendpipe.cli import main
 from pendpipe.errors import InputError
@@ -17,7 +18,6 @@ from pendpipe.facts import KINDS
 from pendpipe.formats import ReadOptions, inspect, read
 from pendpipe.formats.saturation import clipped_samples
 from pendpipe.formats.table import swing_of
-from pendpipe.readings import find_step
 from pendpipe.recording import read_plain
 
 from .cases import WindaqFile, swing

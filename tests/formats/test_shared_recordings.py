@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from pendpipe.analysis.free_decay import find_free_decay
+from pendpipe.analysis.readings import motion_of
 from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.formats import ReadOptions, inspect, read
-from pendpipe.readings import motion_of
 
 from .cases import SHARED
 

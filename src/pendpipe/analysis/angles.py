@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from pendpipe.analysis.readings import motion_of
 from pendpipe.analysis.torque import may_be_sine, sine_coefficient, swing_phase
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
@@ -17,7 +18,6 @@ from pendpipe.estimate import Estimate
 from pendpipe.physics.lengthening import ANGLES, SEEN, TELLS, Coefficient, unit_shown
 from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 from pendpipe.quantities import with_error
-from pendpipe.readings import motion_of
 from pendpipe.recording import Recording
 
 _ON_EARTH: Final = 0.0015

@@ -15,12 +15,12 @@ import numpy as np
 from scipy.special import fdtrc, stdtrit
 
 from pendpipe.analysis.noise import quantisation_rms
+from pendpipe.analysis.readings import decimal_step
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, refuse_if
 from pendpipe.estimate import Z95, Estimate, chi_square_p_value
 from pendpipe.files import fields_of, plain, read_text
 from pendpipe.levels import FALSE_ALARM
-from pendpipe.readings import decimal_step
 
 ANGLES: Final = ("angle_rad", "angle_deg", "displacement_m")
 _OF_A_CUBIC: Final = 4

@@ -16,6 +16,7 @@ from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.quality import small_frequency
 from pendpipe.analysis.fit.result import FitResult
 from pendpipe.analysis.noise import scatter
+from pendpipe.analysis.readings import motion_of
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import Samples, prepare
 from pendpipe.arrays import FloatArray
@@ -47,7 +48,6 @@ from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.estimate import NAMED, Estimate
 from pendpipe.levels import FALSE_ALARM
 from pendpipe.quantities import stretch, with_error
-from pendpipe.readings import motion_of
 from pendpipe.recording import Recording
 
 

@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from pendpipe.analysis.fit.fitted import Baseline, units
+from pendpipe.analysis.readings import motion_of
 from pendpipe.analysis.torque import TOP, swing_phase
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis import Progress, silent
@@ -51,7 +52,6 @@ from pendpipe.errors import InputError, NotAnalysableError
 from pendpipe.estimate import Z95, Estimate
 from pendpipe.levels import FALSE_ALARM
 from pendpipe.quantities import listed
-from pendpipe.readings import motion_of
 from pendpipe.recording import Recording
 
 

@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.readings import amplitudes_in, sizes_of
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
 from pendpipe.facts import Fact, How
@@ -26,7 +27,6 @@ from pendpipe.formats.table import (
     evenness,
 )
 from pendpipe.formats.words import Role, Unit, counts_swings, plain, role_of, split_header, unit_of
-from pendpipe.readings import amplitudes_in, sizes_of
 
 _WORTH: Final[Mapping[Role, float]] = {
     "angle": 6.0,

@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.half_cycles import periods
+from pendpipe.analysis.readings import only_falls
 from pendpipe.arrays import FloatArray
 from pendpipe.formats.table import Column
 from pendpipe.formats.words import plain
-from pendpipe.readings import only_falls
 
 _STEADY: Final = 0.02
 """Share by which the size of a steady signal may change from beginning to end."""

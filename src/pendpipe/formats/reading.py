@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from pendpipe.analysis.readings import find_step, pull_along_string, sizes_of, with_amplitudes
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import InputError, nearest, refuse_if
 from pendpipe.facts import KINDS, Fact, guesses, remarks
@@ -38,7 +39,6 @@ from pendpipe.formats.table import (
 from pendpipe.formats.times import TimeBase, refuse_text, time_base
 from pendpipe.formats.units import readings
 from pendpipe.formats.words import role_of, split_header, unit_of
-from pendpipe.readings import find_step, pull_along_string, sizes_of, with_amplitudes
 from pendpipe.recording import (
     GOOD,
     MISSING,

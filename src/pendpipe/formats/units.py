@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.half_cycles import periods
+from pendpipe.analysis.readings import from_below, jumps_of_a_turn
 from pendpipe.arrays import FloatArray
 from pendpipe.errors import refuse_if
 from pendpipe.facts import Fact, How
@@ -23,7 +24,6 @@ from pendpipe.formats.table import (
 from pendpipe.formats.times import TimeBase
 from pendpipe.formats.words import Unit, unit_of
 from pendpipe.physics.lengthening import ANGLES, unit_shown
-from pendpipe.readings import from_below, jumps_of_a_turn
 from pendpipe.recording import Quantity
 
 _ANGLES = {name: Unit("angle", size, "rad") for name, size in ANGLES.items()}

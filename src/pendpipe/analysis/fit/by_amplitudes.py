@@ -22,6 +22,7 @@ from pendpipe.analysis.fit.prediction import pendulum_decay
 from pendpipe.analysis.fit.quality import without_swings
 from pendpipe.analysis.fit.result import FitResult, result_of
 from pendpipe.analysis.noise import scatter
+from pendpipe.analysis.readings import sizes_of
 from pendpipe.analysis.torque import TOP
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.arrays import FloatArray
@@ -32,7 +33,6 @@ from pendpipe.facts import SWINGS
 from pendpipe.physics.decay import amplitude_and_gradient
 from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
 from pendpipe.quantities import after_number
-from pendpipe.readings import sizes_of
 from pendpipe.recording import Quantity, Recording
 
 _FEWEST: Final = 5

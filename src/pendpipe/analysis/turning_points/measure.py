@@ -27,10 +27,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.noise import noise_rms
+from pendpipe.analysis.readings import decimal_step, find_step, motion_of
 from pendpipe.arrays import BoolArray, FloatArray, IntArray, median
 from pendpipe.dynamics.kernel import IntMatrix, Matrix, Stack, kernel
 from pendpipe.errors import NotAnalysableError, refuse_if
-from pendpipe.readings import decimal_step, find_step, motion_of
 from pendpipe.recording import Recording
 from pendpipe.solve import Bounds, bounded_step
 
