@@ -84,27 +84,19 @@ def clear(points: TurningPoints) -> TurningPoints:
     return points.chosen((amplitude > SEEN * points.angle_sd_rad) & (amplitude < TOP))
 
 
-def nearer(points: TurningPoints, readings: int) -> tuple[Restoring, float]:
-    """The torque whose times are nearer to those of angles, a phase counting by its amplitude.
-
-    And chi^2 by which the motion by the other misses so many readings of noise 1.
-    """
+def told_apart(points: TurningPoints, readings: int, noise: float) -> float:
+    """Chi^2 by which the motion by x that is nearest to turning points of sin x misses them."""
     part = clear(points)
-    plain, sine, omega = _by_torques(part)
-    columns = np.stack([np.ones_like(plain), plain, omega * part.time_s, sine - plain], axis=1)
-    columns *= part.amplitude_rad[:, None]
-    basis = np.linalg.qr(columns[:, :2])[0]
-    shown, late = (columns[:, 2:] - basis @ (basis.T @ columns[:, 2:])).T
-    apart = 0.5 * readings / max(float(np.ptp(points.half_cycle)), 1.0) * float(late @ late)
-    return "sine" if 2.0 * shown @ late >= late @ late else "linear", apart
-
-
-def _by_torques(part: TurningPoints) -> tuple[FloatArray, FloatArray, float]:
-    """Phases by x and by sin x, with roughly fitted losses, and the angular frequency seen."""
-    amplitude, omega = part.amplitude_rad, 2.0 * math.pi * part.apparent_frequency_hz
-    losses = (*loss_rates(part.time_s, amplitude, part.angle_sd_rad).tolist(), 0.5)
-    plain, sine = (phases(part, amplitude, losses, omega, torque) for torque in TORQUES)
-    return plain, sine, omega
+    if len(part) < LEAST_HALF_CYCLES:
+        return 0.0
+    amplitude, number = part.amplitude_rad, part.half_cycle - part.half_cycle[0]
+    swings = (swing_phase(amplitude, "sine") - math.pi) * np.diff(number)
+    late = np.concatenate([[0.0], np.cumsum(swings)])
+    line = amplitude[:, None] * np.stack([np.ones_like(late), number], axis=1)
+    first, each = np.linalg.lstsq(line, amplitude * late)[0]
+    left = amplitude * (late - first - each * number)
+    in_half_cycle = readings / max(float(np.ptp(points.half_cycle)), 1.0)
+    return 0.5 * in_half_cycle * float(left @ left) / noise**2
 
 
 def restoring_of(points: TurningPoints, *, stated: bool = True) -> Restoring:
@@ -136,9 +128,11 @@ def sine_coefficient(points: TurningPoints) -> Coefficient:
     part = clear(points)
     if len(part) < _FEWEST or points.unit != "rad":
         return Coefficient(0.0, math.inf, 0.0)
-    plain, sine, _ = _by_torques(part)
+    amplitude, omega = part.amplitude_rad, 2.0 * math.pi * part.apparent_frequency_hz
+    losses = (*loss_rates(part.time_s, amplitude, part.angle_sd_rad).tolist(), 0.5)
+    plain, phase = (phases(part, amplitude, losses, omega, torque) for torque in TORQUES)
     drift = np.cumsum(np.linspace(-1.0, 1.0, len(part)) * np.diff(plain, prepend=0.0))
     sides = np.ones_like(plain), part.side
     return sine_share(
-        part.time_s - part.time_s[0], plain, sine, drift, *sides, weight=1.0 / part.time_sd_s
+        part.time_s - part.time_s[0], plain, phase, drift, *sides, weight=1.0 / part.time_sd_s
     )

@@ -23,7 +23,7 @@ from pendpipe.analysis.fit.fixed import check_fixed
 from pendpipe.analysis.fit.printed import period_text
 from pendpipe.analysis.fit.quality import without_swings
 from pendpipe.analysis.fit.result import FitResult, read_fit, with_scale
-from pendpipe.analysis.torque import may_be_sine, nearer, restoring_of
+from pendpipe.analysis.torque import may_be_sine, restoring_of, told_apart
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.find import turning_points_of
 from pendpipe.analysis.turning_points.measure import Samples, prepare
@@ -281,7 +281,7 @@ def _waveform(
         restoring = restoring_of(points, stated=stated)
     if restoring is not None:
         return result(fitted(restoring=restoring), restoring)
-    first, apart = nearer(points, len(samples))
+    first = restoring_of(points)
     second: Restoring = "linear" if first == "sine" else "sine"
     forms, others, odds = fitted(restoring=first), None, 0.0
     if forms is None:
@@ -289,7 +289,7 @@ def _waveform(
     own = forms.fitted
     if own.minimum.converged and forms.goodness.misfit == 1.0:
         # What fits to the noise tells by itself how far off the other is.
-        odds = 0.5 * apart / forms.goodness.noise_rms**2
+        odds = 0.5 * told_apart(points, len(samples), forms.goodness.noise_rms)
     if odds < _CERTAIN:
         others = fitted(restoring=second)
         odds = min(max(own.better_by(others.fitted), -_SURE), _SURE) if others else _SURE
