@@ -45,6 +45,15 @@ def pull(result: Any, name: str, truth: float) -> float:
     return float((result[name].value - truth) / result[name].sd)
 
 
+def test_a_short_quiet_decay_by_dry_friction_tells_sin_x_from_x() -> None:
+    """Five cycles from 6 degrees: the times lie between the two torques', the readings do not."""
+    law = Eq8(8.46, 0.0, 0.0, 0.0, 0.0241, "sine")
+    time_s = np.arange(0.0, 5.62, 1.0 / 19.7) * 2.0 * math.pi / 8.46
+    result = pp.fit(clean(law, 0.1, time_s, 1.2e-6))
+    assert result.restoring == "sine"
+    assert abs(pull(result, "frequency", 8.46 / (2.0 * math.pi))) < 4.0
+
+
 def test_few_readings_in_a_cycle_tell_the_noise() -> None:
     """Differences of 7 readings in a half cycle see the motion, and not the noise."""
     time = np.arange(0.0, 40.0, 1.0 / 14.7)
