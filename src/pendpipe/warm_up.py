@@ -20,8 +20,9 @@ def kernels() -> list[Kernel]:
     from pendpipe.analysis.fit import rounding
     from pendpipe.analysis.turning_points import find, long_records, measure
     from pendpipe.dynamics import march
+    from pendpipe.effects import two_planes
 
-    modules = (march, half_cycles, find, measure, long_records, rounding)
+    modules = (march, half_cycles, find, measure, long_records, rounding, two_planes)
     own = [each for module in modules for each in vars(module).values() if isinstance(each, Kernel)]
     called = {id(part) for each in own for part in each.parts()[1:]}
     return [each for each in own if id(each) not in called]
@@ -29,8 +30,7 @@ def kernels() -> list[Kernel]:
 
 def warm_up() -> None:
     """Make the code for this machine, where the installation brought none."""
-    for each in kernels():
-        assert callable(each.machine_code)
+    assert all(callable(each.machine_code) for each in kernels())
 
 
 def ship() -> None:

@@ -28,6 +28,7 @@ from pendpipe.dynamics.layout import (
 )
 from pendpipe.dynamics.march import march
 from pendpipe.dynamics.table import _interpolate
+from pendpipe.effects.two_planes import planes
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FILES = [str(EXAMPLES / f"{name}-pendulum.csv") for name in ("rod", "string")]
@@ -327,12 +328,15 @@ def test_without_a_compiler_a_fit_prints_the_same_digits(hidden: str, tmp_path: 
 def test_arrays_in_place_of_machine_code_move_the_same_pendulum(
     monkeypatch: pytest.MonkeyPatch, amplitude_rad: float
 ) -> None:
-    """Angles and derivatives: what the sums' other order rounds otherwise is below 1e-9."""
+    """Angles, derivatives, two planes: the sums' other order makes less than 1e-9."""
     law = Eq8(3.2, quadratic=1e-3, hysteretic=2e-3, viscous=1e-3, coulomb=2e-4, restoring="sine")
-    release, time_s = Release(0.0, amplitude_rad), np.linspace(0.0, 80.0, 400)
-    compiled = sample_with_jacobian(law, release, time_s)
-    monkeypatch.setattr(Kernel, "__call__", Kernel._without_machine_code)
-    for ours, theirs in zip(compiled, sample_with_jacobian(law, release, time_s), strict=True):
+    release, time_s, found = Release(0.0, amplitude_rad), np.linspace(0.0, 80.0, 400), []
+    square = np.full_like(time_s, amplitude_rad**2)
+    for way in (Kernel.__call__, Kernel._without_machine_code):
+        monkeypatch.setattr(Kernel, "__call__", way)
+        turned = planes(time_s, 3.2 * time_s * square, square, 0.1 + 0.3j, 0.04, 0.1)
+        found.append((*sample_with_jacobian(law, release, time_s), *turned))
+    for ours, theirs in zip(*found, strict=True):
         assert np.all(abs(theirs - ours) <= 1e-9 * abs(ours).max(axis=0))
 
 

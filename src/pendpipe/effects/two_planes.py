@@ -16,12 +16,15 @@ L = 0 and of the cone, whose omega^2 is 1/cos(theta), for L = N; rates are its d
 amplitude R in one plane is N = R^2/2 (1 - 5/96 R^2).
 """
 
+from __future__ import annotations
+
 import math
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 
 from pendpipe.arrays import AnyArray, FloatArray
+from pendpipe.dynamics.kernel import Kernel, Matrix, Stack, kernel
 from pendpipe.effects.two_modes import slow_amplitude
 
 _TURN: Final = 0.15
@@ -32,6 +35,7 @@ _FEWEST: Final = 10
 """Windows, each of a period or more: two planes have eight numbers."""
 
 
+@kernel(inline=True)
 def _stepped(a: Any, b: Any, reached: Any, square: Any, lost: Any, detuned: Any) -> tuple[Any, Any]:
     """Follow both planes over a step: omega r^2 integrates to `reached`, a r to `lost`.
 
@@ -52,14 +56,15 @@ def _stepped(a: Any, b: Any, reached: Any, square: Any, lost: Any, detuned: Any)
     return cosine * a - sine * b, (sine * a + cosine * b) * detuned
 
 
+@kernel(inline=True)
 def _apart(a: Any, b: Any, lost: Any) -> tuple[Any, Any]:
     """What a drag |v| v takes more than of one plane, where it takes the part `lost` of that.
 
     With m = |a^2 + b^2|/(|a|^2 + |b|^2), |v| is d_0 + d_1 cos(2 psi), whose series in m end with
     those of a circle, m = 0, and of a line, m = 1: d_0 = 2/pi, d_1 = 4/(3 pi); over 8/(3 pi).
     """
-    energy, both = np.abs(a) ** 2 + np.abs(b) ** 2, a * a + b * b
-    root, narrow = np.sqrt(energy), (np.abs(both) / energy) ** 2
+    energy, both = a.real**2 + a.imag**2 + b.real**2 + b.imag**2, a * a + b * b
+    root, narrow = math.sqrt(energy), (both.real**2 + both.imag**2) / energy**2
     same = _CIRCLE * root * (1.0 - narrow / 16.0 - _LINE_SAME * narrow**2) - 1.0
     cross = 0.5 * _CIRCLE * root * (0.5 + _LINE_CROSS * narrow) * both / energy
     return lost * (same * a + cross * np.conj(a)), lost * (same * b + cross * np.conj(b))
@@ -69,6 +74,39 @@ _CIRCLE: Final = 3.0 * math.pi / 8.0 / math.sqrt(2.0)
 _LINE_SAME: Final = 1.0 - 1.0 / 16.0 - 0.75 / _CIRCLE
 _LINE_CROSS: Final = 0.5 / _CIRCLE - 0.5
 """Both from the sums at m = 1, 3/4 and 1/4."""
+
+
+def _together(steps: Stack, detuned: Matrix, found: Stack) -> None:
+    turned, both = detuned.view(np.complex128), found.view(np.complex128)
+    step = cast("Kernel", _stepped).plain
+    for k in range(steps.shape[2]):
+        now = step(*both[:, k].T, *steps[:, :, k], turned[:, min(k, 1)])
+        both[:, k + 1] = np.stack(now, axis=1)
+
+
+@kernel(arrays=_together)
+def _follow(steps: Stack, detuned: Matrix, found: Stack) -> None:
+    """Follow both amplitudes of some pairs: `found`, shape (pairs, k + 1, 4), begins with them.
+
+    `steps` holds what a step takes, shape (3, pairs, k); `detuned` half the detuning's turn of the
+    first step, and of the others, shape (pairs, 4). Complex numbers are their two parts.
+    """
+    for row in range(steps.shape[1]):
+        for k in range(steps.shape[2]):
+            now, then, half = found[row, k], found[row, k + 1], detuned[row, 2 * min(k, 1) :]
+            a, b = complex(now[0], now[1]), complex(now[2], now[3])
+            reached, square, lost = steps[0, row, k], steps[1, row, k], steps[2, row, k]
+            a, b = _stepped(a, b, reached, square, lost, complex(half[0], half[1]))
+            then[0], then[1], then[2], then[3] = a.real, a.imag, b.real, b.imag
+
+
+def _followed(a: AnyArray, b: AnyArray, steps: Stack, *detuned: AnyArray) -> AnyArray:
+    """Return both amplitudes at the beginning and after each step, shape (2, pairs, k + 1)."""
+    found = np.empty((len(a), steps.shape[2] + 1, 2), dtype=np.complex128)
+    found[:, 0] = np.stack([a, b], axis=1)
+    turned = np.stack(detuned, axis=1, dtype=np.complex128)
+    _follow(steps, turned.view(np.float64), found.view(np.float64))
+    return np.moveaxis(found, 2, 0)
 
 
 def _begun(other: Any) -> tuple[Any, Any, Any, Any]:
@@ -109,22 +147,18 @@ def planes(
     quadratic
         The loss a of Eq. 14, 1/(rad s).
     """
-    a, b, seen, hidden = (each.item() for each in map(np.asarray, _begun(other)))
+    a, b, seen, hidden = _begun(np.array([other]))
     last_s, size = float(time_s[-1]), (1.0 + abs(other)) ** 2
     turns = abs(detuning) * last_s + 0.375 * size * float(reached[-1])
     count = min(8 + math.ceil(turns / _TURN), 20_000)
     at = np.linspace(0.0, last_s, count + 1)
-    parts = np.diff(np.interp(at, time_s, reached)).tolist()
+    parts = np.diff(np.interp(at, time_s, reached))
     squares = np.interp(0.5 * (at[1:] + at[:-1]), time_s, square)
-    lost = (quadratic * last_s / count * np.sqrt(squares)).tolist()
-    detuned = complex(np.exp(0.5j * detuning * last_s / count))
-    along, across = [a], [b]
-    for step in zip(parts, squares.tolist(), lost, strict=True):
-        a, b = _stepped(a, b, *step, detuned)
-        along.append(a)
-        across.append(b)
-    both = np.array([along, across])
-    turned = np.array([[seen, -hidden], [hidden, seen]]) @ both
+    lost = quadratic * last_s / count * np.sqrt(squares)
+    detuned = np.exp(np.array([0.5j * detuning * last_s / count]))
+    steps = np.stack([parts, squares, lost])[:, None]
+    both = _followed(a, b, steps, detuned, detuned)[:, 0]
+    turned = np.array([[seen[0], -hidden[0]], [hidden[0], seen[0]]]) @ both
     u, w = _cubic(turned, time_s * (count / last_s))
     return u, w
 
@@ -218,12 +252,11 @@ def two_planes(time_s: FloatArray, values: FloatArray, omega: float) -> Planes |
         other = cosine - 1j * sine
         x, y, seen, hidden = _begun(other[..., 0])
         half = np.exp(0.5j * turned[..., 0] / count)
-        found = np.empty(level.shape, dtype=np.complex128)
-        for k in range(count):
-            step = part[..., k], square[..., k], lost[..., k]
-            x, y = _stepped(x, y, *step, np.sqrt(half) if k == 0 else half)
-            u, w = seen * x - hidden * y, hidden * x + seen * y
-            found[..., k] = u + square[..., k] / 32.0 * _further(u, w)
+        steps = np.stack([part, square, lost])
+        x, y = _followed(x, y, steps, np.sqrt(half), half)[:, :, 1:]
+        seen, hidden = seen[:, None], hidden[:, None]
+        u, w = seen * x - hidden * y, hidden * x + seen * y
+        found = u + square / 32.0 * _further(u, w)
         turn = phase + faster * at - np.cumsum(part, axis=-1) / 16.0
         return np.asarray(found * level * np.exp(1j * turn))
 
