@@ -3,8 +3,9 @@
     python -m benchmarks.curves [--number N] [--list] [--journal FILE]
 
 A third each has a torque, a friction of the angle and a loss of the amplitude of some form, by
-scipy's DOP853. What Eq. 8 takes up of a force (a constant and a multiple of sin x of a torque;
-a y + b + c/y of a loss; dry friction) is no part of the curve, and is fitted out of the difference.
+scipy's DOP853. What the law takes up of a force (a constant and a multiple of sin x of a torque, or
+of x where the answer's law is Eq. 8 with x, whose curve then holds sin x - x too; a y + b + c/y of
+a loss; dry friction) is no part of the curve, and is fitted out of the difference.
 """
 
 from __future__ import annotations
@@ -24,11 +25,11 @@ Force = Callable[[Array], Array]
 ARGUMENTS: Final = {"torque": "angle, rad", "friction": "angle, rad", "loss": "amplitude, rad"}
 ORDINATES: Final = {"torque": "torque", "friction": "friction", "loss": "loss rate"}
 TAKEN: Final[dict[str, Callable[[Array], list[Array]]]] = {
-    "torque": lambda x: [np.ones_like(x), np.sin(x)],
+    "torque": lambda x: [np.ones_like(x), x],
     "friction": lambda x: [np.ones_like(x)],
     "loss": lambda y: [np.ones_like(y), y, 1.0 / y],
 }
-"""What Eq. 8 has of each kind."""
+"""What Eq. 8 has of each kind; of a torque the answer's own law, x or sin x."""
 
 
 class Decay(NamedTuple):
@@ -108,9 +109,12 @@ def answer(number: int) -> dict[str, Any]:
     # A formula without a constant is sure of its zero.
     inside = (np.abs(at) <= np.abs(decay.angle_rad).max()) & (sd > 0.0)
     at, value, sd = at[inside], value[inside], sd[inside]
-    taken = np.column_stack(TAKEN[decay.kind](at))
-    off = decay.force(at) - value
-    off = off - taken @ np.linalg.lstsq(taken, off, rcond=None)[0]
+    off, of = decay.force(at) - value, at
+    if decay.kind == "torque":
+        off += np.sin(at)
+        of = np.sin(at) if "circular-error" in {each["id"] for each in found["effects"]} else at
+    taken = np.column_stack(TAKEN[decay.kind](of))
+    off -= taken @ np.linalg.lstsq(taken, off, rcond=None)[0]
     return {"kind": decay.kind, "shown": shown, "pulls": (off / sd).tolist()}
 
 
