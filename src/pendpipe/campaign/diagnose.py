@@ -13,7 +13,7 @@ import numpy as np
 from pendpipe.answer import Answer, percent, printed
 from pendpipe.arrays import FloatArray
 from pendpipe.campaign.design import Design
-from pendpipe.campaign.effects import CATALOGUE
+from pendpipe.campaign.effects import CATALOGUE, WRONG
 from pendpipe.campaign.fit import (
     Candidate,
     JointFit,
@@ -437,7 +437,7 @@ def seen_in(search: CampaignSearch) -> list[dict[str, Any]]:
     if peak := bump(fit):
         text = (
             f"a bump in the loss near {peak.frequency_hz:.2g} Hz, {percent(peak.excess)} above what"
-            f" is told ({peak.beside[0]:.2g} to {peak.beside[1]:.2g} Hz)"
+            f" is told (between {peak.beside[0]:.2g} and {peak.beside[1]:.2g} Hz)"
         )
         found.append({"kind": "bump", **peak._asdict(), "text": text})
     if not found:
@@ -458,8 +458,12 @@ def _kinds(fit: JointFit, kinds: Groups) -> str:
 
 
 def _where(search: CampaignSearch) -> dict[str, Any]:
-    """Return the extent of what is left: the loss in the fluid against frequency, or a scatter."""
-    if is_orderly(search.improved):
+    """Return the extent of what is left: the loss in the fluid against frequency, or a scatter.
+
+    A scatter beyond a digit is no error of records: inputs far from what is told hold it.
+    """
+    factor, _ = scatter(search.improved)
+    if is_orderly(search.improved) or factor.value > WRONG:
         told = told_by_frequency(search.baseline)
         _, frequency, excess, _ = told_and_measured(told, wet=True)
         low, high = int(np.argmin(excess)), int(np.argmax(excess))
@@ -468,7 +472,6 @@ def _where(search: CampaignSearch) -> dict[str, Any]:
         )
         text = f"the loss in the fluid differs from what is told by {least}, {most}"
         return {"kind": "order", "excess": [excess[low], excess[high]], "text": text}
-    factor, _ = scatter(search.improved)
     text = f"the records scatter {factor.value:.2g} times more than their errors say"
     return {"kind": "scatter", "factor": factor.as_json(), "text": text}
 

@@ -70,7 +70,7 @@ class CampaignEffect:
 
 
 CATALOGUE: Final[dict[str, CampaignEffect]] = {}
-"""All campaign effects by identifier, in the order of their declaration."""
+"""All campaign effects by identifier, or by `key`, in the order of their declaration."""
 
 
 def campaign_effect(
@@ -83,14 +83,18 @@ def campaign_effect(
     shapes: Shapes = (None,),
     drag_law: bool = False,
     finer: bool = False,
+    key: str = "",
 ) -> Callable[[Acts], CampaignEffect]:
-    """Declare a campaign effect by the function through which it enters."""
+    """Declare a campaign effect by the function through which it enters.
+
+    One that enters in two ways is declared twice, the second time by a `key` of its own.
+    """
 
     def declare(function: Acts) -> CampaignEffect:
-        CATALOGUE[identifier] = CampaignEffect(
+        found = CATALOGUE[key or identifier] = CampaignEffect(
             identifier, name, equation, parameter, expected, on, function, shapes, drag_law, finer
         )
-        return CATALOGUE[identifier]
+        return found
 
     return declare
 
@@ -190,6 +194,34 @@ def walls(inputs: Inputs, size: FloatArray) -> Inputs:
     what is added to that of the told tank.
     """
     return replace(inputs, closer=inputs.closer + size)
+
+
+@campaign_effect(
+    "terms",
+    walls.identifier,
+    walls.name,
+    r"D \to (1 + \epsilon) D, \quad C_m \to C_m + \rho\, \epsilon",
+    Parameter("drag_excess", "", -0.5, 1.0),
+    0.1,
+    (0.3, 0.45, 0.6),
+    drag_law=True,
+    key="walls-of-any-shape",
+)
+def walls_of_any_shape(terms: Terms, size: FloatArray, design: Design, shape: float) -> Terms:
+    """Walls and surface of other proportions than the told tank's, in thin layers.
+
+    Where ``C_m`` grows by e the fluid passes the sphere faster, so that its drag grows by 4 e/3
+    (the loss in a layer goes as the change of (1 + C_m) V with the sphere's size), and the wall has
+    a layer of its own: e is 0.5 of a plane that nearly touches to 0.75 of a drag's excess. A free
+    surface takes of both, so that beside a wall e is less.
+    """
+    more = size * np.array([float(run.tank and run.fluid is not None) for run in design.runs])
+    return replace(
+        terms,
+        steady=terms.steady * (1.0 + more),
+        history=terms.history * (1.0 + more),
+        inertia=terms.inertia + shape * more * terms.displaced,
+    )
 
 
 _ADDED_PER_DRAG = 0.6

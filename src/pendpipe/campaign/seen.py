@@ -253,7 +253,10 @@ _FEWEST_OF_A_KIND: Final = 3
 
 
 class Bump(NamedTuple):
-    """Where the fluid's loss exceeds what is told of it most, with less on both sides."""
+    """Where the fluid's loss exceeds what is told of it most, with less on both sides.
+
+    `beside` are the records below half of its height, on both sides: it is between them.
+    """
 
     frequency_hz: float
     excess: float
@@ -263,7 +266,8 @@ class Bump(NamedTuple):
 def bump(fit: JointFit) -> Bump | None:
     """Return the bump of the loss against frequency, if there is one between the records.
 
-    It stands out from what is least below and above it by more than half of its height.
+    It stands out from what is least below and above it by more than half of its height, and by
+    more than records scatter, as the steps from one to the next show it.
     """
     rows, frequency, excess, sd = told_and_measured(told_by_frequency(fit), wet=True)
     if len(rows) < 2 * _FEWEST_OF_A_KIND:
@@ -271,10 +275,16 @@ def bump(fit: JointFit) -> Bump | None:
     top = int(np.argmax(excess))
     below, above = excess[: top + 1].min(), excess[top:].min()
     over = float(excess[top] - max(below, above))
-    if over < max(0.5 * float(np.ptp(excess)), FAR_SIGMA * float(sd[top])):
+    steps = np.median(np.abs(np.diff(excess)) / np.hypot(sd[1:], sd[:-1])) / _MEDIAN
+    if over < max(0.5 * float(np.ptp(excess)), FAR_SIGMA * float(sd[top]) * max(steps, 1.0)):
         return None
-    high = frequency[excess > excess[top] - 0.5 * over]
-    return Bump(float(frequency[top]), float(excess[top]), (float(high.min()), float(high.max())))
+    high = np.flatnonzero(excess > excess[top] - 0.5 * over)
+    beside = frequency[[max(high[0] - 1, 0), min(high[-1] + 1, len(rows) - 1)]].tolist()
+    return Bump(float(frequency[top]), float(excess[top]), (beside[0], beside[1]))
+
+
+_MEDIAN: Final = 0.6745
+"""Of the size of a normal number, in its standard deviations."""
 
 
 def has_shape(fit: JointFit) -> bool:
