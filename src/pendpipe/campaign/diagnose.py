@@ -12,7 +12,6 @@ import numpy as np
 
 from pendpipe.answer import Answer, percent, printed
 from pendpipe.arrays import FloatArray
-from pendpipe.campaign.design import Design
 from pendpipe.campaign.effects import CATALOGUE, WRONG
 from pendpipe.campaign.fit import (
     Candidate,
@@ -357,7 +356,8 @@ def answer_of(
 ) -> Answer:
     """Make the answer: whether the records agree, who does not, and what causes explain it."""
     count = len((search.whole or search).baseline.design.runs)
-    theory = _theory(search.baseline.design)
+    design = search.baseline.design
+    theory = "Eq. 16 in the tank that is told" if design.tank and design.walls else "Eq. 16"
     agree = (
         f"do not agree with {theory}" if search.missing else f"agree with {theory}, the loss torque"
     )
@@ -392,7 +392,12 @@ def _rows(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> list[t
             )
             for name, fit in (_with_and_without(search) if search.whole else {}).items()
         ),
-        ("scatter", _scatter(search)),
+        (
+            "scatter",
+            f"{search.scatter} times what the records' errors say ({percent(search.scattered)})"
+            if search.scatter
+            else "",
+        ),
         ("most probable", ", beside ".join(map(_likely, search.found))),
         ("or", f"{off(search.suspect)}: take it anew first" if search.suspect else ""),
         *(("beside it", _others(one)) for one in search.found),
@@ -403,11 +408,6 @@ def _rows(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> list[t
         ("shares", f"{beforehand}; sd expected: {', '.join(sizes)}" if known else ""),
         ("quote", f"k is {quoted_coefficient(search)}, averaged over causes" if known else ""),
     ]
-
-
-def _scatter(search: CampaignSearch) -> str:
-    factor, share = search.scatter, percent(search.scattered)
-    return (factor and f"{factor} times what the records' errors say ({share})") or ""
 
 
 def _pulled(search: CampaignSearch) -> str:
@@ -474,10 +474,6 @@ def _where(search: CampaignSearch) -> dict[str, Any]:
         return {"kind": "order", "excess": [excess[low], excess[high]], "text": text}
     text = f"the records scatter {factor.value:.2g} times more than their errors say"
     return {"kind": "scatter", "factor": factor.as_json(), "text": text}
-
-
-def _theory(design: Design) -> str:
-    return "Eq. 16 in the tank that is told" if design.tank and design.walls else "Eq. 16"
 
 
 def _words(name: str) -> str:

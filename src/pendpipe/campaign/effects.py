@@ -478,10 +478,6 @@ def _drag_of_one(terms: Terms, size: FloatArray, design: Design, shape: str) -> 
     return uniform.put(terms, size * there, design, None)
 
 
-def _rate(inputs: Inputs, size: FloatArray) -> Inputs:
-    return replace(inputs, rate_exponent=inputs.rate_exponent + size)
-
-
 DRAG_OF_ONE_RECORD: Final = CampaignEffect(
     "drag-of-one-record",
     "drag of one record",
@@ -499,6 +495,6 @@ RATE_EXPONENT: Final = CampaignEffect(
     Parameter("exponent", "", -3.0, 3.0),
     0.1,
     "inputs",
-    _rate,
+    lambda inputs, size: replace(inputs, rate_exponent=inputs.rate_exponent + size),
 )
 """Internal friction has none (Kimball and Lovell): Q_hys then goes as f^2 at one inertia."""
