@@ -491,6 +491,27 @@ def test_laws_with_loss_lose_energy_in_each_cycle(law: str, size: float, shape: 
     assert (np.diff(swings) < 0).all()
 
 
+def test_a_small_swing_out_of_the_plane_is_a_spherical_pendulums() -> None:
+    motion = Motion(
+        {"omega": OMEGA, "sine": 1.0, "second": 1.0, "second_omega": OMEGA, "second_gamma": 0.0},
+        1.0,
+        second_rad=1e-5,
+        second_rate_rad_s=2e-5 * OMEGA,
+    )
+    track = motion.run(H * np.arange(8001))
+
+    def force(_t: float, state: FloatArray) -> FloatArray:
+        at, speed = state[:3], state[3:]
+        weight = np.array([0.0, 0.0, -(OMEGA**2)])
+        return np.concatenate([speed, weight - (weight @ at + speed @ speed) * at])
+
+    start = [np.sin(1.0), 1e-5, -np.cos(1.0), 0.0, 2e-5 * OMEGA, 0.0]
+    tight = {"rtol": 1e-11, "atol": 1e-14, "t_eval": track.time_s, "method": "DOP853"}
+    sphere = solve_ivp(force, (0.0, track.time_s[-1]), start, **tight)
+    assert np.abs(track.angle_rad - np.arctan2(sphere.y[0], -sphere.y[2])).max() < 1e-6
+    assert np.abs(track.second_rad - sphere.y[1]).max() < 1e-9
+
+
 # The proof may not be the program agreeing with itself.
 
 PERMITTED = {"arrays", "errors", "files", "process", "version", "__file__"}

@@ -476,10 +476,13 @@ def rates(
     out[0] = v
     out[1] = free - sign * friction(p, x, v, t, turn, turned_at)
     if p.second != 0.0:
-        u = s[SECOND]
+        u, tension = s[SECOND], 0.0
+        if p.sine != 0.0 and p.inertial == 0.0:
+            # What holds a pendulum in its plane: it swings out of it against the same string.
+            tension = p.sine * (v * v + w * w * (math.cos(x) - 1.0))
         out[SECOND] = s[SECOND + 1]
         out[SECOND + 1] = (
-            -p.second_omega * p.second_omega * u
+            -(p.second_omega * p.second_omega + tension) * u
             - p.second_gamma * s[SECOND + 1]
             + p.coupling * p.omega * p.omega * x
             - p.inertial * out[1]
