@@ -331,13 +331,17 @@ def test_arrays_in_place_of_machine_code_move_the_same_pendulum(
     """Angles, derivatives, two planes: the sums' other order makes less than 1e-9."""
     law = Eq8(3.2, quadratic=1e-3, hysteretic=2e-3, viscous=1e-3, coulomb=2e-4, restoring="sine")
     release, time_s, found = Release(0.0, amplitude_rad), np.linspace(0.0, 80.0, 400), []
-    square = np.full_like(time_s, amplitude_rad**2)
+    square, angle = np.full_like(time_s, amplitude_rad**2), time_s.reshape(-1, 8) - 40.0
+    moving, side = (angle, np.sin(angle)), np.ones((len(angle), 1))
     for way in (Kernel.__call__, Kernel._without_machine_code):
         monkeypatch.setattr(Kernel, "__call__", way)
         turned = planes(time_s, 3.2 * time_s * square, square, 0.1 + 0.3j, 0.04, 0.1)
         found.append((*sample_with_jacobian(law, release, time_s), *turned))
+        found[-1] += (law.acceleration(*moving, side),)
     for ours, theirs in zip(*found, strict=True):
         assert np.all(abs(theirs - ours) <= 1e-9 * abs(ours).max(axis=0))
+    expected = 3.2**2 * angle - law.torque(angle) + law.friction(*moving, side)
+    np.testing.assert_allclose(found[0][-1], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("points", [FEW_POINTS, MOST_POINTS])

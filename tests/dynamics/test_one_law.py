@@ -191,7 +191,7 @@ def undamped(clock: Clock, start: float = 1.0, omega: float = OMEGA_RAD_S) -> Mo
 
 def eq8_motion(pendulum: Pendulum, start: float, count: int, order: int = 14) -> Motion:
     guess = undamped(Clock(count, order), start, pendulum.angular_frequency)
-    return follow(pendulum.acceleration, pendulum.angular_frequency, start, 0.0, guess)
+    return follow(pendulum.along, pendulum.angular_frequency, start, 0.0, guess)
 
 
 def sine_law(motion: Motion) -> FloatArray:
@@ -320,7 +320,7 @@ def test_the_tangent_is_what_a_small_force_does() -> None:
     """of_force and of_start against motions followed with a little more of each."""
     pendulum = Pendulum(OMEGA_RAD_S, 0.05, 0.01, 0.01, 1e-4)
     base = eq8_motion(pendulum, 0.2, 40)
-    tangent = Tangent(pendulum.acceleration, base)
+    tangent = Tangent(pendulum.along, base)
     time = np.arange(0.0, 20.0, 0.05)
     sampled = sample_motion(base, time)
 
@@ -330,10 +330,10 @@ def test_the_tangent_is_what_a_small_force_does() -> None:
         )
 
     small = 1e-5
-    pushed = changed(lambda m: pendulum.acceleration(m) + small * m.angle**2)
+    pushed = changed(lambda m: pendulum.along(m) + small * m.angle**2)
     by_force = small * sampled.change(*tangent.of_force(base.angle**2))
     assert np.linalg.norm(by_force - pushed) < 1e-3 * np.linalg.norm(pushed)
-    grown = changed(pendulum.acceleration, start=0.2 * math.exp(small))
+    grown = changed(pendulum.along, start=0.2 * math.exp(small))
     by_start = small * sampled.change(*tangent.of_start())
     assert np.linalg.norm(by_start - grown) < 1e-3 * np.linalg.norm(grown)
 
@@ -354,7 +354,7 @@ def test_what_comes_after_the_last_reading_is_of_no_consequence() -> None:
     short = eq8_motion(pendulum, start, 20)
     until = float(short.time_s[-1, -1])
     whole = follow(
-        pendulum.acceleration, OMEGA_RAD_S, start, 0.0, undamped(Clock(60), start), until_s=until
+        pendulum.along, OMEGA_RAD_S, start, 0.0, undamped(Clock(60), start), until_s=until
     )
     time = np.arange(0.0, until, 0.037)
     one, other = (sample_motion(motion, time).angle for motion in (short, whole))
@@ -386,7 +386,7 @@ def test_a_pendulum_that_stops_before_the_last_reading_is_refused() -> None:
     pendulum = Pendulum(OMEGA_RAD_S, 0.0, 0.0, 0.0, 0.15 / (30.0 * math.pi / OMEGA_RAD_S))
     clock, until = Clock(60), 50.0 * math.pi / OMEGA_RAD_S
     with pytest.raises(StopsError):
-        follow(pendulum.acceleration, OMEGA_RAD_S, 0.15, 0.0, undamped(clock, 0.15), until_s=until)
+        follow(pendulum.along, OMEGA_RAD_S, 0.15, 0.0, undamped(clock, 0.15), until_s=until)
 
 
 @pytest.mark.parametrize("amplitude", [0.3, 0.75, 1.15, 1.5, 1.9, 2.3, 2.55])

@@ -6,7 +6,7 @@ With x = r cos(psi), v = -omega r sin(psi) and x'' = -omega^2 x + f, the motion 
     d t/d psi    = 1/(omega (1 - g cos(psi))),
 
 and its turning points are psi = k pi. Within a half cycle the sign of the velocity is fixed,
-so that f is smooth whatever the friction, and a law is a function of whole arrays: nothing is
+so that f is smooth whatever the friction, and a law is a function of whole arrays: it need not be
 compiled. Both equations are solved by Newton's method, all half cycles together: a change of
 ln r obeys a scalar linear equation, which is integrated exactly, and gives that of t. The motion
 is read at given times by what is slow in it.
@@ -18,13 +18,14 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics.chebyshev import analysis, lobatto_integration, lobatto_nodes
+from pendpipe.dynamics.kernel import Matrix, kernel
 
 
 @dataclass(frozen=True)
@@ -155,6 +156,17 @@ class StopsError(NoMotionError):
     """It stops there, wherever the iteration began."""
 
 
+class Slopes(NamedTuple):
+    """How the rates change with ln r, at a motion."""
+
+    by_log: FloatArray
+    """d ln r/d psi by ln r, over `grown`."""
+    by_time: FloatArray
+    """dt/d psi by ln r."""
+    grown: FloatArray
+    """What a change of ln r at the start has grown to."""
+
+
 @dataclass(frozen=True)
 class Motion:
     """A motion at the nodes of its clock; all arrays of shape (half cycles, order + 1).
@@ -174,7 +186,7 @@ class Motion:
     upwards
         +1 where the first turning point is positive, else -1.
     slopes
-        Of d ln r/d psi and of dt/d psi by ln r, at a motion near it.
+        At a motion near it.
     """
 
     clock: Clock
@@ -182,7 +194,7 @@ class Motion:
     log_amplitude: FloatArray
     time_s: FloatArray
     upwards: float = 1.0
-    slopes: tuple[FloatArray, FloatArray] | None = None
+    slopes: Slopes | None = None
 
     @cached_property
     def amplitude(self) -> FloatArray:
@@ -237,12 +249,14 @@ def rates(law: Law, motion: Motion, largest: float = _LARGEST) -> Rates:
     So they are finite along a motion that is wrong: for a search on its way, and after the time
     until which a motion was followed.
     """
-    omega = motion.angular_frequency
+    omega, _, cosine, sine, _ = motion.angular_frequency, *_phases(motion.clock)
     pull = np.asarray(motion.upwards * law(motion) / (omega * omega * motion.amplitude))
     g = np.clip(np.where(np.isnan(pull), 0.0, pull), -largest, largest)
-    g = np.where(g * motion.clock.cosine > _STEEPEST, np.copysign(_STEEPEST, g), g)
-    free = 1.0 - g * motion.clock.cosine
-    return Rates(-g * motion.clock.sine / free, 1.0 / (omega * free), pull)
+    steep = g * cosine > _STEEPEST
+    if steep.any():
+        g = np.where(steep, np.copysign(_STEEPEST, g), g)
+    free = 1.0 - g * cosine
+    return Rates(-g * sine / free, 1.0 / (omega * free), pull)
 
 
 def follow(
@@ -321,17 +335,18 @@ def _solved(
     before, front, waits = math.inf, -1, 0
     for _ in range(_ROUNDS):
         now = rates(law, motion, largest)
-        by_log, by_time = motion.slopes or _slopes(law, motion, now, largest)
+        slopes = motion.slopes or _slopes(law, motion, now, largest)
+        # The change y of ln r is off, and the integral of its slope times y.
         off = log_start + clock.integral(now.loss) - motion.log_amplitude
-        change = np.clip(_linear(clock, by_log, off), -_STRIDE, _STRIDE)
-        late = start_s + clock.integral(now.pace + by_time * change) - motion.time_s
+        change = off + slopes.grown * clock.integral(slopes.by_log * off)
+        change = np.clip(change, -_STRIDE, _STRIDE, out=change)
+        late = start_s + clock.integral(now.pace + slopes.by_time * change) - motion.time_s
         errors = np.maximum(np.abs(change), omega * np.abs(late)).max(axis=1)
         errors = errors[: _followed(motion, until_s)]
         error = float(np.max(errors))
-        log_amplitude, time_s = motion.log_amplitude + change, motion.time_s + late
-        motion = replace(
-            motion, log_amplitude=log_amplitude, time_s=time_s, slopes=(by_log, by_time)
-        )
+        change += motion.log_amplitude
+        late += motion.time_s
+        motion = Motion(clock, omega, change, late, motion.upwards, slopes)
         # The next change will be smaller by what this one is smaller than the last; with slopes of
         # a motion near it, hardly by more than ten.
         smaller = min(max(error / before, 0.1), 1.0) if before < math.inf else 1.0
@@ -353,21 +368,13 @@ def _solved(
     raise NoMotionError("the motion can't be followed")
 
 
-def _slopes(
-    law: Law, motion: Motion, now: Rates, largest: float = _LARGEST
-) -> tuple[FloatArray, FloatArray]:
+def _slopes(law: Law, motion: Motion, now: Rates, largest: float = _LARGEST) -> Slopes:
     """Return how the rates change with ln r, by differences."""
     larger = replace(motion, log_amplitude=motion.log_amplitude + _STEP)
     more = rates(law, larger, largest)
-    return (more.loss - now.loss) / _STEP, (more.pace - now.pace) / _STEP
-
-
-def _linear(clock: Clock, steepness: FloatArray, source: FloatArray) -> FloatArray:
-    """Solve y = source + integral of (steepness y) over the phase."""
-    growth = clock.integral(steepness)
-    return np.asarray(
-        source + np.exp(growth) * clock.integral(np.exp(-growth) * steepness * source)
-    )
+    by_log = (more.loss - now.loss) / _STEP
+    grown = np.exp(motion.clock.integral(by_log))
+    return Slopes(by_log / grown, (more.pace - now.pace) / _STEP, grown)
 
 
 class Tangent:
@@ -388,25 +395,20 @@ class Tangent:
         return rates(self._law, self.motion)
 
     @cached_property
-    def _slopes(self) -> tuple[FloatArray, FloatArray]:
+    def _slopes(self) -> Slopes:
         return _slopes(self._law, self.motion, self.rates)
-
-    @cached_property
-    def _grown(self) -> FloatArray:
-        """What a change of ln r at the start has grown to."""
-        return np.exp(self.motion.clock.integral(self._slopes[0]))
 
     def of_start(self) -> tuple[FloatArray, FloatArray]:
         """Change of ln r and t by ln r at the start."""
-        by_log = self._grown.copy()
-        return by_log, self.motion.clock.integral(self._slopes[1] * by_log)
+        by_log = self._slopes.grown.copy()
+        return by_log, self.motion.clock.integral(self._slopes.by_time * by_log)
 
     def of_rates(self, loss: FloatArray, pace: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Change of ln r and t at fixed phase by a change of the rates."""
         clock = self.motion.clock
-        by_log = clock.integral(loss / self._grown)
-        by_log *= self._grown
-        by_time = self._slopes[1] * by_log
+        by_log = clock.integral(loss / self._slopes.grown)
+        by_log *= self._slopes.grown
+        by_time = self._slopes.by_time * by_log
         by_time += pace
         return by_log, clock.integral(by_time)
 
@@ -421,8 +423,6 @@ class Tangent:
 
 _POINTS: Final = 6
 """Neighbouring nodes that a value is interpolated from."""
-_READ_AT_ONCE: Final = 1 << 14
-"""Readings that are interpolated together."""
 _FINER: Final = 3
 """Nodes that are interpolated from, over those of the motion."""
 
@@ -595,15 +595,26 @@ def interpolated(values: FloatArray, first: IntArray, weights: FloatArray) -> Fl
     """Interpolate what is known at the nodes, shape (..., rows, order + 1), by six finer ones."""
     flat = values.reshape(-1, *values.shape[-2:])
     found = np.empty((len(flat), len(first)))
-    points = np.arange(_POINTS)[:, None]
-    for row, out in zip(flat, found, strict=True):
-        nodes = _at_finer(row).reshape(-1)
-        # Some at a time stay in the processor's cache.
-        for start in range(0, len(first), _READ_AT_ONCE):
-            part = slice(start, start + _READ_AT_ONCE)
-            near = nodes.take(first[part] + points, mode="clip")
-            np.einsum("pn,pn->n", near, weights[:, part], out=out[part])
+    _interpolate(_at_finer(flat).reshape(len(flat), -1), first, weights, found)
     return found.reshape(*values.shape[:-2], -1)
+
+
+def _all_interpolated(nodes: Matrix, first: IntArray, weights: Matrix, found: Matrix) -> None:
+    near = first + np.arange(_POINTS)[:, None]
+    for row, out in zip(nodes, found, strict=True):
+        np.einsum("pn,pn->n", row.take(near, mode="clip"), weights, out=out)
+
+
+@kernel(arrays=_all_interpolated)
+def _interpolate(nodes: Matrix, first: IntArray, weights: Matrix, found: Matrix) -> None:
+    """Interpolate each row of `nodes` by six of them from `first` on."""
+    last = nodes.shape[1] - 1
+    for row in range(nodes.shape[0]):
+        for i in range(first.size):
+            total = 0.0
+            for p in range(_POINTS):
+                total += nodes[row, min(first[i] + p, last)] * weights[p, i]
+            found[row, i] = total
 
 
 def lagrange(nodes: FloatArray, first: IntArray, time_s: FloatArray) -> FloatArray:
@@ -611,28 +622,36 @@ def lagrange(nodes: FloatArray, first: IntArray, time_s: FloatArray) -> FloatArr
 
     The nodes at the ends of a motion lie close together: beyond, only three are used.
     """
-    weights = _through(nodes, first, time_s, range(_POINTS))
+    weights = np.empty((_POINTS, len(time_s)))
+    _weigh(nodes, first, np.ascontiguousarray(time_s), weights)
+    return weights
+
+
+def _all_weighed(nodes: FloatArray, first: IntArray, time_s: FloatArray, weights: Matrix) -> None:
     half = _POINTS // 2
-    for outside, points in (
+    for part, points in (
+        (slice(None), range(_POINTS)),
         (time_s < nodes[0], range(half)),
         (time_s > nodes[-1], range(half, _POINTS)),
     ):
-        if outside.any():
-            weights[:, outside] = 0.0
-            near = _through(nodes, first[outside], time_s[outside], points)
-            weights[points.start : points.stop, outside] = near
-    return weights
+        near, at = nodes[first[part] + np.arange(_POINTS)[:, None]], time_s[part]
+        for own in range(_POINTS):
+            others = [near[k] for k in points if k != own]
+            shares = (((at - other) / (near[own] - other)) for other in others)
+            weights[own, part] = math.prod(shares) if own in points else 0.0
 
 
-def _through(
-    nodes: FloatArray, first: IntArray, time_s: FloatArray, points: Sequence[int]
-) -> FloatArray:
-    """Lagrange's weights of some nodes behind `first`."""
-    near = [nodes[first + point] for point in points]
-    weights = np.empty((len(near), len(time_s)))
-    for own, node in enumerate(near):
-        product = np.ones_like(time_s)
-        for other in (*near[:own], *near[own + 1 :]):
-            product = product * (time_s - other) / (node - other)
-        weights[own] = product
-    return weights
+@kernel(arrays=_all_weighed)
+def _weigh(nodes: FloatArray, first: IntArray, time_s: FloatArray, weights: Matrix) -> None:
+    """Write Lagrange's weights."""
+    half, last = _POINTS // 2, nodes.size - 1
+    for i in range(time_s.size):
+        at, start = time_s[i], first[i]
+        low, high = half if at > nodes[last] else 0, half if at < nodes[0] else _POINTS
+        for own in range(_POINTS):
+            over, under = 1.0 if low <= own < high else 0.0, 1.0
+            for other in range(low, high):
+                if other != own:
+                    over *= at - nodes[start + other]
+                    under *= nodes[start + own] - nodes[start + other]
+            weights[own, i] = over / under

@@ -1,13 +1,16 @@
 """Eq. 8: its constants, turning points and samples, and their derivatives by every parameter."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final, Literal, get_args
+from typing import Any, Final, Literal, cast, get_args
 
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.kernel import Kernel, kernel
 from pendpipe.dynamics.layout import (
     ENDINGS,
     HEAD,
@@ -44,6 +47,49 @@ Restoring = Literal["linear", "sine"]
 """The torque: omega^2 x, or omega^2 sin x."""
 Drag = Literal["energy", "speed"]
 """The form of the quadratic loss: the paper's rho^2 sgn v, or v|v|."""
+
+
+_TERMS: Final = 11
+"""Of the series of a sine, up to pi/2: the next is 3e-18."""
+_SINES: Final = np.array([(-1.0) ** k / math.factorial(2 * k + 1) for k in range(_TERMS)])
+
+
+@kernel(inline=True)
+def _braked(square: Any, v: Any, side: Any, law: FloatArray) -> Any:
+    """The acceleration by all four losses of a `law` (`Eq8.numbers`); of twice the energy."""
+    omega, drag = law[0], square + law[5] * (1.5 * v * v - square)
+    dry = omega * law[4] + law[2] * math.sqrt(square) + law[1] / omega * drag
+    return -0.5 * math.pi * dry * side - 2.0 * law[3] * v
+
+
+@kernel(inline=True)
+def _acceleration(x: Any, v: Any, side: Any, law: FloatArray) -> Any:
+    """The acceleration x'' + omega^2 x."""
+    s, less = x, 0.0
+    if law[6] != 0.0:
+        # sin x is 2 sin u cos u of half the angle less whole half turns.
+        u = 0.5 * x - math.pi * np.floor(x / (2.0 * math.pi) + 0.5)
+        z, sine = u * u, _SINES[_TERMS - 1]
+        for k in range(_TERMS - 2, -1, -1):
+            sine = sine * z + _SINES[k]
+        s = 2.0 * sine * u
+        less = x - s * math.sqrt(abs(1.0 - 0.25 * s * s))
+    square = law[0] * law[0]
+    return _braked(square * s * s + v * v, v, side, law) + square * less
+
+
+def _all_accelerated(
+    angle: FloatArray, velocity: FloatArray, side: FloatArray, law: FloatArray, found: FloatArray
+) -> None:
+    found[:] = cast("Kernel", _acceleration).plain(angle, velocity, side, law)
+
+
+@kernel(any_order=True, arrays=_all_accelerated)
+def _accelerate(
+    angle: FloatArray, velocity: FloatArray, side: FloatArray, law: FloatArray, found: FloatArray
+) -> None:
+    for i in range(angle.size):
+        found[i] = _acceleration(angle[i], velocity[i], side[i], law)
 
 
 @dataclass(frozen=True)
@@ -171,11 +217,24 @@ class Eq8:
         self, angle: FloatArray, velocity: FloatArray, direction: FloatArray
     ) -> FloatArray:
         """Return the acceleration by all four losses, rad/s^2; `direction` is sgn v."""
-        omega, square = self.angular_frequency, self.energy(angle, velocity)
-        drag = 1.5 * velocity**2 if self.drag == "speed" else square
-        dry = omega * self.coulomb + self.hysteretic * np.sqrt(square)
-        dry = dry + self.quadratic / omega * drag
-        return np.asarray(-0.5 * math.pi * dry * direction - 2.0 * self.viscous * velocity)
+        square = self.energy(angle, velocity)
+        return np.asarray(
+            cast("Kernel", _braked).plain(square, velocity, direction, self.numbers())
+        )
+
+    def acceleration(
+        self, angle: FloatArray, velocity: FloatArray, direction: FloatArray
+    ) -> FloatArray:
+        """Return x'' + omega^2 x, rad/s^2, shape (k, n); `direction` is that of k half cycles."""
+        found, side = np.empty(angle.shape), np.repeat(direction[:, 0], angle.shape[1])
+        flat = (each.reshape(-1) for each in (angle, velocity, side, self.numbers(), found))
+        _accelerate(*flat)
+        return found
+
+    def numbers(self) -> FloatArray:
+        """Return omega, `RATES`, and 1 for a drag v|v| and for sin x, else 0."""
+        forms = self.drag == "speed", self.restoring == "sine"
+        return np.array([self.angular_frequency, *self.rates(), *forms], dtype=np.float64)
 
     @property
     def stop_rad(self) -> float:

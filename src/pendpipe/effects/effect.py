@@ -101,12 +101,9 @@ class Pendulum(Eq8):
         """Return the acceleration by Eq. 8's losses at the nodes, rad/s^2."""
         return self.friction(motion.angle, motion.velocity, motion.direction)
 
-    def acceleration(self, motion: Motion) -> FloatArray:
+    def along(self, motion: Motion) -> FloatArray:
         """Return x'' + omega^2 x of Eq. 8 at the nodes, rad/s^2."""
-        found = self.losses(motion)
-        if self.restoring == "sine":
-            found = found + self.angular_frequency**2 * motion.angle - self.torque(motion.angle)
-        return found
+        return self.acceleration(motion.angle, motion.velocity, motion.direction)
 
 
 class Start(NamedTuple):
@@ -282,7 +279,7 @@ class Effect:
             return None
         usual = {name: getattr(Eq8, name) for name in self.form}
         with_it, without = replace(pendulum, **self.form), replace(pendulum, **usual)
-        return np.asarray(values[0] * (with_it.acceleration(motion) - without.acceleration(motion)))
+        return np.asarray(values[0] * (with_it.along(motion) - without.along(motion)))
 
     def believable(self, values: FloatArray) -> bool:
         """Whether fitted values are those of the thing that is named."""

@@ -308,7 +308,7 @@ class Model(Eq8Model):
                 # Another form is in the pendulum already.
                 return None if effect.form else effect.acceleration(motion, pendulum, own)
 
-            return self._added(pendulum.acceleration(motion), value, of)
+            return self._added(pendulum.along(motion), value, of)
 
         return acceleration
 
