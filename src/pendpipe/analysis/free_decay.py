@@ -78,10 +78,8 @@ class Run:
         Disturbed half cycles inside.
     score
         How freely they follow one another.
-    fades
-        Whether it ends in its own rest or with the record, rather than in something else.
-    driven
-        Whether the amplitude was held up before.
+    before
+        Why what stands before it is no free decay, where its amplitudes tell.
     """
 
     cycles: HalfCycles
@@ -89,8 +87,7 @@ class Run:
     last: int
     bridged: int = 0
     score: float = 0.0
-    fades: bool = False
-    driven: bool = False
+    before: str = ""
 
     @property
     def swing(self) -> FloatArray:
@@ -123,36 +120,65 @@ class Run:
         return self.last - self.first + 1
 
 
-def best_runs(cycles: HalfCycles, gaps_s: Sequence[float] | FloatArray = ()) -> list[Run]:
-    """Find the runs among the half cycles of a record with gaps at some times, the best first."""
+def best_runs(
+    cycles: HalfCycles,
+    gaps_s: Sequence[float] | FloatArray = (),
+    readings: tuple[FloatArray, FloatArray] = (np.empty(0), np.empty(0)),
+) -> list[Run]:
+    """Find the runs among the half cycles of a record with gaps at some times, the best first.
+
+    Its `readings` (times, values) say whether the sensor cuts off turns.
+    """
     if len(cycles) < LEAST_HALF_CYCLES:
         return []
+    piece = np.searchsorted(gaps_s, cycles.middle_s)
+    half = _usual(cycles, np.diff(piece) > 0)
+    follows, fronts, asked = _follows(cycles, half), dict[int, str](), -1
+    # No half cycle follows in a front that is held up, or cut off by the sensor: where chains have
+    # one they are aligned again without it.
+    while len(fronts) > asked:
+        asked, chains = len(fronts), _chains(cycles, piece, half.tolist(), follows.tolist())
+        for one in (one for _, one in chains if one[0] not in fronts):
+            whole = slice(one[0], one[-1] + 1)
+            held = _held(cycles.swing[whole], cycles.step)
+            if front := held or _flat(cycles, whole, *readings):
+                follows[one[0] : one[0] + front] = -math.inf
+                fronts[one[0] + front] = _DRIVEN if held else _CUT_OFF
     runs = (
-        Run(cycles, one[0], one[-1], one[-1] - one[0] + 1 - len(one), score)
-        for score, one in _chains(cycles, np.searchsorted(gaps_s, cycles.middle_s))
+        Run(cycles, one[0], one[-1], one[-1] - one[0] + 1 - len(one), score, fronts.get(one[0], ""))
+        for score, one in chains
         if len(one) >= LEAST_HALF_CYCLES
     )
-    return sorted((_undriven(_fading(run)) for run in runs), key=lambda run: -run.worth)
+    return sorted(runs, key=lambda run: -run.worth)
 
 
-def _chains(cycles: HalfCycles, piece: IntArray) -> list[tuple[float, list[int]]]:
+def _usual(cycles: HalfCycles, gap: BoolArray) -> FloatArray:
+    """The usual half period at each link, of which some are over a gap; shape (m - 1,).
+
+    What holds a gap is no half period, and those behind it may be another motion's.
+    """
+    half = np.diff(cycles.middle_s)
+    parts = np.split(np.where(gap, np.nan, half), np.flatnonzero(gap) + 1)
+    known = np.concatenate([_running_median(part) for part in parts if len(part)])
+    return np.where(np.isnan(known), median(half), known)
+
+
+def _chains(
+    cycles: HalfCycles, piece: IntArray, usual: Sequence[float], follows: Sequence[float]
+) -> list[tuple[float, list[int]]]:
     """Align half cycles to chains, each of one free motion: a chain ends where its score is most.
 
     (Smith and Waterman's alignment of pieces.) A half cycle goes on from the one before at a score
     of up to 1, or over disturbed ones, or a gap to the next `piece` of the record, at a price.
     """
-    # What holds a gap is no half period, and those behind it may be another motion's.
-    half, gap = np.diff(cycles.middle_s), np.diff(piece) > 0
-    parts = np.split(np.where(gap, np.nan, half), np.flatnonzero(gap) + 1)
-    known = np.concatenate([_running_median(part) for part in parts if len(part)])
-    half = np.where(np.isnan(known), median(half), known)
-    follows, usual = _follows(cycles, half).tolist(), half.tolist()
     swing, step = cycles.swing.tolist(), cycles.step
     score, before = [0.0] * len(swing), [-1] * len(swing)
     # Of the chain up to each: its first and its least swing, and the largest of the last three.
-    first, floor, top = swing[:], swing[:], swing[:]
+    first, floor, top, begin = swing[:], swing[:], swing[:], 0
     for here in range(1, len(swing)):
         size, at = swing[here], here - 1
+        # Nothing goes on over a front's end.
+        begin = begin if follows[at] > -math.inf else here
         links = [(score[at] + follows[at], at)]
         if follows[at] < 0.0 or size > _RISE * floor[at] + _TAIL * first[at] + step:
             links = [
@@ -161,7 +187,7 @@ def _chains(cycles: HalfCycles, piece: IntArray) -> list[tuple[float, list[int]]
                     + _over(cycles, at, here, top[at], usual, gap=piece[at] < piece[here]),
                     at,
                 )
-                for at in range(max(0, here - _NEAR), here)
+                for at in range(max(begin, here - _NEAR), here)
             ]
         # What is smaller than the next, and begins the motion, is a pull.
         pulled = 0.93 * size - 0.5 * step
@@ -200,7 +226,12 @@ def _follows(cycles: HalfCycles, usual: FloatArray) -> FloatArray:
     change = after - before
     off = np.where(change > 0.0, change / ((_RISE - 1.0) * before + step), change / (before - low))
     worst = np.maximum(late**2, off**2)
-    return np.asarray(1.0 - np.maximum(worst, _uneven(cycles, worst > 1.0) ** 2))
+    edges = [0, *(np.flatnonzero(worst > 1.0) + 1).tolist(), len(swing)]
+    for first, last in pairwise(edges):
+        if last - first >= LEAST_HALF_CYCLES:
+            one = slice(first, last - 1)
+            worst[one] = np.maximum(worst[one], _wavering(cycles, first, last) ** 2)
+    return np.asarray(1.0 - worst)
 
 
 def _over(
@@ -241,23 +272,11 @@ def _running_median(values: FloatArray) -> FloatArray:
     return np.asarray(0.5 * (windows[rows, (count - 1) // 2] + windows[rows, count // 2]))
 
 
-def _uneven(cycles: HalfCycles, broken: BoolArray) -> FloatArray:
-    """How unevenly half cycles follow between links that are `broken`, shape (m - 1,)."""
-    uneven, edges = (
-        np.zeros(len(broken)),
-        [0, *(np.flatnonzero(broken) + 1).tolist(), len(broken) + 1],
-    )
-    for first, last in pairwise(edges):
-        if last - first >= LEAST_HALF_CYCLES:
-            swing, half = cycles.swing[first:last], np.diff(cycles.middle_s[first:last])
-            uneven[first : last - 1] = _wavering(swing, half, cycles.step)
-    return uneven
-
-
-def _wavering(swing: FloatArray, half: FloatArray, step: float) -> float:
+def _wavering(cycles: HalfCycles, first: int, last: int) -> float:
     """How far periods and amplitudes waver, over what a pendulum's may."""
+    swing, half = cycles.swing[first:last], np.diff(cycles.middle_s[first:last])
     usual = float(median(swing))
-    blur = step / usual
+    blur = cycles.step / usual
     # Where the sides differ, half cycles two apart are alike; of a few that says too little.
     apart = 2 if len(half) > _FEW_LINKS else 1
     waver = float(median(np.abs(half[apart:] - half[:-apart]))) / float(median(half))
@@ -276,26 +295,16 @@ def _bends(swing: FloatArray, usual: float) -> FloatArray:
     return np.asarray(np.abs([np.diff(np.log(swing), 2), np.diff(swing, 2) / usual]))
 
 
-def _fading(run: Run) -> Run:
-    """Note whether the run's own last swing follows it, and then rest or the record's end."""
-    cycles = run.cycles
-    if run.last + 1 == len(cycles):
-        return replace(run, fades=cycles.ending < _RISE * float(run.swing[-1]) + cycles.step)
-    pause = float(cycles.middle_s[run.last + 1] - run.middle_s[-1])
-    return replace(run, fades=pause > 1.5 * run.half_period_s)
-
-
-def _undriven(run: Run) -> Run:
-    """Cut a front part whose amplitude is held while the part after it falls.
+def _held(swing: FloatArray, step: float) -> int:
+    """Count half cycles at the front whose amplitude is held while that after them falls.
 
     The loss of a free half cycle grows with its amplitude; so the first k half cycles lose
     at least k times what those after them lose. A tenth of that is no free decay. (The top
     of a beat is flat too, but loses 0.3 of it.)
     """
-    swing, step = run.swing, run.cycles.step
     count = len(swing)
     if count < 9:
-        return run
+        return 0
     k = np.arange(4, count - 4)
     ahead = np.minimum(np.maximum(4, k // 2), count - 1 - k)
     # Medians of seven: a disturbed half cycle inside the run is no drive.
@@ -311,13 +320,34 @@ def _undriven(run: Run) -> Run:
     held &= falls > np.maximum(2.0 * waver, 3.0 * step)
     gain = np.where(held, expected - lost, 0.0)
     best = int(np.argmax(gain))
-    if gain[best] <= 0:
-        return run
-    return replace(run, first=run.first + int(k[best]), driven=True)
+    return int(k[best]) if gain[best] > 0.0 else 0
+
+
+def _flat(cycles: HalfCycles, whole: slice, time: FloatArray, values: FloatArray) -> int:
+    """Count half cycles at the front that end flat on one side, while the other side falls.
+
+    A sonic ranger has a dead zone, an optical sensor an edge: there the readings stay.
+    """
+    turns, when = (part[whole.start : whole.stop + 1] for part in (cycles.turn, cycles.turn_time_s))
+    near = max(_FLAT * abs(float(turns[1] - turns[0])), cycles.step)
+    for side in (0, 1):
+        own, other = turns[side::2], turns[1 - side :: 2]
+        floor = float(median(own[:_FEW_FLAT]))
+        count = int(np.argmax(np.append(np.abs(own - floor) > near, True)))
+        falls = count < len(other) and abs(other[0] - other[count]) >= 3.0 * near
+        if falls and count >= _FEW_FLAT and len(turns) - 1 - 2 * count - side > _MANY:
+            inside = slice(*np.searchsorted(time, when[[0, 2 * count - 2 + side]]))
+            swing = abs(float(median(other[:count])) - floor)
+            expected = math.acos(1.0 - 2.0 * near / swing) / math.pi
+            if np.mean(np.abs(values[inside] - floor) < near) > _LONG * expected:
+                return 2 * count + side
+    return 0
 
 
 _SHORT: Final = 8.0
 """Half periods below which a rest between two motions is part of the handling."""
+_DRIVEN: Final = "driven: the amplitude is held up"
+_CUT_OFF: Final = "the sensor reads no further on one side: larger swings are left out"
 _BY_HAND: Final = "held or moved by hand before release"
 _NO_DECAY: Final = "no free decay: handling, clamp, repositioning or drive"
 
@@ -455,7 +485,7 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
     # much as it scores.
     found = [
         run
-        for run in best_runs(cycles, time[edges])
+        for run in best_runs(cycles, time[edges], (time, values))
         if math.log(max(len(cycles) - run.legs, 1)) <= math.lgamma(run.score + 2.0)
     ]
     # A drive that comes or goes may tell as much, but does not fall.
@@ -470,7 +500,7 @@ def find_free_decay(recording: Recording, place: str | Path = "recording") -> Fr
         half_period,
         place,
         driven=not alone,
-        held=told is not None and told.driven,
+        held=told is not None and told.before == _DRIVEN,
         decay_s=ends,
     )
     if beat is not None:
@@ -539,19 +569,14 @@ def _described(
     may_turn_over: bool,
 ) -> FreeDecay:
     """Say where a decay begins and ends, what is cut off it, and what else was noticed."""
-    flat = _flat_turns(time, values, run)
-    if flat is not None and run.legs - flat > _MANY:
-        run = replace(run, first=run.first + flat)
     piece = time[np.append(edges, len(time) - 1)], time[np.append(0, edges + 1)]
     stop = _stop(float(piece[0][np.searchsorted(piece[0], run.middle_s[-1])]), run)
     first = int(np.searchsorted(time, piece[1][np.searchsorted(piece[1], run.middle_s[0]) - 1]))
     start = _start(time[first:], values[first:], run)
     half, swing = run.half_period_s, float(run.swing[0])
-    before = "driven: the amplitude is held up" if run.driven else _BY_HAND
+    before = run.before or _BY_HAND
     centre = float(np.mean(run.cycles.turn[run.first : run.first + 2]))
     wide = np.abs(values[time < start] - centre).max(initial=0.0)
-    if flat is not None:
-        before = "the sensor reads no further on one side: larger swings are left out"
     if may_turn_over and wide > np.pi > 0.5 * swing:
         before = "it went over the top before it settled"
     quiet = max(2.0 * least, 0.02 * swing)
@@ -574,28 +599,6 @@ def _described(
         ),
     ]
     return FreeDecay(start, stop, cuts, half, run.legs, notes)
-
-
-def _flat_turns(time: FloatArray, values: FloatArray, run: Run) -> int | None:
-    """Count the half cycles at the front that end flat on one side, while the other side falls.
-
-    A sonic ranger has a dead zone, an optical sensor an edge: there the readings stay.
-    """
-    turns = run.cycles.turn[run.first : run.last + 2]
-    when = run.cycles.turn_time_s[run.first : run.last + 2]
-    near = max(_FLAT * abs(float(turns[1] - turns[0])), run.cycles.step)
-    for side in (0, 1):
-        own, other = turns[side::2], turns[1 - side :: 2]
-        floor = float(median(own[:_FEW_FLAT]))
-        count = int(np.argmax(np.append(np.abs(own - floor) > near, True)))
-        if count < _FEW_FLAT or count >= len(other) or abs(other[0] - other[count]) < 3.0 * near:
-            continue
-        inside = (time >= when[0]) & (time <= when[2 * count - 2 + side])
-        swing = abs(float(median(other[:count])) - floor)
-        expected = math.acos(1.0 - 2.0 * near / swing) / math.pi
-        if np.mean(np.abs(values[inside] - floor) < near) > _LONG * expected:
-            return 2 * count + side
-    return None
 
 
 def _beating(
@@ -735,13 +738,16 @@ def _stop(end: float, run: Run) -> float:
     A decay comes to rest by itself where its next swing would be none, or is not seen. One that
     rests sooner was caught: its last half cycle is the hand's, and may be as long as others.
     """
-    half = float(median(np.diff(run.middle_s[-4:])))
-    swing, turned = run.swing, run.cycles.turn_time_s[run.last : run.last + 2].tolist()
-    loss = float(median(np.abs(np.diff(swing[-_BLOCKS:])))) + run.cycles.step
-    if run.fades and end - turned[1] > 1.5 * half and swing[-1] > _SPOILT * loss:
+    half, cycles, swing = float(median(np.diff(run.middle_s[-4:]))), run.cycles, run.swing
+    pauses = cycles.middle_s[run.last + 1 :] - run.middle_s[-1]
+    follows = cycles.ending < _RISE * float(swing[-1]) + cycles.step
+    fades = float(pauses[0]) > 1.5 * run.half_period_s if len(pauses) else follows
+    turned = cycles.turn_time_s[run.last : run.last + 2].tolist()
+    loss = float(median(np.abs(np.diff(swing[-_BLOCKS:])))) + cycles.step
+    if fades and end - turned[1] > 1.5 * half and swing[-1] > _SPOILT * loss:
         return float(turned[0])
     # Half a period after its last middle the pendulum has turned and swung back once more.
-    stop = float(run.middle_s[-1]) + (1.5 if run.fades else 0.5) * half
+    stop = float(run.middle_s[-1]) + (1.5 if fades else 0.5) * half
     return end if end - stop < 0.3 * half else stop
 
 
@@ -754,7 +760,7 @@ def _start(time: FloatArray, values: FloatArray, run: Run) -> float:
     half_period = float(run.middle_s[1]) - start
     turn = start - 0.5 * half_period
     late = turn - begin > 1.1 * half_period or begin - turn > 0.6 * half_period
-    if run.driven or run.first > 1 or late:
+    if run.before or run.first > 1 or late:
         return start
     if run.first == 0:
         return begin if begin > turn - 0.2 * half_period else start
