@@ -543,8 +543,7 @@ def _by_loss(at: Evaluated, index: int) -> FloatArray:
     """Derivative of the acceleration by one of the baseline's losses; it is linear in them."""
     model, value, moved = at.model, at.value, at.value.copy()
     moved[index] += max(1e-3 * abs(float(value[index])), 1e-6)
-    motion = at.tangent.motion
-    change = model.law(moved)(motion) - model.law(value)(motion)
+    change = model.law(moved)(at.tangent.motion) - at.tangent.force
     return np.asarray(change / (moved[index] - value[index]))
 
 
