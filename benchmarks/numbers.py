@@ -267,7 +267,7 @@ def truths(
 def oracle(bench: Bench, known: int, asked: Sequence[tuple[str, float]]) -> Array:
     """Standard deviation of each quantity by the true law, the first causes `known`."""
     scene, causes, there = bench.scene, bench.causes, truths(bench.scene, bench.causes, asked)
-    moved = [truths(scene, causes, asked, each) - there for each in bench.changes]
+    moved = [truths(scene, causes, asked, partial(each, by=1.0)) - there for each in bench.changes]
     hidden = range(known, len(causes))
     moved += [(truths(scene, bench.less(each), asked) - there) / -SHARE for each in hidden]
     first = 2 + len(bench.changes)

@@ -97,30 +97,54 @@ def test_a_tone_is_worth_its_power_over_that_of_the_noise() -> None:
     assert worth == pytest.approx(expected, rel=0.02)
 
 
-@pytest.mark.parametrize("effect", ["cubic-stiffness", "power-law-damping", "sensor-cubic"])
-def test_what_an_effect_was_sized_for_is_what_a_fit_loses(effect: str) -> None:
-    """The best Eq. 8 misses a reading without noise by the wanted Delta chi^2."""
-    there = scene(amplitude=0.3, rates=(0.05, 0.01, 0.0, 1e-3), noise_rms=1e-4)
-    cause = sized(np.random.default_rng(4), there, [], law_of(effect), 400.0, 4.0)
-    assert cause is not None
+def missed(there: Scene, cause: Cause) -> float:
+    """The chi^2 by which the best Eq. 8 misses a reading without noise."""
     wanted, _ = there.reading([cause])
+    a_was, b_was, _, c_was = there.rates
 
     def misses(p: FloatArray) -> FloatArray:
         omega, a, b, c, top, lead, offset = p
-        rates = (0.05 * (1 + a), 0.01 * (1 + b), 0.0, 1e-3 * (1 + c))
         like = replace(
             there,
-            frequency_hz=0.7 * (1 + omega),
-            rates=rates,
-            amplitude=0.3 * (1 + top),
-            lead_s=0.3 * (1 + lead),
+            frequency_hz=there.frequency_hz * (1 + omega),
+            rates=(a_was * (1 + a), b_was * (1 + b), 0.0, c_was * (1 + c)),
+            amplitude=there.amplitude * (1 + top),
+            lead_s=there.lead_s * (1 + lead),
             offset=offset,
         )
         return (like.reading([])[0] - wanted) / there.sd
 
     scales = [1e-3, 0.5, 0.5, 0.5, 0.01, 0.01, 1e-3]
-    left = least_squares(misses, np.zeros(7), x_scale=scales, xtol=1e-12, ftol=1e-12)
-    assert 2 * left.cost == pytest.approx(400.0, rel=0.25)
+    return 2.0 * least_squares(misses, np.zeros(7), x_scale=scales, xtol=1e-12, ftol=1e-12).cost
+
+
+QUIET = {"amplitude": 0.3, "rates": (0.05, 0.01, 0.0, 1e-3), "noise_rms": 1e-4}
+
+
+@pytest.mark.parametrize("effect", ["cubic-stiffness", "power-law-damping", "sensor-cubic"])
+def test_what_an_effect_was_sized_for_is_what_a_fit_loses(effect: str) -> None:
+    there = scene(**QUIET)
+    cause = sized(np.random.default_rng(4), there, [], law_of(effect), 400.0, 4.0)
+    assert cause is not None
+    assert missed(there, cause) == pytest.approx(400.0, rel=0.25)
+
+
+@pytest.mark.parametrize("effect", ["history-force", "clock-drift", "sensor-cubic"])
+def test_what_is_left_of_a_cause_is_what_a_fit_loses_however_far_it_moves_the_frequency(
+    effect: str,
+) -> None:
+    there = scene(**QUIET)
+    cause = sized(np.random.default_rng(4), there, [], law_of(effect), 400.0, 4.0)
+    assert cause is not None
+    (left,) = Bench(there, [cause]).refined().alone
+    assert left == pytest.approx(missed(there, cause), rel=0.02)
+
+
+def test_a_far_frequency_is_no_cause() -> None:
+    far = Cause("faster", lambda world, size: world.add("omega", 0.01 * size), 1.0)
+    bench = Bench(scene(noise_rms=1e-6), [far])
+    assert bench.alone > 1000.0
+    assert bench.refined().alone < 1.0
 
 
 @pytest.mark.parametrize("wanted", [25.0, 400.0])

@@ -259,6 +259,7 @@ def _try(recipe: Recipe, rng: Rng, ease: float, noise: Noise | None) -> Item | N
         bench = Bench(scene, [causes[0], causes[1]._replace(size=-causes[1].size)])
     left: dict[str, Any] = {}
     if laboratory and family != "outside":
+        bench = bench.refined()
         oracle = Oracle(bench, listed(scene), rng)
     elif laboratory:
         # Sized by what no listed effect takes up.
@@ -277,8 +278,8 @@ def _try(recipe: Recipe, rng: Rng, ease: float, noise: Noise | None) -> Item | N
             laws[0].most,
             close=2 * CLOSE,
         )
-        oracle = at(size)
-        bench = oracle.bench
+        bench = at(size).bench.refined()
+        oracle = Oracle(bench, listed(scene), np.random.default_rng(seed))
         left = dict(
             zip(("left_by_catalogue", "best_mimic"), oracle.left_by_catalogue(), strict=True)
         )
