@@ -83,7 +83,8 @@ class Bounds(NamedTuple):
 
     def clip(self, value: FloatArray) -> FloatArray:
         """Put each entry within its bounds."""
-        return np.clip(value, self.lower, self.upper)
+        # Numpy's own clip takes three times as long for a few numbers.
+        return np.minimum(np.maximum(value, self.lower), self.upper)
 
 
 class Quadratic(NamedTuple):

@@ -176,7 +176,7 @@ class Evaluation(Squares):
     @cached_property
     def columns(self) -> FloatArray:
         """The Jacobian."""
-        columns = np.empty((len(self.residual), self.model.size))
+        columns = np.empty((len(self.residual), self.model.size), order="F")
         columns[:-1] = self.noise.whiten(self.at.jacobian)
         columns[-1:] = SHARES.rows(self.model.size)
         # If one part of b is held, changing b changes the share.

@@ -307,7 +307,7 @@ def _needed_sizes(fit: Fit, effect: Effect, unit: float) -> tuple[float, int]:
     position = next(position for other, position in fit.model.places() if other is effect)
     own = range(position.start, position.stop)
     left = fit.beside(fit.jacobian[:, position], own)
-    squares = (np.linalg.qr(left)[1] @ fit.value[position]) ** 2 / unit
+    squares = (np.linalg.qr(left, mode="r") @ fit.value[position]) ** 2 / unit
     superfluous = squares < SIZE_CHARGE
     return float(squares[superfluous].sum()), max(int(np.count_nonzero(~superfluous)), 1)
 

@@ -510,7 +510,7 @@ def _jacobian(at: Evaluated) -> FloatArray:
     """Derivatives of one recording's readings, shape (n, size)."""
     model, value, pendulum = at.model, at.value, at.span.pendulum
     sampled, tangent = at.sampled, at.tangent
-    columns = np.empty((len(at.reading), model.size))
+    columns = np.empty((len(at.reading), model.size), order="F")
     changes = {index: tangent.of_force(_by_loss(at, index)) for index in (A, B, C, SHARE)}
     changes[OMEGA] = _by_omega(at)
     for index, change in changes.items():
