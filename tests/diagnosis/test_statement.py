@@ -584,10 +584,14 @@ def test_a_curve_says_where_and_how_large_it_is(
 @pytest.mark.parametrize(
     ("kind", "unit", "axes"),
     [
-        (restoring_curve, "rad/s", ("angle, rad", "extra restoring torque over omega^2, rad")),
+        (
+            restoring_curve,
+            "rad/s",
+            ("angle, rad", "restoring torque over omega^2 beyond the law's, rad"),
+        ),
         (reading_curve, "rad/s", ("rate, rad/s", "reading minus rate, rad/s")),
         (damping_curve, "rad/s", ("amplitude, rad", "extra loss rate, 1/s")),
-        (restoring_curve, "m", ("angle, m", "extra restoring torque over omega^2, m")),
+        (restoring_curve, "m", ("angle, m", "restoring torque over omega^2 beyond the law's, m")),
     ],
 )
 def test_a_gyroscope_reads_rates_of_a_motion_in_rad(

@@ -392,6 +392,23 @@ def test_the_key_of_the_decay_stays_within_the_figure(content: Shown) -> None:
     assert 0.0 < key.x0 < key.x1 < figure.bbox.x1
 
 
+def test_the_curves_and_their_keys_stay_within_the_figure(content: Shown) -> None:
+    """Two lines of a title and two rows of a key; what does not stand out is not drawn."""
+    at, name = np.linspace(0.0, 80.0, 61), max((each.name for each in CATALOGUE), key=len)
+    told = dict.fromkeys(("value", "sd", "quadrature", "quadrature_sd", "named"), 0.01 * at)
+    told |= {"at": at, "argument": "time, s", "ordinate": "torque over omega^2 y, 1"}
+    told |= {"name": "", "summary": "the torque is stiffer " * 4, "named_as": name}
+    curves = [told, told, told | {"summary": ""}]
+    found = SimpleNamespace(missing=[SimpleNamespace(curve=each) for each in curves])
+    figure = diagnosis.draw_curve(replace(content, diagnosis=found))
+    FigureCanvasAgg(figure).draw()
+    first, second = figure.axes
+    keys = [each.get_legend().get_window_extent() for each in figure.axes]
+    assert figure.bbox.y1 > keys[0].y1 > keys[0].y0 > first.title.get_window_extent().y1
+    assert first.xaxis.label.get_window_extent().y0 > keys[1].y1
+    assert second.get_ylabel() == "Torque over ω² y"
+
+
 def test_the_spectrum_of_noise_is_the_noise_level(content: Shown) -> None:
     """White noise of rms s, read every dt: s sqrt(2 dt)."""
     assert content.extended is not None

@@ -149,6 +149,7 @@ def curve_told(fit: Fit, effect: Curve, drawn: Drawn, unit: str) -> dict[str, An
         size, low, high = float(value[here].mean()), float(at[here[0]]), float(at[here[-1]])
         pure = effect.is_torque or not across
         number = f"{100.0 * abs(size):.2g} %" if pure else compact(abs(size), across)
+        number += " of the restoring torque" if name == "quadrature" else ""
         place = f"from {short_size(low, per)} to {short_size(high, per)} ({along})"
         if along == "angle" and (effect.is_torque or low <= 0.0 <= high):
             place = f"within {short_size(max(-low, high), per)} of the lowest point"
@@ -162,7 +163,8 @@ def curve_told(fit: Fit, effect: Curve, drawn: Drawn, unit: str) -> dict[str, An
             each.value * largest ** (effect.powers[name] - 1) for name, each in formula.items()
         )
         at_most = f"{100.0 * abs(share):.2g} % {larger if share > 0.0 else smaller}"
-        told = f"the torque is as x {_signed(formula)}: {at_most} at {short_size(largest, per)}"
+        at_most += f" at {short_size(largest, per)} than at rest"
+        told = f"the torque is as x {_signed(formula)}: {at_most}"
         found["polynomial"] = formula
     return {"name": effect.name, "summary": told, **found}
 

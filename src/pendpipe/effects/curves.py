@@ -265,7 +265,7 @@ def share_of_swing(share: float, _: Pendulum, span: Span) -> float:
     name="a restoring torque of unknown form",
     equation=r"\omega^2 x \to \omega^2 x + F(x)",
     argument="angle, rad",
-    ordinate="extra restoring torque over omega^2, rad",
+    ordinate="restoring torque over omega^2 beyond the law's, rad",
     words={"value": ("the torque is", "stiffer", "softer")},
     is_torque=True,
     discriminating_test=(
@@ -560,7 +560,7 @@ def _polynomial(flavour: str, powers: Mapping[str, int]) -> type[Curve]:
         name="a restoring torque of two terms",
         equation=r"\omega^2 x \to \omega^2 x + F(x)",
         argument="angle, rad",
-        ordinate="extra restoring torque over omega^2, rad",
+        ordinate="restoring torque over omega^2 beyond the law's, rad",
         flavour=flavour,
         words=restoring_curve.words,
         is_torque=True,

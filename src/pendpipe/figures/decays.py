@@ -83,7 +83,7 @@ def _readings(
     if scale and decay.fit.light != "red":
         marks += _fitted(decay, own * scale)
     ends = float(recording.time_s[0]), float(recording.time_s[-1])
-    label = quantity_of(recording.unit) + f" ({unit})" * bool(unit)
+    label = f"{quantity_of(recording.unit)} ({unit})"
     return Panel(marks, {"xlabel": "Time (s)", "xlim": ends, "ylabel": label}, key=2)
 
 

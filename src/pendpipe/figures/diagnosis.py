@@ -458,14 +458,20 @@ def _power(values: FloatArray) -> tuple[str, float]:
 
 @styled
 def draw_curve(content: Shown) -> Figure:
-    """Draw the missing force that stands in the place of each effect, one below the other."""
-    unnamed = [effect for effect in content.diagnosis.missing if effect.curve is not None]
-    if not unnamed:
+    """Draw the missing force that stands in the place of each effect, one below the other.
+
+    Those that stand out over all their knots; where none does, the first.
+    """
+    found = [effect.curve for effect in content.diagnosis.missing if effect.curve is not None]
+    if not found:
         raise NothingToDrawError("nothing that is missing is a curve")
-    below = [panel for effect in unnamed for panel in _curves(effect.curve or {})]
-    height = 3.1 * len(below)
-    margins = {"left": 0.17, "bottom": 0.5 / height, "top": 1.0 - 0.72 / height, "hspace": 0.62}
-    return figure_of(height, *below, margins=margins, sharex=False)
+    outstanding = [each for each in found if each["summary"]] or found[:1]
+    below = [panel for each in outstanding for panel in _curves(each)]
+    # Above the axes, of two inches, stand up to two rows of a key and as many lines of a title.
+    above = 0.38 + 0.18 * max(2 * bool(each.key) + 10.0 * (each.lift - 1.1) for each in below)
+    height = (2.5 + above) * len(below)
+    margins = {"bottom": 0.5 / height, "top": 1.0 - above / height, "hspace": 0.25 + above / 2.0}
+    return figure_of(height, *below, margins=margins | {"left": 0.17}, sharex=False)
 
 
 def _curves(drawn: Mapping[str, Any]) -> Iterator[Panel]:
@@ -488,12 +494,12 @@ def _curves(drawn: Mapping[str, Any]) -> Iterator[Panel]:
     if drawn.get("named") is not None:
         over = factor * np.asarray(drawn["named"])
         marks.append(curve(at, over, VERMILION, "--", label=drawn["named_as"]))
-    label = f"{name[:1].upper()}{name[1:]}" + (f" ({pretty_unit(short)})" if short else "")
+    label = f"{name[:1].upper()}{name[1:]} ({pretty_unit(short)})"
     about = {"xlabel": argument, "xmargin": 0.01}
     own = about | {"ylabel": "\n".join(textwrap.wrap(label, 26))}
     title = textwrap.fill(drawn["summary"] or drawn["name"], 58)
     own["title"] = title[:1].upper() + title[1:]
-    yield Panel(marks, own, key=2 * (len(marks) > 3), lift=1.1 + 0.09 * title.count("\n"))
+    yield Panel(marks, own, key=2 * (len(marks) > 3), lift=1.1 + 0.1 * title.count("\n"))
     if "local_exponent" in drawn:
         # The power of the velocity that the whole loss follows, by amplitude.
         value = np.asarray(drawn["local_exponent"])

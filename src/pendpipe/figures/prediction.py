@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 @styled
 def draw_prediction(tables: "Mapping[str, DataFrame]", unit: str) -> Figure:
     """Draw what was predicted, in a unit: a panel for each quantity."""
-    amplitude = f"Amplitude ({after_number(unit).strip()})" if unit else "Amplitude"
+    amplitude = f"Amplitude ({after_number(unit).strip()})"
     named = {"amplitude": amplitude, "phase_deg": "Phase (°)", "time_s": "Time (s)"}
     panels = list[Panel]()
     if "decay" in tables:

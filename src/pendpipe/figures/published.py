@@ -61,5 +61,4 @@ def _panel(one: "Asked") -> Panel:
     )
     of = "$n$" if rows[0].quantity == "n" else rows[0].quantity
     label = f"ln(observed/\ncalculated {of})" if quantity.log else f"Observed less\ncalculated {of}"
-    label += f" ({unit})" if unit else ""
-    return Panel(marks, {"ylabel": label, "xlabel": one.case.title}, key=3)
+    return Panel(marks, {"ylabel": f"{label} ({unit})", "xlabel": one.case.title}, key=3)

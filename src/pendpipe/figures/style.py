@@ -186,6 +186,10 @@ def figure_of(
         for mark in panel.marks:
             mark(axes)
         axes.set(**panel.about)
+        for axis in (axes.xaxis, axes.yaxis):
+            # A quantity without a unit has no brackets.
+            label = axis.get_label_text().removesuffix("()").removesuffix("(1)").rstrip()
+            axis.set_label_text(label.replace("(/", "(1/"))
         if panel.note:
             axes.set_title(panel.note, fontsize=8.5, pad=3)
         if panel.key:
