@@ -398,15 +398,13 @@ def test_the_curves_and_their_keys_stay_within_the_figure(content: Shown) -> Non
     told = dict.fromkeys(("value", "sd", "quadrature", "quadrature_sd", "named"), 0.01 * at)
     told |= {"at": at, "argument": "time, s", "ordinate": "torque over omega^2 y, 1"}
     told |= {"name": "", "summary": "the torque is stiffer " * 4, "named_as": name}
-    curves = [told, told, told | {"summary": ""}]
-    found = SimpleNamespace(missing=[SimpleNamespace(curve=each) for each in curves])
-    figure = diagnosis.draw_curve(replace(content, diagnosis=found))
+    missing = [SimpleNamespace(curve=each) for each in (told, told, told | {"summary": ""})]
+    figure = diagnosis.draw_curve(replace(content, diagnosis=SimpleNamespace(missing=missing)))
     FigureCanvasAgg(figure).draw()
-    first, second = figure.axes
-    keys = [each.get_legend().get_window_extent() for each in figure.axes]
-    assert figure.bbox.y1 > keys[0].y1 > keys[0].y0 > first.title.get_window_extent().y1
-    assert first.xaxis.label.get_window_extent().y0 > keys[1].y1
-    assert second.get_ylabel() == "Torque over ω² y"
+    first, second = (each.get_legend().get_window_extent() for each in figure.axes)
+    assert figure.bbox.y1 > first.y1 > first.y0 > figure.axes[0].title.get_window_extent().y1
+    assert figure.axes[0].xaxis.label.get_window_extent().y0 > second.y1
+    assert figure.axes[1].get_ylabel() == "Torque over ω² y"
 
 
 def test_the_spectrum_of_noise_is_the_noise_level(content: Shown) -> None:

@@ -82,9 +82,8 @@ def _readings(
     marks.append(curve(recording.time_s, own * recording.values, colour, width=0.5, **look))
     if scale and decay.fit.light != "red":
         marks += _fitted(decay, own * scale)
-    ends = float(recording.time_s[0]), float(recording.time_s[-1])
-    label = f"{quantity_of(recording.unit)} ({unit})"
-    return Panel(marks, {"xlabel": "Time (s)", "xlim": ends, "ylabel": label}, key=2)
+    about = {"xlabel": "Time (s)", "ylabel": f"{quantity_of(recording.unit)} ({unit})"}
+    return Panel(marks, about | {"xlim": (recording.time_s[0], recording.time_s[-1])}, key=2)
 
 
 def _fitted(decay: Decay, factor: float) -> list[Mark]:

@@ -305,7 +305,7 @@ def draw_residual_spectrum(content: Shown) -> Figure:
             marks,
             {
                 "xlabel": "Frequency (Hz)",
-                "ylabel": f"Residual, density ({unit}/√Hz)",
+                "ylabel": f"Residual, density ({unit or 1}/√Hz)",
                 "xlim": ends,
                 "ylim": (0.1 * factor * float(np.min(floor)), 2.0 * factor * highest),
             },
@@ -465,8 +465,8 @@ def draw_curve(content: Shown) -> Figure:
     found = [effect.curve for effect in content.diagnosis.missing if effect.curve is not None]
     if not found:
         raise NothingToDrawError("nothing that is missing is a curve")
-    outstanding = [each for each in found if each["summary"]] or found[:1]
-    below = [panel for each in outstanding for panel in _curves(each)]
+    drawn = [each for each in found if each["summary"]] or found[:1]
+    below = [panel for each in drawn for panel in _curves(each)]
     # Above the axes, of two inches, stand up to two rows of a key and as many lines of a title.
     above = 0.38 + 0.18 * max(2 * bool(each.key) + 10.0 * (each.lift - 1.1) for each in below)
     height = (2.5 + above) * len(below)
@@ -496,10 +496,9 @@ def _curves(drawn: Mapping[str, Any]) -> Iterator[Panel]:
         marks.append(curve(at, over, VERMILION, "--", label=drawn["named_as"]))
     label = f"{name[:1].upper()}{name[1:]} ({pretty_unit(short)})"
     about = {"xlabel": argument, "xmargin": 0.01}
-    own = about | {"ylabel": "\n".join(textwrap.wrap(label, 26))}
     title = textwrap.fill(drawn["summary"] or drawn["name"], 58)
-    own["title"] = title[:1].upper() + title[1:]
-    yield Panel(marks, own, key=2 * (len(marks) > 3), lift=1.1 + 0.1 * title.count("\n"))
+    own = {"ylabel": textwrap.fill(label, 26), "title": title[:1].upper() + title[1:]}
+    yield Panel(marks, about | own, key=2 * (len(marks) > 3), lift=1.1 + 0.1 * title.count("\n"))
     if "local_exponent" in drawn:
         # The power of the velocity that the whole loss follows, by amplitude.
         value = np.asarray(drawn["local_exponent"])

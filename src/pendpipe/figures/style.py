@@ -5,6 +5,7 @@ dashes. Vermilion is kept for what goes wrong when something is left out.
 """
 
 import io
+import re
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from operator import methodcaller
@@ -185,11 +186,13 @@ def figure_of(
     for axes, panel in zip(grid.flat, panels, strict=True):
         for mark in panel.marks:
             mark(axes)
-        axes.set(**panel.about)
-        for axis in (axes.xaxis, axes.yaxis):
-            # A quantity without a unit has no brackets.
-            label = axis.get_label_text().removesuffix("()").removesuffix("(1)").rstrip()
-            axis.set_label_text(label.replace("(/", "(1/"))
+        # A quantity without a unit has no brackets.
+        axes.set(
+            **{
+                name: re.sub(r"\s*\(1?\)$", "", of) if "label" in name else of
+                for name, of in panel.about.items()
+            }
+        )
         if panel.note:
             axes.set_title(panel.note, fontsize=8.5, pad=3)
         if panel.key:
