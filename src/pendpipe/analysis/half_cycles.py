@@ -173,11 +173,20 @@ def thinned(
     thin_time, thin_values = np.empty(len(values)), np.empty(len(values))
     count = _thin(time_s, values, step, thin_time, thin_values)
     thin_time, thin_values = thin_time[:count].copy(), thin_values[:count].copy()
-    if count > 0.99 * (time_s[-1] - time_s[0]) / step:
-        # Means over an eighth of a half cycle take mains hum out, and 0.6 % of a crest.
-        ends = thin_values[[0, 0]], thin_values, thin_values[[-1, -1]]
-        thin_values = np.convolve(np.concatenate(ends), np.full(5, 0.2), mode="valid")
-    return thin_time, thin_values
+    gaps = np.flatnonzero(np.diff(thin_time) > half_period_s) + 1
+    parts = zip(np.split(thin_time, gaps), np.split(thin_values, gaps), strict=True)
+    return thin_time, np.concatenate([_even(*part, step) for part in parts])
+
+
+def _even(time: FloatArray, values: FloatArray, step: float) -> FloatArray:
+    """Smooth cells that no gap parts, unless readings come with counts and leave some out.
+
+    Means over an eighth of a half cycle take mains hum out, and 0.6 % of a crest.
+    """
+    if len(time) <= 0.99 * (time[-1] - time[0]) / step:
+        return values
+    ends = values[[0, 0]], values, values[[-1, -1]]
+    return np.convolve(np.concatenate(ends), np.full(5, 0.2), mode="valid")
 
 
 @kernel()

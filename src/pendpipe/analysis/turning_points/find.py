@@ -412,7 +412,12 @@ def _measured(samples: Samples, place: str | Path) -> TurningPoints:
     )
     amplitude, rates, level = _losses(places, first, samples.noise_rms, rough.level)
     places, measured, shape = _shaped(samples, places, amplitude, rates, level, stride)
-    square, freedom = mean_square(measured, 3 + measured.harmonics.shape[1])
+    # What a gap leaves of a half cycle tells no noise of the others.
+    beside = samples.time_s[np.flatnonzero(gaps)[:, None] + [0, 1]]
+    torn = np.searchsorted(places.centre_s - 0.5 * places.half_period_s, beside.ravel()) - 1
+    single = measured.single | np.isin(np.arange(len(places.number)), torn)
+    terms = 3 + measured.harmonics.shape[1]
+    square, freedom = mean_square(measured._replace(single=single), terms)
     if freedom >= TOLD:
         noise = scatter(freedom * square, freedom, samples.step)
         samples = replace(samples, noise_rms=noise)
