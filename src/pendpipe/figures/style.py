@@ -189,7 +189,7 @@ def figure_of(
         # A quantity without a unit has no brackets.
         axes.set(
             **{
-                name: re.sub(r"\s*\(1?\)$", "", of) if "label" in name else of
+                name: re.sub(r"\s*\(1?\)$", "", of) if name in ("xlabel", "ylabel") else of
                 for name, of in panel.about.items()
             }
         )
