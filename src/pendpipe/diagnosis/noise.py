@@ -20,10 +20,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.fft import dct, idct
 from scipy.ndimage import maximum_filter1d, median_filter
-from scipy.optimize import nnls
 
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
-from pendpipe.solve import Bounds, Problem, Quadratic, Summed, minimise
+from pendpipe.solve import Bounds, Problem, Quadratic, Summed, bounded_least_squares, minimise
 
 if TYPE_CHECKING:
     from pendpipe.diagnosis.data import Data
@@ -195,10 +194,10 @@ def noise_of_counts(residual: FloatArray, speed: FloatArray) -> FloatArray:
     """
     square = np.convolve(residual, (1.0, -4.0, 6.0, -4.0, 1.0), "same") ** 2 / 70.0
     parts = np.stack([np.ones(len(speed)), (speed / np.sqrt(np.mean(speed**2))) ** 2], axis=1)
-    variance = np.full(len(speed), np.mean(square))
+    variance, ends = np.full(len(speed), np.mean(square)), (np.zeros(2), np.full(2, np.inf))
     for _ in range(_CLEANINGS):
         # Their errors are as large as themselves; neither part is below a hundredth.
-        share = nnls(parts / variance[:, None], square / variance)[0]
+        share = bounded_least_squares(parts / variance[:, None], square / variance, *ends)
         variance = parts @ np.maximum(share, 0.01 * share.sum())
     return np.asarray(np.sqrt(variance))
 
