@@ -12,8 +12,8 @@ from pendpipe.arrays import FloatArray
 from pendpipe.effects.catalogue import by_identifier
 from pendpipe.effects.catalogue.reading import (
     SoftClipping,
-    camera_beyond_a_quarter,
     camera_geometry,
+    camera_seen_wide,
 )
 from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN
 from pendpipe.effects.curves import usual_loss_rate
@@ -382,7 +382,7 @@ def test_a_camera_sees_the_angle_of_a_turned_plane_and_a_misplaced_pivot(axis_ra
     turned = np.unwrap(seen[:-1] - own) - seen[-1] + across * (np.cos(own) - 1.0)
     sizes = beta**2 / 4.0 * np.array([-math.cos(2.0 * axis_rad), math.sin(2.0 * axis_rad)])
     values = np.array([across, *sizes])
-    wide = camera_beyond_a_quarter.reading(at.sampled, at.span.pendulum, values)
+    wide = camera_seen_wide.reading(at.sampled, at.span.pendulum, values)
     # To the next order in beta^2.
     np.testing.assert_allclose(wide, turned, 0.0, beta**4 / 6.0)
     if not axis_rad:

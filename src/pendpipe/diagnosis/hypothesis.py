@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -36,9 +35,10 @@ from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import damping_modulation, resonant_drive, slow_modulation
 from pendpipe.effects.catalogue.reading import (
     PERSPECTIVE,
+    WIDE_RAD,
     SoftClipping,
-    camera_beyond_a_quarter,
     camera_geometry,
+    camera_seen_wide,
     gain_modulation,
     hum_near_the_motion,
     tone_pickup,
@@ -328,8 +328,8 @@ def applicable(
         and (effect.identifier not in used or effect.local)
     ]
     if rare:
-        if fit.at.span.first_amplitude > 0.5 * math.pi:
-            named = [camera_beyond_a_quarter if e is camera_geometry else e for e in named]
+        if fit.at.span.first_amplitude > WIDE_RAD:
+            named = [camera_seen_wide if e is camera_geometry else e for e in named]
         return list(fit.model.admitted(named))
     keys = {effect.key for effect in fit.model.effects}
     modulations = slow_modulation, gain_modulation, damping_modulation

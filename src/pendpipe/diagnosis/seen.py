@@ -144,7 +144,12 @@ def _where(amplitude: tuple[float, float], time_s: tuple[float, float], data: Da
     # To a hundredth of the recording, as well as anybody asks.
     digits = 2 - math.floor(math.log10(float(np.ptp(data.time_s))))
     when = stretch(*(round(each, digits) + 0.0 for each in time_s))
-    return f"from {first} to {last} ({when})" if first != last else f"from {when}"
+    alike = abs(amplitude[0] - amplitude[1]) < _ALIKE * max(amplitude)
+    return f"from {when}" if alike else f"from {first} to {last} ({when})"
+
+
+_ALIKE: Final = 0.01
+"""Relative difference below which amplitudes of three digits do not show a change between them."""
 
 
 def _percent(size: Estimate) -> str:

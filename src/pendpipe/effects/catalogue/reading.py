@@ -100,13 +100,18 @@ def camera_geometry(sampled: Sampled, pendulum: Pendulum, e_1: float, e_2: float
 
     A pivot misplaced across by e_1 pendulum lengths adds e_1 cos x; a camera that looks at the
     plane of swing from an angle beta, turned about the vertical, e_2 = -beta^2/4. The constant
-    is the offset's. What sin x and cos 2x would add is a scale and e_1 up to a quarter turn.
+    is the offset's. What sin x and cos 2x would add is a scale and e_1 up to a radian.
     """
     return _misplaced(sampled.angle, e_1, e_2)
 
 
 def _misplaced(angle: FloatArray, e_1: float, e_2: float) -> FloatArray:
     return np.asarray(e_1 * (np.cos(angle) - 1.0) + e_2 * np.sin(2.0 * angle))
+
+
+WIDE_RAD: Final = 1.0
+"""Amplitude beyond which cos 2x is told from cos x: it is 4 cos x - 3 + x^4/2, the last a quarter
+of 2 x^2 there."""
 
 
 @_camera(
@@ -116,10 +121,10 @@ def _misplaced(angle: FloatArray, e_1: float, e_2: float) -> FloatArray:
     parameters=(*_MISPLACED, Parameter("e_3", "rad", -0.5, 0.5, word="cos 2x term")),
     sizes=3,
 )
-def camera_beyond_a_quarter(
+def camera_seen_wide(
     sampled: Sampled, pendulum: Pendulum, e_1: float, e_2: float, e_3: float
 ) -> FloatArray:
-    """The form beyond a quarter turn, where cos 2x is told from cos x.
+    """The form beyond `WIDE_RAD`, where cos 2x is told from cos x.
 
     A camera turned by beta about an axis at 45 degrees to the vertical makes e_3 = beta^2/4 of the
     ellipse that it sees.
