@@ -129,8 +129,7 @@ def camera_seen_wide(
     A camera turned by beta about an axis at 45 degrees to the vertical makes e_3 = beta^2/4 of the
     ellipse that it sees.
     """
-    angle = sampled.angle
-    return np.asarray(_misplaced(angle, e_1, e_2) + e_3 * (np.cos(2.0 * angle) - 1.0))
+    return _misplaced(sampled.angle, e_1, e_2) + e_3 * (np.cos(2.0 * sampled.angle) - 1.0)
 
 
 _PERSPECTIVE: Final = Parameter("p", "1/rad", -0.5, 0.5, word="perspective")
