@@ -144,4 +144,4 @@ def test_an_image_below_a_quarter_turn_is_one_cause() -> None:
     seen = x + 0.004 * np.cos(x) + 0.004 * np.sin(2.0 * x) - 0.003 * np.cos(2.0 * x)
     recording = Recording(time_s, seen + noise(8, len(x), 5e-4), "angle_rad")
     named = {each.identifier for each in diagnose_recording(recording).missing}
-    assert named == {"circular-error", "camera-geometry"}
+    assert named == {"camera-geometry"}
