@@ -219,8 +219,6 @@ class Fit:
         Factor on standard deviations for a misfit beyond the noise, in the mean.
     scatter
         Covariance of J'r for that misfit, shape (size, size); None where noise alone is left.
-    misfit
-        Sizes of it in the parts of the motion (`analysis.misfit`), if any.
     """
 
     evaluation: Evaluation
@@ -228,7 +226,6 @@ class Fit:
     converged: bool
     error_scale: float = 1.0
     scatter: FloatArray | None = None
-    misfit: tuple[float, ...] = ()
 
     @property
     def model(self) -> Model:
@@ -559,7 +556,7 @@ def with_errors(fit: Fit, data: Data, noise: Noise) -> Fit:
     """Return a fit with errors that allow for what it leaves beyond the noise (`misfit`)."""
     left = remainder_of(fit, data, noise)
     if not left.systematic:
-        return replace(fit, error_scale=1.0, scatter=None, misfit=())
+        return replace(fit, error_scale=1.0, scatter=None)
     beyond = beyond_noise(fit.jacobian[:-1], fit.at.sampled.phase, left.sizes)
     scatter = fit.jacobian.T @ fit.jacobian + beyond
-    return replace(fit, error_scale=left.error_scale, scatter=scatter, misfit=left.sizes)
+    return replace(fit, error_scale=left.error_scale, scatter=scatter)

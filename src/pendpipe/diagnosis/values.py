@@ -10,7 +10,6 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from pendpipe.analysis.fit.fitted import PARAMETERS, units
-from pendpipe.analysis.misfit import beyond_noise
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
@@ -363,8 +362,7 @@ def drawn_of(fit: Fit, effect: Curve, noise: Noise) -> Drawn:
     of variance t beside any amount of what the law has itself, which is then taken off
     (`Curve.smooth`), and t is unknown: with C = 1 + A K(t) A' each of `_SMOOTHNESS` counts by
     sqrt(t/det C) exp(-r' C^-1 r/2). The 95 % band of such a curve holds 95 % of the truth over all
-    its places (Wahba, J. R. Stat. Soc. B 45, 133, 1983). A misfit counts as random in each part of
-    the motion, as it does for the errors of the fit's numbers.
+    its places (Wahba, J. R. Stat. Soc. B 45, 133, 1983).
     """
     place = next(place for other, place in fit.model.places() if other is effect)
     unit, described = effect.scale(fit.model.pendulum(fit.value)), fit.value[place]
@@ -383,9 +381,7 @@ def drawn_of(fit: Fit, effect: Curve, noise: Noise) -> Drawn:
     others = others[:, [k for k in fit.free if not place.start <= k < place.stop]]
     law, columns = span_of(others, 1e-11), whitened(fit, noise, curve, ((),)).T
     basis, seen = np.linalg.qr(columns - law @ (law.T @ columns))
-    beyond_it = beyond_noise(basis[:-1], fit.at.sampled.phase, fit.misfit) if fit.misfit else 0.0
-    root = np.linalg.cholesky(np.eye(len(seen)) + beyond_it)
-    basis, seen = (np.linalg.solve(root, each) for each in (basis.T, seen))
+    basis, seen = basis.T / fit.error_scale, seen / fit.error_scale
     told = basis @ readings
     fitted, costs = [], []
     for variance in _SMOOTHNESS:
