@@ -339,8 +339,6 @@ def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
     refuse_if(first == len(lines), place, "the file is empty", "record again, or give another file")
     told = (original(line).lstrip("# ").partition(":") for line in above)
     metadata = {key.strip(): value.strip() for key, _, value in told if value}
-    for key in (MARK, RECORDED_BY):
-        metadata.pop(key, None)
     names = [name.strip() for name in lines[first].split(",")]
     quantity, picked = _columns(place, first + 1, names)
     table = _numbers(place, lines, first + 1, [*picked.values()], len(names))
@@ -356,7 +354,11 @@ def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
         quantity=quantity,
         quality=quality,
         radius_excess=column.get("radius_excess"),
-        metadata={key: text for key, text in metadata.items() if not key.startswith(_WEAK)},
+        metadata={
+            key: text
+            for key, text in metadata.items()
+            if not key.startswith(_WEAK) and key not in (MARK, RECORDED_BY)
+        },
         notes=notes,
         facts=tuple(
             _guess_of(key, text) for key, text in metadata.items() if key.startswith(_WEAK)

@@ -174,11 +174,9 @@ def _chains(
     swing, step = cycles.swing.tolist(), cycles.step
     score, before = [0.0] * len(swing), [-1] * len(swing)
     # Of the chain up to each: its first and its least swing, and the largest of the last three.
-    first, floor, top, begin = swing[:], swing[:], swing[:], 0
+    first, floor, top = swing[:], swing[:], swing[:]
     for here in range(1, len(swing)):
         size, at = swing[here], here - 1
-        # Nothing goes on over a front's end.
-        begin = begin if follows[at] > -math.inf else here
         links = [(score[at] + follows[at], at)]
         if follows[at] < 0.0 or size > _RISE * floor[at] + _TAIL * first[at] + step:
             links = [
@@ -187,7 +185,7 @@ def _chains(
                     + _over(cycles, at, here, top[at], usual, gap=piece[at] < piece[here]),
                     at,
                 )
-                for at in range(max(begin, here - _NEAR), here)
+                for at in range(max(0, here - _NEAR), here)
             ]
         # What is smaller than the next, and begins the motion, is a pull.
         pulled = 0.93 * size - 0.5 * step
@@ -643,10 +641,8 @@ def _beating(
     inside = (time >= start) & (time <= stop)
     usual = float(median(half))
     modes = two_modes(time[inside], values[inside], usual, may_be_one=not driven, decay_s=decay_s)
-    if modes is None:
-        return None
-    steadily = [mode for mode in modes if mode.driven]
-    if steadily and not driven:
+    steadily = [mode for mode in modes or () if mode.driven]
+    if modes is None or (steadily and not driven):
         return None
     if steadily:
         raise NotAnalysableError(

@@ -60,10 +60,10 @@ def read_header(lines: Sequence[str], layout: Layout) -> Header:
     names_at, cells = _names(filled, layout)
     interval = interval_of([line for _, line in filled[-300:]])
     metadata = _metadata([line for _, line in filled])
-    notes: tuple[str, ...] = ()
     glued = layout.split(filled[-1][1]) if filled else []
-    if len(glued) == 2 * layout.width - 1 > 1 and layout.is_number(glued[-1]):
-        notes = (f"line {filled[-1][0]}: names and the first row in one line, which is not read",)
+    is_glued = len(glued) == 2 * layout.width - 1 > 1 and layout.is_number(glued[-1])
+    told = "names and the first row in one line, which is not read"
+    notes = (f"line {filled[-1][0]}: {told}",) if is_glued else ()
     if not cells:
         told = "no header: columns are recognised by their values"
         return Header((), (), (), interval, metadata, (told, *notes))

@@ -75,16 +75,18 @@ def list_in(
         spoken = [c for c in falling if plain(c.name).startswith("ampl")]
         column = [*spoken, *falling][0]
         return Listed("amplitudes", f"'{column.label}' only falls: amplitudes", "", column)
-    for column in readings:
-        if counts_samples(column) and one_way(column.values) == 1.0:
-            return Listed(
-                "passages",
-                f"'{column.label}' only counts, as passages of a light gate do: no recording of"
-                " the swing",
-                "give the recording of the swing: times of passages do not show the amplitude",
-                column,
-            )
-    return None
+    counted = (
+        Listed(
+            "passages",
+            f"'{column.label}' only counts, as passages of a light gate do: no recording of"
+            " the swing",
+            "give the recording of the swing: times of passages do not show the amplitude",
+            column,
+        )
+        for column in readings
+        if counts_samples(column) and one_way(column.values) == 1.0
+    )
+    return next(counted, None)
 
 
 ONE_WAY: Final = 0.95
@@ -142,11 +144,13 @@ def steady(time_s: FloatArray, values: FloatArray, others: Sequence[Column]) -> 
             f" or driven signal, {NOT_FREE}"
         )
     tail = slice(-max(8, len(values) // 10), None)
-    for drive in others:
-        named = drive.role == "none" and drive.swing.clear and len(drive.values) == len(values)
-        if named and np.ptp(drive.values[tail]) > 0.5 * np.ptp(drive.values) > 0.0:
-            return f"'{drive.label}' beside it swings to the end: a driven signal, {NOT_FREE}"
-    return ""
+    driving = (
+        f"'{drive.label}' beside it swings to the end: a driven signal, {NOT_FREE}"
+        for drive in others
+        if drive.role == "none" and drive.swing.clear and len(drive.values) == len(values)
+        if np.ptp(drive.values[tail]) > 0.5 * np.ptp(drive.values) > 0.0
+    )
+    return next(driving, "")
 
 
 SETTINGS: Final = "it holds settings of an instrument (a saved state), no samples"

@@ -66,8 +66,7 @@ def decode(data: bytes) -> str:
     """
     text = data.decode(_encoding(data), errors="replace")
     text = text.rstrip("\0")  # what a logger reserved and never filled
-    for wrong in "°µ²³":  # UTF-8 that a program took for Windows-1252, and wrote anew
-        text = text.replace(f"Â{wrong}", wrong)
+    text = re.sub("Â(?=[°µ²³])", "", text)  # UTF-8 taken for Windows-1252, and written anew
     for blank in _BLANKS:
         text = text.replace(blank, " ")
     text = text.lstrip("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
@@ -488,10 +487,12 @@ def _by_key(
     )
     rows = [np.flatnonzero(which == key) for key in dict.fromkeys(keys) if key != ""]
     some_keys, rows = len(rows), [each for each in rows if len(each) >= FEWEST]
-    if clock is None or not rows or not 1 < some_keys <= _MOST_KEYS:
-        return columns, numbers
-    if np.all(np.diff(clock.values) > 0) or any(
-        np.any(np.diff(clock.values[each]) <= 0) for each in rows
+    if (
+        clock is None
+        or not rows
+        or not 1 < some_keys <= _MOST_KEYS
+        or np.all(np.diff(clock.values) > 0)
+        or any(np.any(np.diff(clock.values[each]) <= 0) for each in rows)
     ):
         return columns, numbers
     longest = max(map(len, rows))

@@ -352,11 +352,11 @@ def _count_rows(_choice: Choice, base: TimeBase) -> None:
 def _count_late_rows(choice: Choice, base: TimeBase) -> None:
     """Count rows that were stamped as they arrived: by rows the periods agree far better."""
     values = _values(choice, base)
-    if len(values) <= FEWEST:
-        return
-    # Rows that arrive in bursts are even within these, which take up little of the time.
     steps = np.diff(base.time_s)
-    if is_uniform(base.time_s) and 2.0 * np.median(steps) > np.mean(steps):
+    # Rows that arrive in bursts are even within these, which take up little of the time.
+    if len(values) <= FEWEST or (
+        is_uniform(base.time_s) and 2.0 * np.median(steps) > np.mean(steps)
+    ):
         return
     index = np.arange(len(values))
     even: FloatArray = np.polynomial.Polynomial.fit(index, base.time_s, 1)(index)
@@ -514,9 +514,7 @@ def _rounded(time: FloatArray, lines: IntArray | None = None) -> FloatArray | No
     digit = _coarseness(time) + 0.15 * float(time[-1] - time[0]) / len(time)
     index: FloatArray = np.arange(len(time), dtype=np.float64)
     placed = index if lines is None else (lines[: len(time)] - lines[0]).astype(np.float64)
-    if not 0.0 < placed[-1] - index[-1] <= 0.03 * len(time):
-        placed = index
-    places = (placed, index)[placed is index :]
+    places = (placed, index)[not 0.0 < placed[-1] - index[-1] <= 0.03 * len(time) :]
     for place, late in product(places, (0.0, 0.5, -0.5)):
         centre = time + late * digit
         even: FloatArray = np.polynomial.Polynomial.fit(place, centre, 1, w=1.0 / digit)(place)

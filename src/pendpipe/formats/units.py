@@ -251,14 +251,19 @@ def _by_digits(finite: FloatArray) -> _Guess | None:
     """Read the unit off printed digits: all numbers are multiples of one in the other unit."""
     if _printed_digit(finite, 1.0) is not None:
         return None
-    for unit, scale, name, other in (
-        (_RADIAN, 180 / np.pi, "radians", "degrees"),
-        (_DEGREE, np.pi / 180, "degrees", "radians"),
-    ):
-        if digit := _printed_digit(finite, scale):
-            why = f"converted to {other}, its values are multiples of {digit:.4g}"
-            return _Guess(unit, f"is in {name} ({why})", "shown")
-    return None
+    shown = (
+        _Guess(
+            unit,
+            f"is in {name} (converted to {other}, its values are multiples of {digit:.4g})",
+            "shown",
+        )
+        for unit, scale, name, other in (
+            (_RADIAN, 180 / np.pi, "radians", "degrees"),
+            (_DEGREE, np.pi / 180, "degrees", "radians"),
+        )
+        if (digit := _printed_digit(finite, scale))
+    )
+    return next(shown, None)
 
 
 def _printed_digit(finite: FloatArray, scale: float) -> float | None:
@@ -267,13 +272,14 @@ def _printed_digit(finite: FloatArray, scale: float) -> float | None:
     # Beyond it a double has no such digits left.
     if len(some) < _DIGITS or np.abs(some).max() > 10.0 ** (sys.float_info.dig - _PLACES):
         return None
-    some = scale * some
-    for place in range(_PLACES + 1):
-        whole = some * 10.0**place
-        # Of readings that have no such digit a few in a hundred are this near to one.
-        if np.ptp(whole) > 20.0 and np.all(np.abs(whole - np.rint(whole)) < 0.5 * _NEAR):
-            return 10.0**-place
-    return None
+    wholes = ((10.0**-place, scale * some * 10.0**place) for place in range(_PLACES + 1))
+    # Of readings that have no such digit a few in a hundred are this near to one.
+    digits = (
+        digit
+        for digit, whole in wholes
+        if np.ptp(whole) > 20.0 and np.all(np.abs(whole - np.rint(whole)) < 0.5 * _NEAR)
+    )
+    return next(digits, None)
 
 
 def _by_rate(choice: Choice, column: Column, time_s: FloatArray) -> _Guess | None:

@@ -183,19 +183,23 @@ def parse_header(place: Path, data: bytes, options: ReadOptions) -> WindaqHeader
         "give the true rate with --sample-rate",
     )
     form = "HiRes" if hires else "14-bit"
-    for odd, note in (
-        (false, f"the sample interval in the header ({interval:g} s) can't be true"),
-        # WinDaq itself refuses such a file, by its byte 44.
-        (
-            told["compression"] < 1,
-            f"the header's compression of the display ({told['compression']}) can't be true",
-        ),
-        (
-            suffix in SUFFIXES and (suffix in (".wdh", ".whc")) != hires,
-            f"the header is that of {form}, the name {place.suffix} is not: the header is believed",
-        ),
-    ):
-        notes += [note] * bool(odd)
+    notes += [
+        note
+        for odd, note in (
+            (false, f"the sample interval in the header ({interval:g} s) can't be true"),
+            # WinDaq itself refuses such a file, by its byte 44.
+            (
+                told["compression"] < 1,
+                f"the header's compression of the display ({told['compression']}) can't be true",
+            ),
+            (
+                suffix in SUFFIXES and (suffix in (".wdh", ".whc")) != hires,
+                f"the header is that of {form}, the name {place.suffix} is not: the header is"
+                " believed",
+            ),
+        )
+        if odd
+    ]
     entries = np.frombuffer(data, _layout(_ENTRY_FIELDS, entry), count, table)
     channels = [_channel(place, number, each) for number, each in enumerate(entries, start=1)]
     # A scan without a word would let a damaged header claim any number of scans.
@@ -668,9 +672,9 @@ def read_capture(place: Path, data: bytes, options: ReadOptions) -> Table:
     if not srate and options.sample_rate is None:
         srate = _SLOWEST
         notes.append("the capture does not give its srate: 65535 (11.44 Hz) is taken")
-    metadata = {"bits": "12", "range_volts": "10"}
-    for second in re.findall(r"^\s*(1\d{9}(?:\.\d+)?)\s*$", text, re.M):
-        metadata["recorded_at"] = f"{second} s since 1970"
+    began = re.findall(r"^\s*(1\d{9}(?:\.\d+)?)\s*$", text, re.M)
+    dated = {"recorded_at": f"{began[-1]} s since 1970"} if began else {}
+    metadata = {"bits": "12", "range_volts": "10", **dated}
     limits = -10.0, 2047 * _VOLTS_PER_COUNT
     columns = tuple(
         Column(f"channel {n}", "V", volts, n, resolution=_VOLTS_PER_COUNT, limits=limits)

@@ -177,14 +177,17 @@ def windaq_hires(place: str | Path, recording: Recording) -> tuple[bytes, tuple[
         events=_events(recording, rows, pauses),
     )
     constant = recording.metadata.get("volts_per_radian")
-    for lost, note in (
-        (constant, f"a .WDH has no place for volts_per_radian ({constant})"),
-        (
-            abs(begin_s) > 0.5 * interval_s,
-            f"times in the .WDH count from its first sample ({begin_s:.6g} s here)",
-        ),
-    ):
-        notes += [note] * bool(lost)
+    notes += [
+        note
+        for lost, note in (
+            (constant, f"a .WDH has no place for volts_per_radian ({constant})"),
+            (
+                abs(begin_s) > 0.5 * interval_s,
+                f"times in the .WDH count from its first sample ({begin_s:.6g} s here)",
+            ),
+        )
+        if lost
+    ]
     return content, tuple(notes)
 
 
