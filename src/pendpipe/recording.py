@@ -343,16 +343,15 @@ def read_plain(path: str | Path, data: bytes | None = None) -> Recording:
     quantity, picked = _columns(place, first + 1, names)
     table = _numbers(place, lines, first + 1, [*picked.values()], len(names))
     column = dict(zip(picked, table.T, strict=True))
-    quality = None
-    if "quality" in column:
+    quality = column.get("quality")
+    if quality is not None:
         # What is no quality becomes 255, which `check` refuses.
-        known = np.isin(column["quality"], (GOOD, SUSPECT, MISSING))
-        quality = np.where(known, column["quality"], 255).astype(np.uint8)
+        quality = np.where(np.isin(quality, (GOOD, SUSPECT, MISSING)), quality, 255)
     recording = Recording(
         time_s=column["time_s"],
         values=column[quantity],
         quantity=quantity,
-        quality=quality,
+        quality=None if quality is None else quality.astype(np.uint8),
         radius_excess=column.get("radius_excess"),
         metadata={
             key: text

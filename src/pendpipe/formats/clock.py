@@ -67,9 +67,7 @@ def column_of_clock_times(cells: Sequence[str]) -> FloatArray | None:
     if not days or min(days.values()) < _FIRST_DAY or matches.count(None) > 0.1 * len(matches):
         return None
     seconds, ahead = np.full(len(cells), np.nan), np.zeros(len(cells))
-    for row, match in enumerate(matches):
-        if match is None:
-            continue
+    for row, match in ((row, match) for row, match in enumerate(matches) if match is not None):
         date, (hour, minute, second, half, *zone) = match.groups()[:6], match.groups()[6:]
         hours = int(hour or 0)
         hours = hours % 12 + 12 * (half.lower() == "pm") if half else hours

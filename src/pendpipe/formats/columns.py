@@ -165,9 +165,8 @@ def choose(table: Table, options: ReadOptions, *, reading: bool = True) -> Choic
         f"no column looks like the motion of a pendulum (found {names})",
         "name it with --column (and its unit with --unit)",
     )
-    if others:
-        said = f"one of several runs is read; choose with --column: {others}"
-        facts.append(Fact("rows", "one run", "stated", said))
+    said = f"one of several runs is read; choose with --column: {others}"
+    facts += [Fact("rows", "one run", "stated", said)] * bool(others)
     if time is not None:
         told = options.columns[0] is not None or time.role in ("time", "index")
         facts.insert(0, Fact("time column", time.label, "stated" if told else "shown"))
@@ -372,8 +371,7 @@ def _readings(
         for c in alive
     ]
     pair = _position_pair(alive)
-    if pair is not None:
-        candidates.append((_PAIR, pair))
+    candidates += [(_PAIR, pair)] if pair is not None else []
     if not candidates:
         return (), []
     most = max(entry[0] for entry in candidates)

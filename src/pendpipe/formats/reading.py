@@ -245,9 +245,8 @@ def recording_of(table: Table, options: ReadOptions) -> Recording:
     facts += lost
     _refuse_absurd(table, base, values)
     missing, start = np.isnan(values), base.time_s[0] if base.time_s.size else 0.0
-    if start < 0:
-        said = f"the times begin at {start:.6g} s, before their zero"
-        facts.append(Fact("clock", f"from {start:.6g} s", "stated", said))
+    said = f"the times begin at {start:.6g} s, before their zero"
+    facts += [Fact("clock", f"from {start:.6g} s", "stated", said)] * bool(start < 0)
     quality = np.where(missing, MISSING, GOOD).astype(np.uint8)
     kept = {key: value for key, value in table.metadata.items() if key in _KEPT}
     events = {

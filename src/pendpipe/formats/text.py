@@ -333,10 +333,11 @@ def _rows(
         what if wrong else "there are no samples",
         "correct or drop the row" if wrong else "record again, or give another file",
     )
-    notes = [f"{len(kept) - len(rows)} line(s) of text below the first row left out"]
-    notes = notes if len(kept) > len(rows) else []
-    if wrong:
-        notes.append(f"{len(wrong)} damaged row(s) left out (line {number}: '{line.strip()[:40]}')")
+    told = (
+        (len(kept) - len(rows), "line(s) of text below the first row left out"),
+        (len(wrong), f"damaged row(s) left out (line {number}: '{line.strip()[:40]}')"),
+    )
+    notes = [f"{many} {what}" for many, what in told if many]
     padded = [cells + [""] * (width - len(cells)) for *_, cells in whole]
     return padded, np.array([number for number, *_ in whole], np.int64), notes
 

@@ -410,11 +410,9 @@ def _drop_repeats(choice: Choice, base: TimeBase) -> None:
     origin = first[which.reshape(-1)]
     again = origin < np.arange(len(origin))
     if many := (of_one_stamp := again.sum()) > max(20, 0.01 * len(again)):
-        for column in choice.channels:
-            if len(column.values) > base.rows.max():
-                values = column.values[base.rows]
-                same = (values == values[origin]) | (np.isnan(values) & np.isnan(values[origin]))
-                again &= same
+        long = (c.values for c in choice.channels if len(c.values) > base.rows.max())
+        for values in (column[base.rows] for column in long):
+            again &= (values == values[origin]) | (np.isnan(values) & np.isnan(values[origin]))
     # Of many rows with one stamp, some have the same reading near a turn.
     if again.any() and not (many and again.sum() < 0.5 * of_one_stamp):
         base.keep(~again, f"{again.sum()} row(s) that repeat the time of an earlier row left out")

@@ -284,16 +284,19 @@ def _printed_digit(finite: FloatArray, scale: float) -> float | None:
 
 def _by_rate(choice: Choice, column: Column, time_s: FloatArray) -> _Guess | None:
     """Compare its derivative with one in a known unit that stands beside it."""
-    for other in choice.channels:
-        unit = unit_of(other.unit) if other.unit else None
-        if unit is None or unit.name != "rad/s" or len(other.values) != len(column.values):
-            continue
-        slope = derivative_slope(time_s, column.values, other.values) or 0.0
-        for guess, name in ((_RADIAN, "radians"), (_DEGREE, "degrees")):
-            if abs(unit.factor * abs(slope) / guess.factor - 1.0) < 0.25:
-                why = f"is taken to be in {name} (by '{other.label}' beside it)"
-                return _Guess(guess, why, "shown")
-    return None
+    slopes = (
+        (other, unit.factor * abs(derivative_slope(time_s, column.values, other.values) or 0.0))
+        for other in choice.channels
+        if (unit := unit_of(other.unit)) is not None and unit.name == "rad/s"
+        if len(other.values) == len(column.values)
+    )
+    shown = (
+        _Guess(guess, f"is taken to be in {name} (by '{other.label}' beside it)", "shown")
+        for other, slope in slopes
+        for guess, name in ((_RADIAN, "radians"), (_DEGREE, "degrees"))
+        if abs(slope / guess.factor - 1.0) < 0.25
+    )
+    return next(shown, None)
 
 
 _LEAST_TURN: Final = 256.0

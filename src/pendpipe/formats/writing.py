@@ -209,8 +209,7 @@ def _scaled(
     if recording.quantity == "volts" and range_volts and possible and not unipolar:
         tries.append((range_volts / -_LOWEST, 0.0))
     if recording.resolution:
-        step = recording.resolution
-        tries.append((step, float(values[np.argmin(np.abs(values - middle))])))
+        tries.append((recording.resolution, float(values[np.argmin(np.abs(values - middle))])))
     span_step = max((high - low) / (_HIGHEST - _LOWEST - 1), abs(middle) * 1e-12, 1e-12)
     tries.append((span_step, middle))
     for step, intercept in tries:
