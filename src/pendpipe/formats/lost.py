@@ -33,17 +33,15 @@ def lost_readings(
         The size of the file's unit.
     """
     values = without_spikes(without_marks(given)) if swings else without_marks(given)
-    missing, facts = np.isnan(values), list[Fact]()
-    lost = given[missing & ~np.isnan(given)] / factor
-    if lost.size:
-        marks = ", ".join(f"{mark:.6g}" for mark in np.unique(lost)[:3])
-        said = f"{lost.size} reading(s) that stand out ({marks}): taken as lost"
-        facts.append(Fact("lost readings", marks, "shown", said))
-    if missing.any():
-        said = f"{missing.sum()} row(s) without a reading, marked missing"
-        how: How = "shown" if lost.size else "stated"
-        facts.append(Fact("lost readings", f"{missing.sum()}", how, said))
-    return values, facts
+    missing = np.isnan(values)
+    lost, many = given[missing & ~np.isnan(given)] / factor, int(missing.sum())
+    marks = ", ".join(f"{mark:.6g}" for mark in np.unique(lost)[:3])
+    how: How = "shown" if lost.size else "stated"
+    told = (
+        (lost.size, marks, f"{lost.size} reading(s) that stand out ({marks}): taken as lost"),
+        (many, f"{many}", f"{many} row(s) without a reading, marked missing"),
+    )
+    return values, [Fact("lost readings", value, how, said) for some, value, said in told if some]
 
 
 @np.errstate(invalid="ignore", over="ignore")

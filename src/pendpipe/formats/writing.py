@@ -235,8 +235,7 @@ def _events(recording: Recording, rows: IntArray, pauses: _Pauses) -> list[Event
     for mark in markers_of(recording):
         scan = int(np.clip(np.searchsorted(time_s, mark.time_s - 1e-9), 0, len(rows) - 1))
         comments = by_scan.setdefault(scan, [])
-        if mark.comment not in comments:
-            comments.append(mark.comment)
+        comments += [mark.comment] * (mark.comment not in comments)
     if recording.quality is not None:
         suspect = recording.quality[rows] == SUSPECT
         for scan in np.flatnonzero(suspect & ~np.concatenate(([False], suspect[:-1]))).tolist():
