@@ -1,6 +1,7 @@
 """Names beside each other: rivals, neighbours, and cycles that were left out."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -94,6 +95,19 @@ def test_a_magnet_may_be_a_restoring_torque_without_a_name() -> None:
         *(name for name, _ in effect.indistinguishable),
     }
     assert effect.probability < 0.5 or effect.identifier == "unnamed-restoring"
+
+
+@pytest.mark.parametrize(("a", "told"), [(0.2, True), (0.05, False)])
+def test_the_drag_that_a_fit_has_chosen_is_chosen_again(a: float, told: bool) -> None:
+    """Of two forms without a value the other is taken where the readings tell them apart."""
+    rng, truth = np.random.default_rng(2), TRUTH.copy()
+    truth[0] = a
+    energy = Model(TIME_S, INTERVAL_S)
+    data, noise = prepared(energy.reading(truth) + NOISE_RAD * rng.standard_normal(len(TIME_S)))
+    speed = refine(replace(energy, drag="speed"), data, noise, truth)
+    state = simplified(hypothesis_of(speed, data, noise, (), speed))
+    assert (state.fit.model.drag == "energy") is told
+    assert state.drag_form == state.fit.model.drag
 
 
 @pytest.mark.structure

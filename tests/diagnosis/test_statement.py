@@ -85,6 +85,7 @@ def searched(unexplained: float, remainder: Remainder | None = None, p_value: fl
         unexplained=unexplained,
         p_value=p_value,
         beginning=SimpleNamespace(fit=None),
+        drag_form="energy",
         remainder=remainder,
         data=SimpleNamespace(unit="rad", step=0.0),
         baseline=SimpleNamespace(model=SimpleNamespace(restoring="linear")),

@@ -89,6 +89,28 @@ def test_a_string_pendulum_seen_by_one_camera(
     assert fit.value[OMEGA] == pytest.approx(math.sqrt(SQUARE), rel=max(stiffer, 1e-3))
 
 
+@pytest.mark.parametrize("stiffer", [-0.1, 0.004, 0.02])
+def test_a_small_swing_across_is_held_by_the_string_that_the_large_one_pulls(
+    stiffer: float,
+) -> None:
+    """At 28 degrees it grows where the turn of the planes takes up the detuning.
+
+    Its waveform's third harmonic, of the square of the large swing, is left.
+    """
+    scene = (0.47, 0.002, stiffer, 0.5 * math.pi)
+    along, across = (np.tan(spherical(*scene, camera_rad)) for camera_rad in (0.0, 0.5 * math.pi))
+    readings = np.arctan(along) + across / np.sqrt(1.0 + along**2 + across**2)
+    data = Data(TIME, readings, 1.0 / 30.0, True, np.ones(len(TIME)))
+    model = Model(TIME, 1.0 / 30.0, (PLANES,), restoring="sine")
+    omega = math.sqrt(SQUARE)
+    value = np.array([0.0, LOSS, 0.0, 0.0, omega, 0.485, 0.0, 0.0, 0.0, 0.0, 0.0])
+    value[-1] = 0.25 / math.pi * omega * stiffer
+    fit = refine(model, data, white_noise(data, 1e-4), value, held=[A, C, SHARE])
+    alone = refine(model.bare(), data, white_noise(data, 1e-4), value[:8], held=[A, C, SHARE])
+    assert data.rms_left(fit.at.reading) < 0.25 * 0.47**2 * data.rms_left(alone.at.reading)
+    assert fit.value[-1] == pytest.approx(value[-1], rel=0.1)
+
+
 @pytest.mark.parametrize("camera_rad", [0.1, 0.5])
 def test_a_drag_of_the_speed_in_both_planes_needs_no_detuning(camera_rad: float) -> None:
     """The smaller half axis loses less, and the loss of one plane is 4/(3 pi) of v|v| a length."""

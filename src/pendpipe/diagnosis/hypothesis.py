@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendpipe.analysis.fit.fitted import DragForm
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.diagnosis import Progress
 from pendpipe.diagnosis.begin import Beginning
@@ -32,7 +33,12 @@ from pendpipe.diagnosis.refine import (
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.dynamics.eq8 import OMEGA, Restoring
 from pendpipe.effects import Effect
-from pendpipe.effects.catalogue.in_time import damping_modulation, resonant_drive, slow_modulation
+from pendpipe.effects.catalogue.in_time import (
+    damping_modulation,
+    resonant_drive,
+    slow_modulation,
+    viscous_step,
+)
 from pendpipe.effects.catalogue.reading import (
     PERSPECTIVE,
     WIDE_RAD,
@@ -179,12 +185,18 @@ class Hypothesis:
 
     @property
     def key(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Its effects and its faults: where a search has been it does not return."""
+        """Its drag, effects and faults: where a search has been it does not return."""
         effects = [effect.key for effect in self.fit.model.effects]
         released = [str(index) for index in self.beginning.held if index not in self.held]
         faults = sorted(each.identifier for each in self.faults)
         # What happens at an instant may happen twice.
-        return tuple(sorted([*effects, *released])), tuple(faults)
+        return (self.fit.model.drag, *sorted([*effects, *released])), tuple(faults)
+
+    @property
+    def drag_form(self) -> DragForm:
+        """That the readings prefer; told by the fit, unless the search has taken the other."""
+        fit, drag = self.beginning.fit, self.baseline.model.drag
+        return drag if fit is None or fit.light == "red" or fit.form.drag != drag else fit.drag_form
 
     @property
     def scan(self) -> Detection:
@@ -333,7 +345,7 @@ def applicable(
         return list(fit.model.admitted(named))
     keys = {effect.key for effect in fit.model.effects}
     modulations = slow_modulation, gain_modulation, damping_modulation
-    forms: list[Effect | None] = [SoftClipping(), resonant_drive, *modulations]
+    forms: list[Effect | None] = [SoftClipping(), resonant_drive, viscous_step, *modulations]
     if any(effect.identifier == circular_error.identifier for effect in catalogue):
         forms.append(CIRCULAR_ERROR_IN.get(unit))
     if tone_pickup.identifier not in used:

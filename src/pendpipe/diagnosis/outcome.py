@@ -83,8 +83,8 @@ class Outcome:
     @property
     def drag_form(self) -> str:
         """That the readings prefer; of several recordings together that of the first."""
-        fit = self.alone[0].fit if self.alone else self.fit
-        return "energy" if fit is None or fit.light == "red" else fit.drag_form
+        search = self.alone[0].search if self.alone else self.search
+        return "energy" if search is None else search.drag_form
 
     @property
     def missing(self) -> tuple[FoundEffect, ...]:

@@ -407,8 +407,9 @@ def refit_leads(
     lost = phase_lost and base.model.restoring == "linear" and data.unit == "rad"
     as_pendulum = replace(base.model, restoring="sine") if lost else base.model
     begun = (_begun(base, as_pendulum, data, noise, lead, held) for lead in detection.leads)
-    found = [*detection.leads, *filter(None, begun)]
-    leads = _worth_refitting(found, phase_lost, most, wide=bool(pulled(base)))
+    leads = _worth_refitting(detection.leads, phase_lost, most, wide=bool(pulled(base)))
+    # A gain that was had is more than a score: both are refitted.
+    leads += filter(None, begun)
     fits = side_by_side(base, data, noise, leads, held, phase_lost=phase_lost)
     if not fits:
         return []

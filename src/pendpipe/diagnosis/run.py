@@ -315,8 +315,8 @@ def _presumed(found: Hypothesis) -> tuple[FoundEffect, ...]:
 
     What each explains is told to first order beside the baseline's other numbers.
     """
-    fit, begun = found.baseline, found.beginning.fit
-    dragged = (drag_form,) if begun is not None and begun.drag_form == "speed" else ()
+    fit = found.baseline
+    dragged = (drag_form,) if found.drag_form == "speed" else ()
     law = fit.at.span.pendulum
     everywhere = replace(
         Location.over(found.data.time_s, fit.at.sampled.amplitude),

@@ -16,6 +16,7 @@ from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.fit.by_waveform import ODDS
 from pendpipe.diagnosis.begin import Beginning
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.detect import (
@@ -66,7 +67,7 @@ from pendpipe.diagnosis.rivals import (
 from pendpipe.diagnosis.summary import BASELINES
 from pendpipe.diagnosis.weighing import weigh
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.dynamics.eq8 import OFFSET, C
+from pendpipe.dynamics.eq8 import OFFSET, A, C
 from pendpipe.dynamics.eq8_model import values_of
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
@@ -162,7 +163,9 @@ def compared(here: Hypothesis, there: Sequence[Hypothesis]) -> Iterator[Hypothes
     scale = Scale.of(best.fit, here.data, here.noise)
 
     def score(each: Hypothesis) -> float:
-        return scale.lost(each.fit.chi2) + price(each.steps)
+        # As likely as the fit asks of a drag that it calls told.
+        other = each.fit.model.drag != each.beginning.model.drag
+        return scale.lost(each.fit.chi2) + price(each.steps) + 2.0 * ODDS * other
 
     for each in there:
         yield replace(each, lower=score(here) - score(each))
@@ -175,6 +178,7 @@ def simpler(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:
         *_curve_for_names(state),
         *_rare_for_a_curve(state, task.rare(state)),
         *_events_for_a_curve(state, task),
+        *_other_drag(state),
     ]
     return compared(state, there)
 
@@ -246,6 +250,27 @@ def _drops(state: Hypothesis) -> Iterator[Hypothesis]:
             others = tuple(other for other in state.steps if other is not step)
             words = f"{effect.name} is no longer needed"
             yield replace(state, fit=without, steps=others, words=words)
+
+
+def _other_drag(state: Hypothesis) -> Iterator[Hypothesis]:
+    """Take the other form of the drag: with all effects, and without the curves it may replace.
+
+    Neither form has a value of its own. The fit has chosen one of them without the effects.
+    """
+    model = state.fit.model
+    if A in state.held or not state.fit.value[A] > 0.0:
+        return
+    other = replace(model, drag="energy" if model.drag == "speed" else "speed")
+    drawn = [step for step in state.steps if step.winner.drawn]
+    for gone in ([], drawn) if drawn else ([],):
+        model, value = other, state.fit.value
+        for step in gone:
+            model, value = model.dropping(step.winner.effect, value)
+        fit = best_fit(model, state.data, state.noise, [value], held=state.held)
+        if fit is not None:
+            steps = tuple(step for step in state.steps if step not in gone)
+            words = f"drag by {'the energy' if model.drag == 'energy' else 'v|v|'}"
+            yield replace(state, fit=fit, steps=steps, words=words)
 
 
 def _curve_for_names(state: Hypothesis) -> Iterator[Hypothesis]:
@@ -503,6 +528,11 @@ def _additions(state: Hypothesis, task: Task, *, names_first: bool = False) -> I
         return
     one = adding(state, step)
     yield one
+    if not state.steps:
+        # The drag was chosen without the effect; a curve is found beside either form.
+        for other in map(task.scanned, _other_drag(state)):
+            lead = leading(other, task, names_first=True)
+            yield from compared(state, [adding(other, lead)] if lead else [])
     # Of two laws that share a misfit neither may pay its price before the other is there.
     if one.lower < -one.steps[-1].predicted_worse and shares_a_misfit(step, state):
         trial = task.scanned(correct(one.settle(one.fit), task))

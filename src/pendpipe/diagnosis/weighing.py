@@ -265,6 +265,8 @@ def _is_of(fit: Fit, without: Fit, effect: Effect, found: Hypothesis) -> bool:
     keys = [each.key for each in (*without.model.effects, effect)]
     if [each.key for each in fit.model.effects] != keys:
         return False
+    if fit.model.drag != without.model.drag:
+        return False  # the other form of the drag was taken after it
     if not np.array_equal(fit.model.time_s, without.model.time_s):
         return False  # the time stamps were corrected after it
     with suppress(NoMotionError):

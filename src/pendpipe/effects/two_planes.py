@@ -148,19 +148,55 @@ def planes(
         The loss a of Eq. 14, 1/(rad s).
     """
     a, b, seen, hidden = _begun(np.array([other]))
-    last_s, size = float(time_s[-1]), (1.0 + abs(other)) ** 2
+    size = (1.0 + abs(other)) ** 2
+    both, place = _along(a, b, time_s, reached, square, detuning, quadratic, size)
+    turned = np.array([[seen[0], -hidden[0]], [hidden[0], seen[0]]]) @ both[:, 0]
+    u, w = _cubic(turned, place)
+    return u, w
+
+
+def beside(
+    time_s: FloatArray,
+    reached: FloatArray,
+    square: FloatArray,
+    detuning: float,
+    quadratic: float = 0.0,
+) -> AnyArray:
+    """Return what a small swing across, 1 and -i at the first reading, becomes; shape (2, n).
+
+    Over the amplitude of the plane that swings, which it leaves alone. In phase with that it turns
+    the plane and stays; in quadrature it is an ellipse, which turns.
+    """
+    small = np.array([_SMALL, -1j * _SMALL])
+    both, place = _along(np.ones(2), small, time_s, reached, square, detuning, quadratic, 1.0)
+    return _cubic(both[1] / both[0] / _SMALL, place)
+
+
+_SMALL: Final = 1e-6
+"""Of a swing, whose square moves the other plane by less than anyone has measured."""
+
+
+def _along(
+    a: AnyArray,
+    b: AnyArray,
+    time_s: FloatArray,
+    reached: FloatArray,
+    square: FloatArray,
+    detuning: float,
+    quadratic: float,
+    size: float,
+) -> tuple[AnyArray, FloatArray]:
+    """Follow pairs of amplitudes along a motion; and where among the steps its readings lie."""
+    last_s = float(time_s[-1])
     turns = abs(detuning) * last_s + 0.375 * size * float(reached[-1])
     count = min(8 + math.ceil(turns / _TURN), 20_000)
     at = np.linspace(0.0, last_s, count + 1)
     parts = np.diff(np.interp(at, time_s, reached))
     squares = np.interp(0.5 * (at[1:] + at[:-1]), time_s, square)
     lost = quadratic * last_s / count * np.sqrt(squares)
-    detuned = np.exp(np.array([0.5j * detuning * last_s / count]))
-    steps = np.stack([parts, squares, lost])[:, None]
-    both = _followed(a, b, steps, detuned, detuned)[:, 0]
-    turned = np.array([[seen[0], -hidden[0]], [hidden[0], seen[0]]]) @ both
-    u, w = _cubic(turned, time_s * (count / last_s))
-    return u, w
+    detuned = np.full(len(a), np.exp(0.5j * detuning * last_s / count))
+    steps = np.repeat(np.stack([parts, squares, lost])[:, None], len(a), axis=1)
+    return _followed(a, b, steps, detuned, detuned), time_s * (count / last_s)
 
 
 def waveform(amplitude: FloatArray, phase: FloatArray, u: AnyArray, w: AnyArray) -> FloatArray:

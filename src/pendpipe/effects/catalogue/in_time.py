@@ -33,7 +33,7 @@ from pendpipe.effects.effect import (
 )
 from pendpipe.effects.kicks import between_kicks, corner, pulse, repeated_kick
 from pendpipe.effects.two_modes import two_modes
-from pendpipe.effects.two_planes import planes, two_planes, waveform
+from pendpipe.effects.two_planes import beside, planes, two_planes, waveform
 
 
 def _beating(time_s: FloatArray, values: FloatArray, period_s: float) -> Start | None:
@@ -122,10 +122,10 @@ _SLOWEST: Final = 1.5
 """Beats, or cycles of a modulation, within the recording: slower ones are drifts."""
 
 
-def _detunings(span: Span, slowest: float = 0.25) -> list[tuple[float, ...]]:
-    """On both sides, half of 1/duration apart, from so many beats within the recording on."""
+def _detunings(span: Span, slowest: float = 0.25, apart: float = 0.5) -> list[tuple[float, ...]]:
+    """On both sides, a part of 1/duration apart, from so many beats within the recording on."""
     last = plane_band_hz(span)
-    beats = np.arange(slowest / span.duration_s, last, 0.5 / span.duration_s)
+    beats = np.arange(slowest / span.duration_s, last, apart / span.duration_s)
     return rows([*(-beats[::-1]), *beats])
 
 
@@ -173,11 +173,13 @@ def _second_plane(**more: Any) -> Callable[[Callable[..., Any]], Effect]:
 
 @_second_plane(
     equation=(
-        r"y = x + \frac{r}{r_1} \left[q_c \cos(\psi + 2\pi \delta t)"
-        r" + q_s \sin(\psi + 2\pi \delta t)\right]"
+        r"y = x + \operatorname{Re}\left[r \beta\, e^{i\psi}\right], \quad"
+        r" \dot\beta = 2\pi i \delta \beta - \tfrac38 \omega r^2 \operatorname{Im} \beta,"
+        r" \quad r_1 \beta_1 = q_c - i q_s"
     ),
     example=(1e-3, 5e-4, 0.02),
-    shapes=lambda span: _detunings(span, _SLOWEST),
+    # Where the planes' turn takes up the detuning a small swing grows, and beats are sharper.
+    shapes=lambda span: _detunings(span, _SLOWEST, 0.25),
     start=lambda time_s, values, period_s: _in_two_planes(
         time_s, values, Pendulum(2.0 * math.pi / period_s, restoring="sine"), float(time_s[0])
     ),
@@ -190,10 +192,23 @@ def plane_coupling(
 
     A sensor askew adds a part of it: a tone with the main motion's envelope, which runs ahead of it
     by `detuning`. Of a string both planes are those of a spherical pendulum: the more they swing,
-    the slower, and an ellipse turns by 3/8 of the product of its half axes.
+    the slower, and an ellipse turns by 3/8 of the product of its half axes. Without sin x (r^2 is
+    0 there) beta turns alone.
     """
-    phase = sampled.phase + 2.0 * math.pi * detuning * elapsed(sampled.time_s)
-    return np.asarray(sampled.amplitude / sampled.amplitude[0] * tone_at(cosine, sine, phase))
+    time, turned = elapsed(sampled.time_s), 2.0 * math.pi * detuning
+    if pendulum.restoring == "sine":
+        across = beside(time, *_amplitude_so_far(sampled), turned, pendulum.quadratic)
+    else:
+        across = np.exp(1j * turned * time) * np.array([[1.0], [-1j]])
+    seen = (cosine * across[0] + sine * across[1]) * np.exp(1j * sampled.phase)
+    return np.asarray(sampled.amplitude / sampled.amplitude[0] * seen.real)
+
+
+def _amplitude_so_far(sampled: Sampled) -> tuple[FloatArray, FloatArray]:
+    """Return the integral of omega r^2 since the first reading, and r^2."""
+    motion = sampled.motion
+    reached = sampled.at_nodes(motion.clock.integral(motion.amplitude**2))
+    return reached - reached[0], sampled.amplitude**2
 
 
 PlaneCoupling = type(plane_coupling)
@@ -221,11 +236,9 @@ def string_planes(
     moves least. At size 0 it has no derivative.
     """
     motion = sampled.motion
-    reached = sampled.at_nodes(motion.clock.integral(motion.amplitude**2))
     ratio = motion.upwards * complex(cosine, -sine) / sampled.amplitude[0]
-    turned = 2.0 * math.pi * detuning
-    time, square = elapsed(sampled.time_s), sampled.amplitude**2
-    both = planes(time, reached - reached[0], square, ratio, turned, pendulum.quadratic)
+    turned, time = 2.0 * math.pi * detuning, elapsed(sampled.time_s)
+    both = planes(time, *_amplitude_so_far(sampled), ratio, turned, pendulum.quadratic)
     return motion.upwards * waveform(sampled.amplitude, sampled.phase, *both)
 
 
@@ -634,6 +647,24 @@ def frequency_step(
 def damping_step(motion: Motion, pendulum: Pendulum, change: float, instant_s: float) -> FloatArray:
     """All losses of the baseline change by a factor 1 + eps at an instant: a rub begins."""
     return np.asarray(change * smooth_step(motion, instant_s) * pendulum.losses(motion))
+
+
+@enters(
+    "acceleration",
+    Sudden,
+    identifier="damping-step",
+    key="damping-step:viscous",
+    name="jump of the damping",
+    equation=r"\ddot x \mathrel{+}= -2 \gamma\, H(t - t_k)\, \dot x",
+    parameters=(Parameter("gamma", "1/s", -10.0, 10.0, word="extra damping"), INSTANT),
+    tried=24,
+    refined=False,
+    example=(1e-3, 21.03),
+    discriminating_test="release it again alike: a law of the amplitude recurs, a magnet does not",
+)
+def viscous_step(motion: Motion, pendulum: Pendulum, gamma: float, instant_s: float) -> FloatArray:
+    """The viscous damping alone changes at an instant: a magnet is moved, the air is let in."""
+    return np.asarray(-2.0 * gamma * smooth_step(motion, instant_s) * motion.velocity)
 
 
 def _at_a_turn(values: FloatArray, span: Span) -> float:
