@@ -136,9 +136,6 @@ _PATIENCE, _STILL_OFF = 5, 0.1
 """Rounds that one half cycle may take to come so near, once all before it are settled."""
 _ROUNDS: Final = 25
 """Picard's iterations at most."""
-_FURTHER: Final = 3
-"""Rounds like the last one that should do: else slopes of the motion there, with which one round
-makes the error a thousandth, and which cost as much as one, are quicker."""
 _STEP: Final = 1e-6
 """Of ln r in a numerical derivative: its error is 1e-6 of it, that of the rounding 1e-10."""
 _LOST: Final = 1e3
@@ -365,7 +362,7 @@ def _solved(
             return motion, np.full_like(now.pull, np.inf)
         if not error < _LOST:
             break
-        if error * (error / before) ** _FURTHER > _TOLERANCE:
+        if error > 0.5 * before:
             motion = replace(motion, slopes=None)
         before = error
     raise NoMotionError("the motion can't be followed")
