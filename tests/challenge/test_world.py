@@ -129,6 +129,7 @@ def test_what_an_effect_was_sized_for_is_what_a_fit_loses(effect: str) -> None:
     assert missed(there, cause) == pytest.approx(400.0, rel=0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", ["history-force", "clock-drift", "sensor-cubic"])
 def test_what_is_left_of_a_cause_is_what_a_fit_loses_however_far_it_moves_the_frequency(
     effect: str,

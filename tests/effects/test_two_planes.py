@@ -89,6 +89,7 @@ def test_a_string_pendulum_seen_by_one_camera(
     assert fit.value[OMEGA] == pytest.approx(math.sqrt(SQUARE), rel=max(stiffer, 1e-3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffer", [-0.1, 0.004, 0.02])
 def test_a_small_swing_across_is_held_by_the_string_that_the_large_one_pulls(
     stiffer: float,

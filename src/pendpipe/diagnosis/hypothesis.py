@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pendpipe.analysis.fit.by_waveform import ODDS
 from pendpipe.analysis.fit.fitted import DragForm
 from pendpipe.analysis.turning_points.measure import Samples
 from pendpipe.diagnosis import Progress
@@ -31,7 +32,7 @@ from pendpipe.diagnosis.refine import (
     remainder_of,
 )
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
-from pendpipe.dynamics.eq8 import OMEGA, Restoring
+from pendpipe.dynamics.eq8 import OMEGA, A, Restoring
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import (
     damping_modulation,
@@ -192,11 +193,29 @@ class Hypothesis:
         # What happens at an instant may happen twice.
         return (self.fit.model.drag, *sorted([*effects, *released])), tuple(faults)
 
-    @property
+    def other_drag(self, *gone: Step) -> Fit | None:
+        """Fit the model with the other form of the drag, and without the effects of some steps.
+
+        None where they are one, without a drag that is fitted.
+        """
+        model, value = self.fit.model, self.fit.value
+        if A in self.held or not value[A] > 0.0:
+            return None
+        model = replace(model, drag="energy" if model.drag == "speed" else "speed")
+        for step in gone:
+            model, value = model.dropping(step.winner.effect, value)
+        return best_fit(model, self.data, self.noise, [value], held=self.held)
+
+    @cached_property
     def drag_form(self) -> DragForm:
         """That the readings prefer; told by the fit, unless the search has taken the other."""
         fit, drag = self.beginning.fit, self.baseline.model.drag
-        return drag if fit is None or fit.light == "red" or fit.form.drag != drag else fit.drag_form
+        if fit is None or fit.light == "red":
+            return drag
+        if fit.form.drag == drag:
+            return fit.drag_form
+        other = self.other_drag()
+        return drag if other is None or other.chi2 - self.fit.chi2 > 2.0 * ODDS else "undecided"
 
     @property
     def scan(self) -> Detection:

@@ -56,6 +56,7 @@ from pendpipe.diagnosis.refine import (
 )
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.rivals import (
+    NEAR,
     NO_SCAN,
     Rival,
     Scale,
@@ -67,7 +68,7 @@ from pendpipe.diagnosis.rivals import (
 from pendpipe.diagnosis.summary import BASELINES
 from pendpipe.diagnosis.weighing import weigh
 from pendpipe.dynamics.any_law import NoMotionError
-from pendpipe.dynamics.eq8 import OFFSET, A, C
+from pendpipe.dynamics.eq8 import OFFSET, C
 from pendpipe.dynamics.eq8_model import values_of
 from pendpipe.effects import Effect
 from pendpipe.effects.catalogue.in_time import PlaneCoupling
@@ -163,9 +164,7 @@ def compared(here: Hypothesis, there: Sequence[Hypothesis]) -> Iterator[Hypothes
     scale = Scale.of(best.fit, here.data, here.noise)
 
     def score(each: Hypothesis) -> float:
-        # As likely as the fit asks of a drag that it calls told.
-        other = each.fit.model.drag != each.beginning.model.drag
-        return scale.lost(each.fit.chi2) + price(each.steps) + 2.0 * ODDS * other
+        return scale.lost(each.fit.chi2) + price(each.steps)
 
     for each in there:
         yield replace(each, lower=score(here) - score(each))
@@ -178,9 +177,11 @@ def simpler(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:
         *_curve_for_names(state),
         *_rare_for_a_curve(state, task.rare(state)),
         *_events_for_a_curve(state, task),
-        *_other_drag(state),
     ]
-    return compared(state, there)
+    yield from compared(state, there)
+    for each in compared(state, list(_other_drag(state))):
+        # As likely as the fit asks of a drag that it calls told.
+        yield replace(each, lower=each.lower - 2.0 * ODDS)
 
 
 def leading(state: Hypothesis, task: Task, *, names_first: bool) -> Step | None:
@@ -257,19 +258,12 @@ def _other_drag(state: Hypothesis) -> Iterator[Hypothesis]:
 
     Neither form has a value of its own. The fit has chosen one of them without the effects.
     """
-    model = state.fit.model
-    if A in state.held or not state.fit.value[A] > 0.0:
-        return
-    other = replace(model, drag="energy" if model.drag == "speed" else "speed")
     drawn = [step for step in state.steps if step.winner.drawn]
     for gone in ([], drawn) if drawn else ([],):
-        model, value = other, state.fit.value
-        for step in gone:
-            model, value = model.dropping(step.winner.effect, value)
-        fit = best_fit(model, state.data, state.noise, [value], held=state.held)
+        fit = state.other_drag(*gone)
         if fit is not None:
             steps = tuple(step for step in state.steps if step not in gone)
-            words = f"drag by {'the energy' if model.drag == 'energy' else 'v|v|'}"
+            words = f"drag {'v|v|' if fit.model.drag == 'speed' else 'by the energy'}"
             yield replace(state, fit=fit, steps=steps, words=words)
 
 
@@ -531,16 +525,24 @@ def _additions(state: Hypothesis, task: Task, *, names_first: bool = False) -> I
     if not state.steps:
         # The drag was chosen without the effect; a curve is found beside either form.
         for other in map(task.scanned, _other_drag(state)):
-            lead = leading(other, task, names_first=True)
+            promised = _left_by_a_name(state) - _left_by_a_name(other) > NEAR
+            lead = leading(other, task, names_first=True) if promised else None
             yield from compared(state, [adding(other, lead)] if lead else [])
     # Of two laws that share a misfit neither may pay its price before the other is there.
     if one.lower < -one.steps[-1].predicted_worse and shares_a_misfit(step, state):
         trial = task.scanned(correct(one.settle(one.fit), task))
-        for more in _additions(trial, task, names_first=True):
+        # What is left may be noise of another colour.
+        for more in (trial, *_additions(trial, task, names_first=True)):
             # A neighbour of a neighbour is compared with the hypothesis before both.
             model, value = state.fit.model.at_times(more.data.time_s), state.fit.value
             fit = refine(model, more.data, more.noise, value, held=state.held, rounds=0)
             yield from compared(replace(more, fit=fit, steps=state.steps), [more])
+
+
+def _left_by_a_name(state: Hypothesis) -> float:
+    """Return the chi^2 that the scan promises with its best name."""
+    names = (lead.score for lead in state.scan.leads if lead.effect.kind != "unnamed")
+    return state.fit.chi2 - max(names, default=0.0)
 
 
 def _ends_with_curve(state: Hypothesis) -> bool:
