@@ -412,8 +412,9 @@ def _measured(samples: Samples, place: str | Path) -> TurningPoints:
     )
     amplitude, rates, level = _losses(places, first, samples.noise_rms, rough.level)
     places, measured, shape = _shaped(samples, places, amplitude, rates, level, stride)
-    # What a gap leaves of a half cycle tells no noise of the others.
-    beside = samples.time_s[np.flatnonzero(gaps)[:, None] + [0, 1]]
+    # What a gap leaves of a half cycle tells no noise of the others; between counts there is none.
+    broken = np.flatnonzero(gaps & (not samples.counts))
+    beside = samples.time_s[broken[:, None] + [0, 1]]
     torn = np.searchsorted(places.centre_s - 0.5 * places.half_period_s, beside.ravel()) - 1
     single = measured.single | np.isin(np.arange(len(places.number)), torn)
     terms = 3 + measured.harmonics.shape[1]
