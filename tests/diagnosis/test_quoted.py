@@ -314,9 +314,14 @@ CHIRP = 2e-5
 def braked() -> tuple[FloatArray, float]:
     """A viscous brake is switched on half way, and the clock slows down; the mean period."""
     time_s = TIME_S - 0.5 * CHIRP * TIME_S**2 / END_S
-    half_s = 0.5 * END_S
-    damped = 0.008 * np.minimum(time_s, half_s) + 0.024 * np.maximum(time_s - half_s, 0.0)
-    return 0.15 * np.exp(-damped) * np.cos(OMEGA_RAD_S * time_s), T0_S * (1.0 + 0.5 * CHIRP)
+    late_s = np.maximum(time_s - 0.5 * END_S, 0.0)
+    free, held = (complex(-rate, math.sqrt(OMEGA_RAD_S**2 - rate**2)) for rate in (0.008, 0.024))
+    # Angle and velocity go on where it begins.
+    then = 0.15 * np.exp(free * 0.5 * END_S)
+    part = ((free * then).real - held.conjugate() * then.real) / (2j * held.imag)
+    before, after = 0.15 * np.exp(free * time_s), 2.0 * part * np.exp(held * late_s)
+    angle_rad = np.where(late_s > 0.0, after.real, before.real)
+    return angle_rad, 2.0 * math.pi / free.imag * (1.0 + 0.5 * CHIRP)
 
 
 def humming() -> tuple[FloatArray, float]:

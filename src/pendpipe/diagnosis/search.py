@@ -529,7 +529,8 @@ def _additions(state: Hypothesis, task: Task, *, names_first: bool = False) -> I
             lead = leading(other, task, names_first=True) if promised else None
             yield from compared(state, [adding(other, lead)] if lead else [])
     # Of two laws that share a misfit neither may pay its price before the other is there.
-    if one.lower < -one.steps[-1].predicted_worse and shares_a_misfit(step, state):
+    pays = one.lower >= -one.steps[-1].predicted_worse
+    if not (pays or names_first) and shares_a_misfit(step, state):
         trial = task.scanned(correct(one.settle(one.fit), task))
         # What is left may be noise of another colour.
         for more in (trial, *_additions(trial, task, names_first=True)):
