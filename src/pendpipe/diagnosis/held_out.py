@@ -37,6 +37,8 @@ class HeldOut:
         Of the errors of prediction, in the unit of the readings.
     blocks, better
         How many blocks were left out, and how many the extended model predicts better.
+    worst
+        The gain of the block that it predicts worst, or 0.
     """
 
     before: float
@@ -46,6 +48,7 @@ class HeldOut:
     rms_after: float = field(metadata={"json": "rms_after_rad"})
     blocks: int
     better: int = field(metadata={"json": "blocks_better"})
+    worst: float = field(default=0.0, metadata={"json": "worst_block"})
 
     @property
     def gain(self) -> float:
@@ -78,6 +81,7 @@ def held_out(
         float(np.sqrt(np.mean(error_after[used] ** 2))),
         int(np.count_nonzero(filled)),
         int(np.count_nonzero(gains > 0.0)),
+        min(float(gains.min()), 0.0),
     )
 
 
@@ -93,12 +97,13 @@ def predicted_worse(
 ) -> float:
     """Return twice the log density by which a model predicts cycles that are left out worse.
 
-    What it has more than the other then describes the noise of the readings and no law. A curve
-    (`drawn`) may diverge in one block where its knots have no readings: that is a loss of one
+    What it has more than the other then describes the noise of the readings and no law. It may
+    diverge in the block without which it is not known, as a transient does in the first, which does
+    not count. A curve (`drawn`) may where its knots have no readings: that is a loss of one
     standard deviation of the sum, and two are allowed.
     """
     found = held_out(before, after, data, noise, held_before, held_after)
-    allowed = 2.0 * found.gain_sd if drawn and math.isfinite(found.gain_sd) else 0.0
+    allowed = 2.0 * found.gain_sd if drawn and math.isfinite(found.gain_sd) else -found.worst
     return 2.0 * max(-found.gain - allowed, 0.0)
 
 
