@@ -19,6 +19,8 @@ _FOLDS: Final = 2
 """Fits for all predictions: every other block is left out of one of two."""
 _PRECISE: Final = 1e-4
 """Relative error to which missing readings are filled in."""
+_UNKNOWN: Final = 10.0
+"""Loss of a block over the gain of all: of a size that is wrong by three times itself there."""
 _MOST_STEPS: Final = 400
 """Of conjugate gradients at most, whatever they have reached."""
 
@@ -97,13 +99,16 @@ def predicted_worse(
 ) -> float:
     """Return twice the log density by which a model predicts cycles that are left out worse.
 
-    What it has more than the other then describes the noise of the readings and no law. It may
-    diverge in the block without which it is not known, as a transient does in the first, which does
-    not count. A curve (`drawn`) may where its knots have no readings: that is a loss of one
-    standard deviation of the sum, and two are allowed.
+    What it has more than the other then describes the noise of the readings and no law. Its size
+    may be unknown without one block, as a transient's without the first, which does not count. A
+    curve (`drawn`) may diverge where its knots have no readings: that is a loss of one standard
+    deviation of the sum, and two are allowed.
     """
     found = held_out(before, after, data, noise, held_before, held_after)
-    allowed = 2.0 * found.gain_sd if drawn and math.isfinite(found.gain_sd) else -found.worst
+    unknown = -2.0 * found.worst < _UNKNOWN * (before.chi2 - after.chi2)
+    allowed = -found.worst if unknown else 0.0
+    if drawn and math.isfinite(found.gain_sd):
+        allowed = 2.0 * found.gain_sd
     return 2.0 * max(-found.gain - allowed, 0.0)
 
 
