@@ -100,13 +100,13 @@ def predicted_worse(
     """Return twice the log density by which a model predicts cycles that are left out worse.
 
     What it has more than the other then describes the noise of the readings and no law. Its size
-    may be unknown without one block, as a transient's without the first, which does not count. A
-    curve (`drawn`) may diverge where its knots have no readings: that is a loss of one standard
-    deviation of the sum, and two are allowed.
+    may be unknown without one block, as a transient's without the first, which does not count if
+    the others speak for it. A curve (`drawn`) may diverge where its knots have no readings: that is
+    a loss of one standard deviation of the sum, and two are allowed.
     """
     found = held_out(before, after, data, noise, held_before, held_after)
     unknown = -2.0 * found.worst < _UNKNOWN * (before.chi2 - after.chi2)
-    allowed = -found.worst if unknown else 0.0
+    allowed = -found.worst if unknown and found.gain > found.worst else 0.0
     if drawn and math.isfinite(found.gain_sd):
         allowed = 2.0 * found.gain_sd
     return 2.0 * max(-found.gain - allowed, 0.0)
