@@ -10,7 +10,7 @@ import numpy as np
 from pendpipe.arrays import BoolArray, FloatArray, IntArray
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
-from pendpipe.diagnosis.refine import Fit, refine
+from pendpipe.diagnosis.refine import CLEAN, Fit, refine
 from pendpipe.dynamics.any_law import NoMotionError
 
 _BLOCK_CYCLES: Final = 10
@@ -101,12 +101,13 @@ def predicted_worse(
 
     What it has more than the other then describes the noise of the readings and no law. Its size
     may be unknown without one block, as a transient's without the first, which does not count if
-    the others speak for it. A curve (`drawn`) may diverge where its knots have no readings: that is
-    a loss of one standard deviation of the sum, and two are allowed.
+    the others speak for it and noise is left. A curve (`drawn`) may diverge where its knots have no
+    readings: that is a loss of one standard deviation of the sum, and two are allowed.
     """
     found = held_out(before, after, data, noise, held_before, held_after)
     unknown = -2.0 * found.worst < _UNKNOWN * (before.chi2 - after.chi2)
-    allowed = -found.worst if unknown and found.gain > found.worst else 0.0
+    unknown &= found.gain > found.worst and after.chi2 <= CLEAN * data.used
+    allowed = -found.worst if unknown else 0.0
     if drawn and math.isfinite(found.gain_sd):
         allowed = 2.0 * found.gain_sd
     return 2.0 * max(-found.gain - allowed, 0.0)
