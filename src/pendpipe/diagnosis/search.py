@@ -180,7 +180,7 @@ def simpler(state: Hypothesis, task: Task) -> Iterator[Hypothesis]:
     ]
     yield from compared(state, there)
     for each in compared(state, list(_other_drag(state))):
-        # As likely as the fit asks of a drag that it calls told.
+        # The fit, too, calls the form of the drag told only at these odds.
         yield replace(each, lower=each.lower - 2.0 * ODDS)
 
 

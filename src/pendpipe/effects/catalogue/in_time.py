@@ -192,8 +192,8 @@ def plane_coupling(
 
     A sensor askew adds a part of it: a tone with the main motion's envelope, which runs ahead of it
     by `detuning`. Of a string both planes are those of a spherical pendulum: the more they swing,
-    the slower, and an ellipse turns by 3/8 of the product of its half axes. Without sin x (r^2 is
-    0 there) beta turns alone.
+    the slower, and an ellipse turns by 3/8 of the product of its half axes. Of a spring the
+    planes do not turn each other: beta has the detuning alone.
     """
     time, turned = elapsed(sampled.time_s), 2.0 * math.pi * detuning
     if pendulum.restoring == "sine":
