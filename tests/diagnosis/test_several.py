@@ -18,6 +18,9 @@ from pendpipe.effects.model import Model
 from pendpipe.effects.stack import Differs, Stack
 from pendpipe.recording import Recording
 
+from ..effects.integration import swung
+from .records import white
+
 AMPLITUDES = (0.05, 0.15, 0.4)
 B, C = np.pi * 0.9 * (1.0 / 600.0 + 1.0 / 900.0), 7e-4
 
@@ -135,6 +138,18 @@ def test_derivatives_of_two_recordings_are_those_of_each_by_what_it_has() -> Non
         error = found[:, index] - quotient / (2.0 * step[index])
         # As of one recording: the columns of the baseline leave out small parts of the effects'.
         assert np.linalg.norm(error) < 0.025 * np.linalg.norm(found[:, index]), index
+
+
+@pytest.mark.slow
+def test_the_form_of_the_drag_is_told_by_all_where_none_tells_it_alone() -> None:
+    """The search goes to the other form in each recording, and says so by its name."""
+    time_s = np.arange(0.0, 60.0, 1.0 / 15.0)
+    angle = swung(time_s, 0.4, 5.6, 0.006, drag=0.03)[0]
+    noisy = (angle + white(seed, len(angle), 9e-4) for seed in (1, 2, 3))
+    found = pp.diagnose([Recording(time_s, y, "angle_rad") for y in noisy], together=True)
+    assert {each.drag_form for each in found.alone} == {"undecided"}
+    assert found.drag_form == "speed"
+    assert "drag-form" in {each.identifier for each in found.effects if each.presumed}
 
 
 @pytest.mark.slow

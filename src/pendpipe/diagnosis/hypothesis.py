@@ -40,6 +40,7 @@ from pendpipe.effects.catalogue.in_time import (
     slow_modulation,
     viscous_step,
 )
+from pendpipe.effects.catalogue.losses import drag_form
 from pendpipe.effects.catalogue.reading import (
     PERSPECTIVE,
     WIDE_RAD,
@@ -210,9 +211,9 @@ class Hypothesis:
     def drag_form(self) -> DragForm:
         """That the readings prefer; told by the fit, unless the search has taken the other."""
         fit, drag = self.beginning.fit, self.baseline.model.drag
-        if fit is None or fit.light == "red":
+        if fit is not None and fit.light == "red":
             return drag
-        if fit.form.drag == drag:
+        if fit is not None and fit.form.drag == drag:
             return fit.drag_form
         other = self.other_drag()
         return drag if other is None or other.chi2 - self.fit.chi2 > 2.0 * ODDS else "undecided"
@@ -341,11 +342,11 @@ def applicable(
     Or, with `rare`, those that are asked where a curve would be added: rare effects, and what every
     pendulum has.
 
+    The form of the drag is none: without a size it is no lead but a neighbour (`other_drag`).
+
     What happens at an instant may happen twice: a second one is a copy, so that the model can
     tell their values apart.
     """
-    value = fit.value
-    present = {"a": value[0] > 0.0, "b": value[1] > 0.0, "c": value[2] > 0.0}
     used = {effect.identifier for effect in fit.model.effects}
     named = [
         copy(effect) if effect.identifier in used else effect
@@ -355,7 +356,7 @@ def applicable(
         and baseline not in effect.inside
         and (unit in ("rad", "rad/s") or not effect.angular)
         and not (effect.form and fit.at.span.pendulum.has(effect.form))
-        and all(present[name] for name in effect.needs)
+        and effect is not drag_form
         and (effect.identifier not in used or effect.local)
     ]
     if rare:

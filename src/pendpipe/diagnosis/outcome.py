@@ -82,9 +82,8 @@ class Outcome:
 
     @property
     def drag_form(self) -> str:
-        """That the readings prefer; of several recordings together that of the first."""
-        search = self.alone[0].search if self.alone else self.search
-        return "energy" if search is None else search.drag_form
+        """That the readings prefer."""
+        return "energy" if self.search is None else self.search.drag_form
 
     @property
     def missing(self) -> tuple[FoundEffect, ...]:

@@ -166,7 +166,7 @@ def diagnose_recording(
     return Diagnosis(
         before,
         after,
-        (*_presumed(found), *effects),
+        (*presumed(found), *effects),
         predicted,
         *_seen(found, named, level),
         warnings=(*points.notes, *stamps),
@@ -310,7 +310,7 @@ def _fit_of(
         return None
 
 
-def _presumed(found: Hypothesis) -> tuple[FoundEffect, ...]:
+def presumed(found: Hypothesis) -> tuple[FoundEffect, ...]:
     """List what the baseline has that Eq. 8 has not: sin x, and v|v| where that was fitted.
 
     What each explains is told to first order beside the baseline's other numbers.
@@ -322,13 +322,13 @@ def _presumed(found: Hypothesis) -> tuple[FoundEffect, ...]:
         Location.over(found.data.time_s, fit.at.sampled.amplitude),
         summary="it is fitted, throughout the record",
     )
-    presumed = list[FoundEffect]()
+    effects = list[FoundEffect]()
     for effect in (circular_error, *dragged):
         if not law.has(effect.form):
             continue
         (column,) = whitened(fit, found.noise, effect, [()])
         worth = float(np.sum(fit.beside(column, ()) ** 2))
-        presumed.append(
+        effects.append(
             FoundEffect(
                 effect.identifier,
                 effect.name,
@@ -344,7 +344,7 @@ def _presumed(found: Hypothesis) -> tuple[FoundEffect, ...]:
                 presumed=True,
             )
         )
-    return tuple(presumed)
+    return tuple(effects)
 
 
 def _fitted_model(fit: Fit, found: Hypothesis, name: str) -> FittedModel:

@@ -38,6 +38,7 @@ from pendpipe.diagnosis.quoted import Description, averages, descriptions_of
 from pendpipe.diagnosis.refine import Fit, best_fit, loses_phase, remainder_of, with_errors
 from pendpipe.diagnosis.result import Diagnosis
 from pendpipe.diagnosis.rivals import Scale
+from pendpipe.diagnosis.run import presumed
 from pendpipe.diagnosis.search import LESS_FRICTION, run_search
 from pendpipe.diagnosis.summary import DOUBTFUL
 from pendpipe.diagnosis.values import constants_of
@@ -246,8 +247,7 @@ def diagnose_several(
     before = replace(after, improved=found.baseline, described=[Description(1.0, bare)])
     named, differing = after.effects()
     events = after.events()
-    own_forms = [each for each in outcomes[0].effects if each.presumed]
-    effects = (*own_forms, *named, *differing, *events)
+    effects = (*presumed(found), *named, *differing, *events)
     held = (
         held_out(found.baseline, found.fit, found.data, found.noise, found.held, found.held)
         if named

@@ -240,11 +240,11 @@ class Stack(Model):
         return [int(base[k]) for base, held in pairs for k in held if k < len(base)]
 
     def evaluate(self, value: FloatArray) -> Evaluated:
-        """Return the readings of all, one recording after the other."""
+        """Return the readings of all, one recording after the other, by one form of the drag."""
         parts = []
         for number, (member, mixing) in enumerate(zip(self.members, self.mixings(), strict=True)):
             own = np.clip(mixing @ value, *member.bounds())
-            parts.append(_OfSeveral(number, member.evaluate(own), mixing))
+            parts.append(_OfSeveral(number, replace(member, drag=self.drag).evaluate(own), mixing))
         spans = [part.at.span for part in parts]
         loudest = max(parts, key=lambda part: part.at.span.first_amplitude).at
         span = Span(

@@ -68,7 +68,8 @@ drag_form: Final = other_form(
 
     Both fall as dr/dt = -a r^2 if v|v| is 1.5 times as strong; the friction's third harmonic
     is 1/5 of its first for v|v|, and -1/3 for the energy form. With sin x the envelopes part at
-    large amplitudes.
+    large amplitudes. It has no size to scan for: the fit takes one form, and a diagnosis goes to
+    the other where the readings tell it beside what was left out.
     """,
     {"drag": "speed"},
     identifier="drag-form",
