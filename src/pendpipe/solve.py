@@ -12,6 +12,8 @@ no normal equations, no last step unverified, none that follow a curve, and can'
 resumed, as refits are that compete. So this is ours.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
@@ -22,6 +24,8 @@ from typing import Final, Generic, NamedTuple, Self, TypeVar
 import numpy as np
 
 from pendpipe.arrays import FloatArray, IntArray, scaled_qr
+from pendpipe.dynamics.kernel import Matrix, Stack, kernel
+from pendpipe.priors import NO_PRIORS, Priors
 
 _SLACK: Final = 1e-9
 """Rounding error of the gradient."""
@@ -270,28 +274,6 @@ def bounded_least_squares(
             break
         held[released] = False
     return x
-
-
-class Priors(NamedTuple):
-    """Normal priors of some values: each counts as one more datum."""
-
-    places: IntArray
-    mean: FloatArray
-    sd: FloatArray
-
-    def residual(self, value: FloatArray) -> FloatArray:
-        """What is to be explained of each."""
-        return (self.mean - value[self.places]) / self.sd
-
-    def rows(self, size: int) -> FloatArray:
-        """Derivatives of what explains it, shape (priors, size)."""
-        found = np.zeros((len(self.places), size))
-        found[np.arange(len(self.places)), self.places] = 1.0 / self.sd
-        return found
-
-
-NO_PRIORS: Final = Priors(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
-"""Of a problem of which nothing is known beforehand."""
 
 
 @dataclass(frozen=True)
@@ -734,7 +716,6 @@ CHI2_95: Final = 3.841458820694124
 """95 % point of chi^2 with one degree of freedom."""
 
 
-@np.errstate(over="ignore")  # a corner may be beyond all numbers
 def intervals95(
     value: FloatArray,
     normal: FloatArray,
@@ -763,57 +744,115 @@ def intervals95(
     chi^2 is taken as quadratic. Where truth lies on a bound the interval covers it in at
     least 95 % of the cases (97.5 % with one bound), never less.
     """
+    ends = np.stack([value[list(indices)]] * 2, axis=1)
     if not np.isfinite(normal).all():
         # A search that got to where nothing moves tells nothing.
-        return [(float(value[j]), float(value[j])) for j in indices]
+        return [(low, high) for low, high in ends.tolist()]
     # By its root, since rounding may have made the matrix indefinite.
-    root, scale, *_ = of_normal(normal, gradient)
-    part, room = root.T @ root + _HAIR * np.eye(len(value)), bounds.about(value)
-    best = bounded_step(normal, gradient, room, held) * scale
-    way, pull = Bounds(room.lower * scale, room.upper * scale), gradient / scale
-    found = []
-    for j in indices:
-        low, high = (_end(part, pull, way, (j, *held), best, side) for side in (-1.0, 1.0))
-        # What met a bound ends there, to the last digit.
-        low = bounds.lower[j] if low <= way.lower[j] else value[j] + low / scale[j]
-        high = bounds.upper[j] if high >= way.upper[j] else value[j] + high / scale[j]
-        found.append((float(low), float(high)))
-    return found
+    linear, room = of_normal(normal, gradient, _others(len(value), held)), bounds.about(value)
+    free, scale, root = linear.free, linear.scale, linear.triangle
+    part, pull = root.T @ root + _HAIR * np.eye(len(free)), gradient[free] / scale
+    best, room = linear.step(room)[0][free] * scale, Bounds(*(each[free] * scale for each in room))
+    wanted = np.array([place for place, j in enumerate(indices) if j not in held], dtype=np.int64)
+    own = np.searchsorted(free, np.asarray(indices, dtype=np.int64)[wanted])
+    found, size = np.empty((len(own), 2)), len(free)
+    space = np.empty((1, size, size)), np.empty((5, size))
+    _walk(part, pull, room.lower, room.upper, best, own, *space, found)
+    # What met a bound ends there, to the last digit.
+    ends[wanted] = value[free[own], None] + found / scale[own, None]
+    met = found <= room.lower[own, None], found >= room.upper[own, None]
+    for side, limit in enumerate(bounds):
+        ends[wanted, side] = np.where(met[side][:, side], limit[free[own]], ends[wanted, side])
+    return [(low, high) for low, high in ends.tolist()]
 
 
-def _end(
-    normal: FloatArray,
+@kernel()
+def _walk(
+    normal: Matrix,
     gradient: FloatArray,
-    room: Bounds,
-    held: Sequence[int],
+    lower: FloatArray,
+    upper: FloatArray,
     best: FloatArray,
-    side: float,
-) -> float:
-    """How far the first of what is `held` gets to an end of its interval, from the optimum on.
+    wanted: IntArray,
+    room: Stack,
+    work: Matrix,
+    ends: Matrix,
+) -> None:
+    """Fill in how far some values get to the ends of their intervals, from the optimum on.
 
     The others follow within their bounds, straight on from one corner to the next, at which a
     value meets its bound or comes off it. So chi^2 is a parabola between corners, and the end is
-    the root of one: the first, where no bound is met.
+    the root of one: the first, where no bound is met. There is `room` for a matrix, shape
+    (1, n, n), and for five vectors, (5, n).
     """
-    index, step, follows = held[0], best, np.ones(len(best), dtype=bool)
-    follows[list(held)], last = False, 0.0
-    # A value is stuck at its upper bound (1), at its lower one (-1), or free (0).
-    pull = gradient - normal @ best
-    wall = 1.0 * ((step >= room.upper) & (pull > 0.0)) - ((step <= room.lower) & (pull < 0.0))
-    for _ in range(10 * len(best) + 10):
-        free, way = np.flatnonzero(follows & (wall == 0.0)), np.zeros(len(step))
-        way[index], rows = side * (index not in held[1:]), normal[free]
-        way[free] = np.linalg.solve(rows[:, free], -way[index] * rows[:, index])
-        change, pull = normal @ way, gradient - normal @ step
-        bend, slope = max(float(way @ change), _HAIR), float(way @ pull)
-        missing = max(CHI2_95 + float(step @ (pull + gradient)), 0.0)
-        last = (slope + math.sqrt(slope**2 + bend * missing)) / bend
-        corner = np.full(len(step), np.inf)
-        ahead = np.where(way > 0.0, room.upper, room.lower) - step
-        np.divide(ahead, way, out=corner, where=way != 0.0)
-        np.divide(pull, change, out=corner, where=follows & (wall * change > 0.0))
-        if (k := int(np.argmin(corner))) == index or not (go := max(float(corner[k]), 0.0)) < last:
-            break
-        # From there on it is stuck, or no longer.
-        wall[k], step = np.sign(way[k]), room.clip(step + go * way)
-    return float(room.clip(step + last * way)[index])
+    size = best.size
+    step, wall, way, change, pull = work[0], work[1], work[2], work[3], work[4]
+    for end in range(2 * wanted.size):
+        index, side, last = wanted[end // 2], 2.0 * (end % 2) - 1.0, 0.0
+        for turn in range(10 * size + 10):
+            for p in range(size if turn == 0 else 0):
+                step[p] = best[p]
+            missing, bend, slope = CHI2_95, 0.0, 0.0
+            for p in range(size):
+                pull[p] = gradient[p]
+                for q in range(size):
+                    pull[p] -= normal[p, q] * step[q]
+                missing += step[p] * (pull[p] + gradient[p])
+                if turn == 0:
+                    # It is stuck at its upper bound (1), at its lower one (-1), or free (0).
+                    stuck = 1.0 if step[p] >= upper[p] and pull[p] > 0.0 else 0.0
+                    wall[p] = -1.0 if step[p] <= lower[p] and pull[p] < 0.0 else stuck
+            # What is looked for goes on by itself.
+            wall[index] = 2.0
+            for p in range(size):
+                for q in range(size):
+                    loose = wall[p] == 0.0 and wall[q] == 0.0
+                    room[0, p, q] = normal[p, q] if loose else 1.0 if p == q else 0.0
+            invert(room)
+            for p in range(size):
+                way[p], change[p] = side if p == index else 0.0, 0.0
+                for q in range(size if wall[p] == 0.0 else 0):
+                    way[p] -= side * room[0, p, q] * (normal[q, index] if wall[q] == 0.0 else 0.0)
+            for p in range(size):
+                for q in range(size):
+                    change[p] += normal[p, q] * way[q]
+                bend, slope = bend + way[p] * change[p], slope + way[p] * pull[p]
+            bend = max(bend, _HAIR)
+            last = (slope + math.sqrt(slope * slope + bend * max(missing, 0.0))) / bend
+            corner, met = np.inf, index
+            for p in range(size):
+                if way[p] != 0.0:
+                    ahead = ((upper[p] if way[p] > 0.0 else lower[p]) - step[p]) / way[p]
+                elif wall[p] * change[p] > 0.0:
+                    ahead = pull[p] / change[p]
+                else:
+                    continue
+                if ahead < corner:
+                    corner, met = ahead, p
+            if met == index or not max(corner, 0.0) < last:
+                break
+            # From there on it is stuck, or no longer.
+            wall[met] = math.copysign(1.0, way[met]) if way[met] != 0.0 else 0.0
+            for p in range(size):
+                step[p] = min(max(step[p] + max(corner, 0.0) * way[p], lower[p]), upper[p])
+        reached = step[index] + last * way[index]
+        ends[end // 2, end % 2] = min(max(reached, lower[index]), upper[index])
+
+
+@kernel()
+def invert(matrices: Stack) -> None:
+    """Invert positive definite matrices in their place, shape (k, size, size), by sweeps."""
+    size = matrices.shape[1]
+    for k in range(matrices.shape[0]):
+        one = matrices[k]
+        for p in range(size):
+            pivot = one[p, p]
+            one[p, p] = 1.0
+            for r in range(size):
+                one[p, r] /= pivot
+            for q in range(size):
+                if q != p:
+                    factor = one[q, p]
+                    one[q, p] = 0.0
+                    for r in range(size):
+                        one[q, r] -= factor * one[p, r]

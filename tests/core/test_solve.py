@@ -11,11 +11,11 @@ from scipy.optimize import lsq_linear, minimize
 from scipy.stats import chi2 as chi_square
 
 from pendpipe.arrays import FloatArray
+from pendpipe.priors import Priors
 from pendpipe.solve import (
     CHI2_95,
     Bounds,
     NoStartError,
-    Priors,
     Problem,
     Quadratic,
     Search,

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
 from typing import Final
 
 import numpy as np
 
+from pendpipe.analysis.turning_points.measure import cosine_sine, product
 from pendpipe.arrays import FloatArray, IntArray
 from pendpipe.dynamics.any_law import Sampled
+from pendpipe.dynamics.kernel import Matrix, Stack, kernel
 
 _FEWEST_READINGS: Final = 5
 """Fewest readings in a cycle for three fitted numbers."""
@@ -23,10 +24,25 @@ _RIDGE: Final = 1e-12
 
 def harmonic_columns(phase: FloatArray, harmonics: int) -> FloatArray:
     """Return 1, cos psi, sin psi, cos 2 psi, ...; shape (1 + 2 harmonics, n)."""
-    first = np.cos(phase) + 1j * np.sin(phase)
-    turned = np.cumprod(np.broadcast_to(first, (harmonics, len(phase))), axis=0)
-    waves = np.stack([turned.real, turned.imag], axis=1).reshape(-1, len(phase))
-    return np.concatenate([np.ones((1, len(phase))), waves])
+    waves = np.empty((1 + 2 * harmonics, len(phase)))
+    _fill_waves(np.ascontiguousarray(phase), waves)
+    return waves
+
+
+@kernel(any_order=True)
+def _fill_waves(phase: FloatArray, waves: Matrix) -> None:
+    """Fill in what `harmonic_columns` returns, right to 1e-12."""
+    for i in range(phase.size):
+        turns = math.floor(phase[i] / math.pi + 0.5)
+        cosine, sine = cosine_sine(phase[i] - math.pi * turns)
+        side = 1.0 - 2.0 * (turns - 2.0 * math.floor(0.5 * turns))
+        waves[0, i], waves[1, i], waves[2, i] = 1.0, side * cosine, side * sine
+    for m in range(3, waves.shape[0]):
+        # cos(n + 1) = 2 cos(1) cos(n) - cos(n - 1), and so the sine; the one at 0 is none
+        share = 0.0 if m == 4 else 1.0
+        for i in range(phase.size):
+            twice = 2.0 * waves[1, i] * waves[m - 2, i]
+            waves[m, i] = twice - share * waves[max(m - 4, 0), i]
 
 
 def _numbered(phase: FloatArray) -> IntArray:
@@ -63,14 +79,25 @@ def normal_equations(
     gram, right
         Shapes (k, p, p) and (k, p, ...); zero of windows without readings.
     """
-    size, empty = len(columns), np.diff(starts, append=columns.shape[1]) == 0
+    size, table = len(columns), values.reshape(len(values), -1)
     gram = np.empty((len(starts), size, size))
-    # A pair of columns at a time: all products of all readings would take gigabytes.
-    for i, j in combinations_with_replacement(range(size), 2):
-        gram[:, i, j] = gram[:, j, i] = np.add.reduceat(columns[i] * columns[j], starts)
-    right = np.stack([np.add.reduceat((column * values.T).T, starts) for column in columns], axis=1)
-    gram[empty], right[empty] = 0.0, 0.0
-    return gram, right
+    right = np.empty((len(starts), size, table.shape[1]))
+    ends = np.append(starts, len(values))
+    _sum_up(np.ascontiguousarray(columns), np.ascontiguousarray(table.T), ends, gram, right)
+    return gram, right.reshape(*right.shape[:2], *values.shape[1:])
+
+
+@kernel(any_order=True)
+def _sum_up(columns: Matrix, values: Matrix, ends: IntArray, gram: Stack, right: Stack) -> None:
+    """Fill both; each window ends where the next one starts."""
+    for k in range(ends.size - 1):
+        first, count = ends[k], ends[k + 1] - ends[k]
+        for i in range(columns.shape[0]):
+            column = columns[i, first:]
+            for j in range(i + 1):
+                gram[k, i, j] = gram[k, j, i] = product(column, columns[j, first:], count)
+            for j in range(values.shape[0]):
+                right[k, i, j] = product(column, values[j, first:], count)
 
 
 def by_cycle(

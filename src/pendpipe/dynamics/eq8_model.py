@@ -34,7 +34,7 @@ from pendpipe.dynamics.eq8 import (
     sample_with_jacobian,
     share_of,
 )
-from pendpipe.solve import Priors
+from pendpipe.priors import Priors
 
 Seen = Literal["angle", "rate", "position"]
 """What of the motion is read: the angle, its rate, or a position L sin x."""

@@ -24,9 +24,9 @@ from pendpipe.dynamics.eq8 import SHARE_MEAN, SHARE_SD, Restoring
 from pendpipe.levels import REFUTED
 from pendpipe.physics.decay import amplitude_and_gradient
 from pendpipe.physics.lengthening import elliptic
+from pendpipe.priors import Priors
 from pendpipe.solve import (
     Bounds,
-    Priors,
     Quadratic,
     bounded_step,
     covariance,

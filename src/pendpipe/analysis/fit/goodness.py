@@ -8,6 +8,7 @@ change along the record. All questions share one level.
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -15,9 +16,9 @@ import numpy as np
 from pendpipe.analysis.demodulation import harmonic_columns, normal_equations
 from pendpipe.analysis.misfit import misfit_of
 from pendpipe.analysis.noise import TOLD, scatter, undithered_rms
-from pendpipe.analysis.turning_points.measure import invert
 from pendpipe.arrays import FloatArray
 from pendpipe.levels import REFUTED
+from pendpipe.solve import invert
 
 _BINS: Final = 32
 """Means in a cycle that stand for more readings than that."""
@@ -231,21 +232,29 @@ def _questions(
     """What noise has to explain, of each harmonic: scatter of the blocks, and slow change."""
     size, count = found.value.shape[1], len(found.value)
     asked, slow = [], min(_SLOW, count // 3)
-    basis = np.linalg.qr(np.linspace(-1.0, 1.0, count)[:, None] ** np.arange(slow))[0]
+    # Each is a normal number of its own, the sine less what it shares with the cosine.
+    variance = found.inverse * noise**2 + np.eye(size) * rounding[:, None, None] ** 2
+    cosine, sine, white = np.arange(1, size, 2), np.arange(2, size, 2), found.value.copy()
+    shared = variance[:, cosine, sine] / variance[:, cosine, cosine]
+    white[:, sine] -= shared * white[:, cosine]
+    square = variance.diagonal(axis1=1, axis2=2).copy()
+    square[:, sine] -= shared * variance[:, cosine, sine]
+    white /= np.sqrt(square)
+    taken = (_slow_changes(count, slow).T @ white) ** 2
     for harmonic in range((size + 1) // 2):
         part = slice(2 * harmonic - 1, 2 * harmonic + 1) if harmonic else slice(0, 1)
-        absorbed = (lines, fitted)[harmonic] if harmonic < 2 else 0
-        variance = found.inverse[:, part, part] * noise**2
-        wide = variance.shape[1]
-        variance = variance + np.eye(wide) * rounding[:, None, None] ** 2
-        # Each is a normal number of its own.
-        root = np.linalg.cholesky(variance)
-        white = np.linalg.solve(root, found.value[:, part, None])[..., 0]
+        absorbed, wide = (lines, fitted)[harmonic] if harmonic < 2 else 0, 1 + (harmonic > 0)
         freedom = wide * count - absorbed
         name = ("level", "motion")[harmonic] if harmonic < 2 else f"harmonic {harmonic}"
         if freedom > 0:
-            asked.append(Question(name, float(np.sum(white**2)), freedom))
+            asked.append(Question(name, float(np.sum(white[:, part] ** 2)), freedom))
         if wide * slow > absorbed:
-            taken = float(np.sum((basis.T @ white) ** 2))
-            asked.append(Question(f"{name}, slow", taken, wide * slow - absorbed))
+            along = float(np.sum(taken[:, part]))
+            asked.append(Question(f"{name}, slow", along, wide * slow - absorbed))
     return asked
+
+
+@lru_cache(maxsize=16)
+def _slow_changes(count: int, slow: int) -> FloatArray:
+    """Orthonormal polynomials along so many blocks, shape (count, slow)."""
+    return np.linalg.qr(np.linspace(-1.0, 1.0, count)[:, None] ** np.arange(slow))[0]

@@ -32,7 +32,7 @@ from pendpipe.arrays import BoolArray, FloatArray, IntArray, median
 from pendpipe.dynamics.kernel import IntMatrix, Matrix, Stack, kernel
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.recording import Recording
-from pendpipe.solve import Bounds, bounded_step
+from pendpipe.solve import Bounds, bounded_step, invert
 
 FITTED: Final = 4
 """Readings of a half cycle from which its amplitude, phase and level are told, and one is left."""
@@ -198,7 +198,7 @@ def _fill(
 
 
 @kernel(any_order=True)
-def _product(one: FloatArray, other: FloatArray, count: int) -> float:
+def product(one: FloatArray, other: FloatArray, count: int) -> float:
     """Return the sum of products of the first `count`."""
     total = 0.0
     for i in range(count):
@@ -262,10 +262,10 @@ def half_cycle_sums(
             )
             readings = block[_READING]
             for p in range(terms):
-                right[k, p] += _product(block[p], readings, count)
+                right[k, p] += product(block[p], readings, count)
                 for q in range(p + 1):
-                    gram[k, p, q] += _product(block[p], block[q], count)
-            square[k] += _product(readings, readings, count)
+                    gram[k, p, q] += product(block[p], block[q], count)
+            square[k] += product(readings, readings, count)
             first += count * stride
         for p in range(terms):
             for q in range(p):
@@ -438,25 +438,6 @@ def measure(
         one_sided=one_sided,
         single=np.zeros(number, dtype=bool),
     )
-
-
-@kernel()
-def invert(matrices: Stack) -> None:
-    """Invert positive definite matrices in their place, shape (k, size, size), by sweeps."""
-    size = matrices.shape[1]
-    for k in range(matrices.shape[0]):
-        one = matrices[k]
-        for p in range(size):
-            pivot = one[p, p]
-            one[p, p] = 1.0
-            for r in range(size):
-                one[p, r] /= pivot
-            for q in range(size):
-                if q != p:
-                    factor = one[q, p]
-                    one[q, p] = 0.0
-                    for r in range(size):
-                        one[q, r] -= factor * one[p, r]
 
 
 def _solved(
