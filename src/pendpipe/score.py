@@ -11,10 +11,28 @@ from typing import Final
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import BoolArray, FloatArray
 
 CLASS: Final = 6.0
 """A rival whose likelihood is within exp(-3) of the best one's is in its class (chi^2)."""
+
+
+NEAR: Final = 16.0
+"""Twice the log-likelihood by which a lead may be behind the best and still win in the end."""
+REACH: Final = 0.3
+"""Part of the best score that a refit may catch up."""
+
+
+def within_reach(scores: FloatArray, part: float = REACH) -> BoolArray:
+    """Return which leads may win once they are refitted; scores count as chi^2."""
+    best = float(np.max(scores))
+    return np.asarray(scores > best - NEAR - part * best)
+
+
+def shares(logs: FloatArray) -> FloatArray:
+    """Return probabilities, of which one is true, from their logarithms, shape kept."""
+    weights = np.exp(logs - np.max(logs))
+    return np.asarray(weights / weights.sum())
 
 
 def unit_rows(

@@ -139,13 +139,13 @@ def _predicted(search: CampaignSearch) -> dict[str, Any]:
 
 def _with_and_without(search: CampaignSearch) -> dict[str, JointFit]:
     """Fits with a drag factor over Eq. 16, of all records and without those that are left out."""
-    answers = {"all_records": search.whole or search}
-    if search.whole:
-        answers["without"] = search
+    answers = {"all_records": search.whole}
+    if search.left_out:
+        answers["without"] = search.baseline
     return {
         name: joint_fit(
-            replace(each.baseline.design, walls=False),
-            each.baseline.data,
+            replace(each.design, walls=False),
+            each.data,
             named("uniform-drag-excess", "added-mass"),
         )
         for name, each in answers.items()
@@ -310,20 +310,20 @@ def _of(shape: Any) -> str | float:
 
 def _unnamed(search: CampaignSearch) -> dict[str, Any]:
     """What no entry explains: the records that differ from the rest, in sigma."""
-    whole = search.whole or search
-    _, pulls = held_out(whole.baseline)
-    names = (run.record for run in whole.baseline.design.runs)
+    whole = search.whole
+    _, pulls = held_out(whole)
+    names = (run.record for run in whole.design.runs)
     pairs = zip(names, pulls.tolist(), strict=True)
     far = search.left_out or sorted((Far(*pair) for pair in pairs), key=lambda one: -abs(one.sigma))
     summary = "; ".join(f"{one.record} by {one.sigma:+.1f} sigma" for one in far[:3])
-    left = search.baseline if search.whole else None
+    left = search.baseline if search.left_out else None
     told = FoundEffect(
         "unnamed-damping",
         "records that disagree, by nothing that the catalogue has",
         "unnamed",
         r"b \to b + \Delta b(\text{record})",
         {},
-        whole.baseline.chi2 - (left.chi2 if left else whole.baseline.degrees_of_freedom),
+        whole.chi2 - (left.chi2 if left else whole.degrees_of_freedom),
         search.p_value,
         1.0,
         (),
@@ -355,7 +355,7 @@ def answer_of(
     search: CampaignSearch, ranked: Sequence[Sequence[NextRun]], copies: Sequence[str] = ()
 ) -> Answer:
     """Make the answer: whether the records agree, who does not, and what causes explain it."""
-    count = len((search.whole or search).baseline.design.runs)
+    count = len(search.whole.design.runs)
     design = search.baseline.design
     theory = "Eq. 16 in the tank that is told" if design.tank and design.walls else "Eq. 16"
     agree = (
@@ -390,7 +390,7 @@ def _rows(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> list[t
                 _words(name),
                 f"the drag is {fit.size(0, about=1.0)} times Eq. 16, k {coefficient(fit)}",
             )
-            for name, fit in (_with_and_without(search) if search.whole else {}).items()
+            for name, fit in (_with_and_without(search) if search.left_out else {}).items()
         ),
         (
             "scatter",

@@ -234,15 +234,14 @@ def joint_fit(
     if start is not None:
         first[: len(start)] = start[: len(first)]
     bounds = _bounds(design, added)
-    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        for weight in (*(_APPROACH if start is None else ()), 1.0):
-            weighted = data._replace(whitening=weight * data.whitening)
-            problem = Problem(partial(_weighted, design, weighted, added), bounds)
-            found = minimise(problem, first)
-            first = found.value
-        shaped = _by_shapes(design, data, added, first)
-        point = found.point
-        return JointFit(design, data, added, first, -point.residual, point.columns, shaped)
+    for weight in (*(_APPROACH if start is None else ()), 1.0):
+        weighted = data._replace(whitening=weight * data.whitening)
+        problem = Problem(partial(_weighted, design, weighted, added), bounds)
+        found = minimise(problem, first)
+        first = found.value
+    shaped = _by_shapes(design, data, added, first)
+    point = found.point
+    return JointFit(design, data, added, first, -point.residual, point.columns, shaped)
 
 
 def _by_shapes(
@@ -284,13 +283,13 @@ def chi2_near(
     design: Any, data: Measured, added: Sequence[Candidate], unknowns: FloatArray
 ) -> float:
     """Least chi^2 of the model that is linear about some unknowns."""
-    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        residuals = _residuals(design, data, added, unknowns)
-        basis, _ = np.linalg.qr(_derivatives(design, data, added, unknowns))
+    residuals = _residuals(design, data, added, unknowns)
+    basis, _ = np.linalg.qr(_derivatives(design, data, added, unknowns))
     left = residuals - basis @ (basis.T @ residuals)
     return float(left @ left)
 
 
+@np.errstate(invalid="ignore", over="ignore", divide="ignore")
 def _residuals(
     design: Any, data: Measured, added: Sequence[Candidate], unknowns: FloatArray
 ) -> FloatArray:

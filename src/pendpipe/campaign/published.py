@@ -145,7 +145,7 @@ def diagnose_table(table: Table, level: float = FALSE_ALARM) -> tuple[CampaignSe
 
 def answer_of_table(found: CampaignSearch, errors: Errors) -> Answer:
     """Make the answer: whether theory and observation agree, what may be missing, what remains."""
-    table = found.baseline.design if found.whole is None else found.whole.baseline.design
+    table = found.whole.design
     agree = "do not agree" if found.missing else "agree"
     left = chi_square_p_value(found.improved.chi2, found.improved.degrees_of_freedom)
     causes = [row for one in found.found for row in _rows(one)]

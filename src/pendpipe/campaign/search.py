@@ -1,30 +1,39 @@
-"""What a campaign's model lacks: its catalogue is scanned and refitted; records far off go."""
+"""What a campaign's model lacks: its catalogue is scanned and refitted; records far off go.
+
+The neighbours of a set of causes (`pendpipe.search`): with one more, without one or with another in
+its place, without the record that is farthest off, or with larger errors of all records. They are
+compared by one score: -2 ln L, with a price for each cause (`Found.price`), for each record that is
+left out (`FAR_SIGMA`), and for larger errors.
+"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from scipy.special import ndtr
+from scipy.special import logsumexp, ndtr
 
 from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.campaign.design import Design
 from pendpipe.campaign.effects import WRONG
-from pendpipe.campaign.fit import Candidate, JointFit, Measured, candidates, joint_fit
+from pendpipe.campaign.fit import Candidate, JointFit, Measured, candidates, joint_fit, only
 from pendpipe.campaign.seen import (
     FAR_SIGMA,
     Far,
     farthest,
     has_shape,
     is_orderly,
+    off,
     scatter,
     wider,
     without,
 )
 from pendpipe.estimate import Estimate, chi_square_p_value
 from pendpipe.levels import FALSE_ALARM
-from pendpipe.score import CLASS, trials_of, unit_rows
+from pendpipe.score import CLASS, shares, trials_of, unit_rows, within_reach
+from pendpipe.search import descend
 
 MOST_EFFECTS: Final = 3
 """Effects that are added: of three dozen records more are not told apart."""
@@ -38,12 +47,9 @@ _SEED: Final = 24
 """Of the draws, so that one campaign has one answer."""
 _VISIBLE: Final = 1e-6
 """Part of a pattern that must remain beside what the unknowns follow, above its rounding."""
-_REACH: Final = 30.0
-"""Candidates whose linear gain in chi^2 is this far behind the best are not refitted: the
-effects change the records by a fifth at most, where the linear gain is good to a fifth."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Found:
     """One effect that the model lacks, with the rivals that the data cannot tell from it."""
 
@@ -64,41 +70,48 @@ class Found:
 
 @dataclass(frozen=True)
 class CampaignSearch:
-    """The answer, before it is put into words.
+    """A set of causes, and of records that are left out; at last the answer.
 
     Parameters
     ----------
+    whole
+        The joint fit without causes, of all records with the stated errors.
     baseline, improved
-        The joint fits without and with what was found, of the records that were kept.
+        Those without and with what was found, of the records that were kept.
     p_value
         Global: of the largest score over the catalogue, or of chi^2 as a whole.
-    found
-        In the order in which they were added; empty also where nothing named explains a misfit.
     missing
         Whether something is missing.
+    found
+        In the order in which they were added; empty also where nothing named explains a misfit.
     left_out
         Records that disagree with all others, and explain a misfit better than any effect.
-    suspect
-        A record that would explain it about as well as what was found.
-    whole
-        The answer with all records, where some were left out.
-    scattered
-        Probability of that, beside what else explains the misfit.
     scatter
         By what factor the records scatter beyond the stated errors, where that explains a misfit:
         `improved`, and what was found, then have errors as large.
+    widened
+        -2 ln L over the chi^2 of `improved` where errors are larger, with the price of these.
+    scattered
+        Probability of the scatter, beside what else explains the misfit.
+    suspect
+        A record that would explain it about as well as what was found.
+    lower, words
+        By how much its score is lower than that of the set it was made from, and what was done.
     """
 
+    whole: JointFit
     baseline: JointFit
     improved: JointFit
     p_value: float
-    found: tuple[Found, ...]
     missing: bool
+    found: tuple[Found, ...] = ()
     left_out: tuple[Far, ...] = ()
-    suspect: Far | None = None
-    whole: "CampaignSearch | None" = None
     scatter: Estimate | None = None
+    widened: float = 0.0
     scattered: float = 0.0
+    suspect: Far | None = None
+    lower: float = 0.0
+    words: str = ""
 
     @property
     def unexplained(self) -> float:
@@ -111,10 +124,22 @@ class CampaignSearch:
         return not (self.missing and self.unexplained < FALSE_ALARM)
 
     @property
-    def price(self) -> float:
-        """-2 ln L, with what causes and records that are left out must lower it by."""
+    def score(self) -> float:
+        """-2 ln L, with the prices of causes, of records left out, and of larger errors."""
         far = len(self.left_out) * FAR_SIGMA**2
-        return self.improved.chi2 + sum(one.price for one in self.found) + far
+        return self.improved.chi2 + self.widened + sum(one.price for one in self.found) + far
+
+    @property
+    def key(self) -> tuple[frozenset[Any], frozenset[str], bool]:
+        """Its causes, what is left out, and whether errors are larger."""
+        records = frozenset(far.record for far in self.left_out)
+        causes = frozenset((one.effect.identifier, one.shape) for one in self.improved.added)
+        return causes, records, self.scatter is not None
+
+    @cached_property
+    def scan(self) -> "_Scan":
+        """Scores of what it does not have."""
+        return _scan(self.improved)
 
 
 def local_scores(fit: JointFit, tried: Sequence[Candidate]) -> tuple[FloatArray, FloatArray]:
@@ -164,9 +189,7 @@ def search(
 ) -> CampaignSearch:
     """Look for what the model lacks, and for records that disagree with all others.
 
-    Where records are left out, or more is left than noise, larger errors of all records are a
-    rival, at the scatter that they have (`scatter`): a number for all in the place of causes
-    (`_price`) and records (`FAR_SIGMA`). What leaves more than noise names nothing.
+    What leaves more than noise names nothing.
 
     Parameters
     ----------
@@ -179,116 +202,132 @@ def search(
         The fit without effects, where it is there already.
     """
     base = base or joint_fit(design, data)
-    answer = _among_records(base, level)
-    # The errors of a table of numbers are their scatter.
-    if (answer.described and not answer.left_out) or not isinstance(base.design, Design):
-        return answer
-    best, price = answer, answer.price
-    for kept in (base, answer.baseline)[: 1 + bool(answer.left_out)]:
-        lost = kept is not base
-        other, other_price = _scattered(kept, level)
-        other_price += lost * len(answer.left_out) * FAR_SIGMA**2
-        if other and other_price < price:
-            best, price = other, other_price
-            if lost:
-                best = replace(other, left_out=answer.left_out, whole=answer.whole)
-    if best is not answer:
-        share = 1.0 / (1.0 + math.exp(0.5 * (price - answer.price)))
-        best = replace(best, p_value=answer.p_value, scattered=share)
-    return best if best.described else _undescribed(base, answer)
+    whole = chi_square_p_value(base.chi2, base.degrees_of_freedom)
+    p_value = min(1.0, 2.0 * min(_scan(base).p_value, whole))
+    begun = CampaignSearch(base, base, base, p_value, p_value < level)
+    if not begun.missing:
+        return begun
+    additions, simpler = (partial(some, level=level) for some in (_additions, _simpler))
+    answer = descend(begun, [additions, simpler, _scattered])
+    return _weighed(answer, level) if answer.described else _undescribed(answer)
 
 
-def _among_records(base: JointFit, level: float) -> CampaignSearch:
-    """Search, and leave out the records that disagree.
-
-    A record that lies beyond `FAR_SIGMA` whatever was found, or explains the misfit better than
-    what was found, is left out, and the search is made again.
-    """
-    whole = answer = _search(base, level)
-    left_out: list[Far] = []
-    while answer.missing and len(answer.baseline.design.runs) > MOST_LEFT_OUT:
-        unexplained = farthest(answer.improved)
-        suspects = [far for far in (unexplained, farthest(answer.baseline)) if far]
-        if not suspects:
-            break
-        # A cause that bends to a foreign record makes others far.
-        each = {far: without(answer.baseline, far.record) for far in suspects}
-        suspect, fewer = min(each.items(), key=lambda item: item[1].chi2)
-        better, needed = answer.improved.chi2 - fewer.chi2, CLASS
-        others = [one for one in answer.improved.added if not one.effect.finer]
-        # A mode that one record sees is that record, beside the other causes.
-        if len(others) < len(answer.improved.added):
-            alone = without(answer.baseline, suspect.record, others)
-            better, needed = answer.improved.chi2 - alone.chi2, -CLASS
-        if unexplained is None and better < needed:
-            answer = replace(answer, suspect=suspect if better > -CLASS else None)
-            break
-        if len(left_out) == MOST_LEFT_OUT:
-            break
-        left_out.append(suspect)
-        answer = _search(fewer, level)
-    answer = _beside_each_other(answer, level)
-    if not left_out:
-        return answer
-    return replace(
-        answer, p_value=whole.p_value, missing=True, left_out=tuple(left_out), whole=whole
-    )
-
-
-def _scattered(base: JointFit, level: float) -> tuple[CampaignSearch | None, float]:
-    """Search with errors as large as the records scatter, unless what is left has an order.
+def _with(
+    state: CampaignSearch,
+    found: Sequence[Found],
+    left_out: Sequence[Far],
+    words: str,
+    *,
+    scattered: bool | None = None,
+) -> CampaignSearch:
+    """Fit a neighbour, and compare it.
 
     Causes make records scatter too, so that the scatter is taken anew beside them.
-
-    Returns
-    -------
-    answer, price
-        And -2 ln L over that of the stated errors, with what it must be lowered by.
     """
-    fit, found = base, list[CampaignSearch]()
-    if has_shape(base):
-        return None, math.inf
-    for _ in range(MOST_EFFECTS):
-        factor, fall = scatter(fit)
-        if factor.value > WRONG:
-            return None, math.inf
-        wide = wider(base.data, factor.value)
-        answer = _among_records(joint_fit(base.design, wide, (), base.unknowns), level)
-        now = answer.improved
-        stated = wider(now.data, 1.0 / factor.value)
-        fit = joint_fit(now.design, stated, now.added, now.unknowns)
-        before = [(each.improved.added, each.left_out) for each in found[-1:]]
-        found.append(answer)
-        if before == [(now.added, answer.left_out)]:
-            break
-    price = answer.price - now.chi2 + fit.chi2 - fall + CLASS
-    if answer.left_out or len(answer.found) > 1 or is_orderly(now) or not answer.described:
-        return None, price
-    return replace(answer, missing=True, scatter=factor), price
+    names = [far.record for far in left_out]
+    kept = np.array([run.record not in names for run in state.whole.design.runs])
+    design, data = only(state.whole.design, state.whole.data, kept)
+    added = [one.leader.added[-1] for one in found]
+    # What another record has bent is no place to begin.
+    start = state.baseline.unknowns if tuple(left_out) == state.left_out else None
+    factor, widened = None, 0.0
+    stated = improved = joint_fit(design, data, added, start)
+    if state.scatter is not None if scattered is None else scattered:
+        factor, fall = scatter(stated)
+        data = wider(data, factor.value)
+        improved = joint_fit(design, data, added, start)
+        widened = stated.chi2 - fall - improved.chi2 + CLASS
+    made = replace(
+        state,
+        baseline=joint_fit(design, data, (), start) if added else improved,
+        improved=improved,
+        found=tuple(found),
+        left_out=tuple(left_out),
+        scatter=factor,
+        widened=widened,
+        words=words,
+    )
+    return replace(made, lower=state.score - made.score)
 
 
-def _undescribed(base: JointFit, answer: CampaignSearch) -> CampaignSearch:
+def _additions(state: CampaignSearch, level: float) -> Iterator[CampaignSearch]:
+    """Add the cause that explains most, or leave out the record that is farthest off.
+
+    A cause that bends to a foreign record makes others far.
+    """
+    most = 1 if state.scatter else MOST_EFFECTS
+    if len(state.found) < most and (one := _leading(state.improved, state.scan, level)):
+        yield _with(state, (*state.found, one), state.left_out, f"adding {_name(one)}")
+    if state.scatter or len(state.left_out) == MOST_LEFT_OUT:
+        return
+    if len(state.improved.design.runs) <= MOST_LEFT_OUT:
+        return
+    # A mode that one record sees is that record, beside the other causes.
+    coarse = tuple(one for one in state.found if not one.leader.last.finer)
+    for far in {farthest(state.improved), farthest(state.baseline)} - {None}:
+        assert far is not None
+        for found in dict.fromkeys((state.found, coarse, ())):
+            yield _with(state, found, (*state.left_out, far), f"without {off(far)}")
+
+
+def _simpler(state: CampaignSearch, level: float) -> Iterator[CampaignSearch]:
+    """Drop a cause, or put another in its place; take a record back.
+
+    The order in which causes were added is none of nature's.
+    """
+    for own in state.found:
+        others = [one for one in state.found if one is not own]
+        fewer = _with(state, others, state.left_out, f"{_name(own)} is no longer needed")
+        yield fewer
+        if others and (one := _leading(fewer.improved, fewer.scan, level)):
+            yield _with(state, [*others, one], state.left_out, f"{_name(one)} for {_name(own)}")
+    for far in state.left_out:
+        kept = [each for each in state.left_out if each is not far]
+        yield _with(state, state.found, kept, f"{far.record} is no longer far")
+
+
+def _scattered(state: CampaignSearch) -> Iterator[CampaignSearch]:
+    """Take larger errors of all records, unless what is left has an order.
+
+    A number for all in the place of causes and records.
+    """
+    # The errors of a table of numbers are their scatter.
+    if state.scatter or not isinstance(state.whole.design, Design):
+        return
+    if state.described and not state.left_out:
+        return
+    for left_out in dict.fromkeys(((), state.left_out)):
+        for found in ((), *((one,) for one in state.found)):
+            made = _with(state, found, left_out, "all errors are larger", scattered=True)
+            assert made.scatter is not None
+            if made.scatter.value > WRONG or is_orderly(made.improved) or has_shape(made.baseline):
+                continue
+            yield replace(made, scattered=1.0 / (1.0 + math.exp(-0.5 * made.lower)))
+
+
+def _undescribed(answer: CampaignSearch) -> CampaignSearch:
     """Name nothing; records are left out still if they explain more than what is left."""
-    left = answer.improved.chi2 - answer.improved.degrees_of_freedom
-    if answer.left_out and not has_shape(base) and base.chi2 - answer.baseline.chi2 > left:
-        return replace(answer, improved=answer.baseline, found=(), suspect=None)
-    return CampaignSearch(base, base, answer.p_value, (), True)
+    whole, improved = answer.whole, answer.improved
+    left = improved.chi2 - improved.degrees_of_freedom
+    if answer.left_out and not has_shape(whole) and whole.chi2 - answer.baseline.chi2 > left:
+        return replace(answer, improved=answer.baseline, found=())
+    return CampaignSearch(whole, whole, whole, answer.p_value, missing=True)
 
 
-def _search(baseline: JointFit, level: float) -> CampaignSearch:
-    """Add effects as long as the scan of the catalogue alarms."""
-    everything = candidates(baseline.design)
-    fit, found, first = baseline, list[Found](), 1.0
-    for number in range(MOST_EFFECTS):
-        scan = _scan(fit, everything)
-        if not number:
-            whole = chi_square_p_value(fit.chi2, fit.degrees_of_freedom)
-            first = min(1.0, 2.0 * min(scan.p_value, whole))
-        if scan.p_value >= 0.5 * level or (one := _found(fit, scan)) is None:
-            break
-        found.append(one)
-        fit = one.leader
-    return CampaignSearch(baseline, fit, first, tuple(found), first < level)
+def _weighed(answer: CampaignSearch, level: float) -> CampaignSearch:
+    """Weigh each cause beside all others."""
+    again = list[Found]()
+    for own in answer.found:
+        others = [each for each in answer.improved.added if each != own.leader.added[-1]]
+        fit = answer.improved
+        fit = joint_fit(fit.design, fit.data, others, answer.whole.unknowns)
+        one = _leading(fit, _scan(fit), level)
+        again.append(one if one and one.leader.added[-1] == own.leader.added[-1] else own)
+    improved = again[-1].leader if again else answer.improved
+    far = farthest(answer.baseline) if again else None
+    if far and without(answer.baseline, far.record).chi2 > improved.chi2 + CLASS:
+        far = None
+    return replace(answer, improved=improved, found=tuple(again), suspect=far)
 
 
 class _Scan(NamedTuple):
@@ -299,71 +338,45 @@ class _Scan(NamedTuple):
     p_value: float
 
 
-def _scan(fit: JointFit, everything: Sequence[Candidate]) -> _Scan:
+def _scan(fit: JointFit) -> _Scan:
     taken = {one.effect.identifier for one in fit.added}
-    tried = [one for one in everything if one.effect.identifier not in taken]
+    tried = [one for one in candidates(fit.design) if one.effect.identifier not in taken]
     scores, correlations = local_scores(fit, tried)
     return _Scan(tried, scores, global_p_value(scores, correlations, tried))
 
 
-def _found(fit: JointFit, scan: _Scan) -> Found | None:
-    """Return the effect that explains most of what a fit leaves, with its class."""
+def _name(one: Found) -> str:
+    return one.leader.last.name
+
+
+def _leading(fit: JointFit, scan: _Scan, level: float) -> Found | None:
+    """Return the effect that explains most of what a fit leaves, with its class, if one alarms."""
+    if scan.p_value >= 0.5 * level:
+        return None
     rivals = refit(fit, scan.tried, scan.scores)
     effects = len({one.effect.identifier for one in scan.tried})
-    members, nothing = class_of(rivals, fit, effects)
+    members, nothing, evidence = class_of(rivals, fit, effects)
     leader, probability = members[0]
-    gain = fit.chi2 - leader.chi2
-    if gain < 1.0 or nothing > sum(share for _, share in members):
-        return None
-    best, inside = (
-        min(rival.chi2 for rival in rivals),
-        {each.last.identifier for each, _ in members},
-    )
+    best = min(rival.chi2 for rival in rivals)
+    inside = {each.last.identifier for each, _ in members}
     above = [
         (one.effect.identifier, float(fit.chi2 - score**2 - best))
         for one, score in zip(scan.tried, scan.scores, strict=True)
     ]
     above += [(rival.last.identifier, rival.chi2 - best) for rival in rivals]
     excluded = {name: rise for name, rise in above if name not in inside}
-    chance = min(1.0, 2.0 * scan.p_value)
-    price = 2.0 * math.log(effects / (1.0 - NOTHING_MISSING))
-    price -= leader.chi2 + 2.0 * leader.log_evidence
+    chance, gain = min(1.0, 2.0 * scan.p_value), fit.chi2 - leader.chi2
+    price = evidence - leader.chi2
     return Found(leader, tuple(members[1:]), probability, nothing, chance, gain, excluded, price)
-
-
-def _beside_each_other(answer: CampaignSearch, level: float) -> CampaignSearch:
-    """Weigh each effect beside all others; drop what is not needed, take what is better.
-
-    The order in which effects were added is none of nature's.
-    """
-    last = answer.improved
-    everything = candidates(last.design)
-    added, start = list(last.added), last.unknowns[: len(last.design.nuisances)]
-    for _ in range(2 * MOST_EFFECTS if len(added) > 1 else 0):
-        again = list[Found]()
-        for number, own in enumerate(added):
-            others = added[:number] + added[number + 1 :]
-            fit = joint_fit(last.design, last.data, others, start)
-            scan = _scan(fit, everything)
-            one = _found(fit, scan) if scan.p_value < 0.5 * level else None
-            if one is None or one.leader.added[-1] != own:
-                added[number : number + 1] = [] if one is None else [one.leader.added[-1]]
-                break
-            again.append(one)
-        else:
-            fit = again[-1].leader if again else answer.baseline
-            return replace(answer, improved=fit, found=tuple(again))
-    return answer
 
 
 def refit(fit: JointFit, tried: Sequence[Candidate], scores: FloatArray) -> list[JointFit]:
     """Refit with each candidate whose linear gain is within reach of the best one's."""
     gains = np.where(_one_sided(tried), np.maximum(scores, 0.0), scores) ** 2
-    reach = max(_REACH, 0.25 * float(gains.max()))
     near = [
         number
         for number, one in enumerate(tried)
-        if gains[number] >= max(gains.max() - reach, _best_shape(tried, gains, one))
+        if within_reach(gains)[number] and gains[number] >= _best_shape(tried, gains, one)
     ]
     found = [
         joint_fit(fit.design, fit.data, (*fit.added, tried[number]), fit.unknowns)
@@ -400,8 +413,8 @@ _MOST_STEPS: Final = 12
 
 def class_of(
     rivals: Sequence[JointFit], before: JointFit, effects: int
-) -> tuple[list[tuple[JointFit, float]], float]:
-    """The rivals that the data cannot tell apart, and the probability that nothing is missing.
+) -> tuple[list[tuple[JointFit, float]], float, float]:
+    """The rivals that the data cannot tell apart, the probability of nothing, and their -2 ln L.
 
     The most probable first, with probabilities. One shape of an effect stands for it. Nothing is a
     rival too (`NOTHING_MISSING`, the rest shared by all `effects` that were tried). What is left
@@ -415,9 +428,9 @@ def class_of(
             inside.setdefault(rival.last.identifier, rival)
     members = sorted(inside.values(), key=lambda rival: -rival.log_evidence)
     each = math.log((1.0 - NOTHING_MISSING) / effects)
-    logs = [rival.log_evidence + each for rival in members]
-    logs.append(math.log(NOTHING_MISSING) - 0.5 * before.chi2)
-    weights = np.exp(np.array(logs) - max(logs))
+    logs = np.array([rival.log_evidence + each for rival in members])
+    none = math.log(NOTHING_MISSING) - 0.5 * before.chi2
     left = chi_square_p_value(best, members[0].degrees_of_freedom)
-    *named_ones, nothing = (left / (left + FALSE_ALARM) * weights / weights.sum()).tolist()
-    return list(zip(members, named_ones, strict=True)), nothing
+    *named_ones, nothing = (left / (left + FALSE_ALARM) * shares(np.append(logs, none))).tolist()
+    evidence = 2.0 * (math.log(NOTHING_MISSING) - float(logsumexp(logs)))
+    return list(zip(members, named_ones, strict=True)), nothing, evidence

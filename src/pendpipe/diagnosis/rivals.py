@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import Final
 
 import numpy as np
@@ -39,7 +40,7 @@ from pendpipe.effects import Effect
 from pendpipe.effects.curves import Curve
 from pendpipe.effects.model import Model
 from pendpipe.estimate import Estimate
-from pendpipe.score import CLASS, Trials
+from pendpipe.score import CLASS, NEAR, REACH, Trials, shares, within_reach
 from pendpipe.solve import Search
 
 _SHAPE_CHARGE: Final = 2.0
@@ -346,9 +347,7 @@ def probabilities(rivals: Sequence[Rival], none: float) -> FloatArray:
     own_form = np.array([rival.effect.kind == "parameter" for rival in rivals])
     worth = np.where(own_form, 1.0, shrunk) * (likelihood - best)
     logs = _in_order(0.5 * (worth + prior), rivals)
-    logs = np.append(logs, 0.5 * (none - best))
-    weights = np.exp(logs - logs.max())
-    return np.asarray(weights / weights.sum())
+    return shares(np.append(logs, 0.5 * (none - best)))
 
 
 def _in_order(logs: FloatArray, rivals: Sequence[Rival]) -> FloatArray:
@@ -368,8 +367,6 @@ def _in_order(logs: FloatArray, rivals: Sequence[Rival]) -> FloatArray:
     return np.array(lowered)
 
 
-NEAR: Final = 16.0
-"""Twice the log-likelihood by which a lead may be behind the best and still win in the end."""
 _BEHIND_CURVE: Final = 0.6
 """Part of a curve's gain by which a refit may end behind it, beyond `NEAR`, and matter: a name has
 far fewer values."""
@@ -387,10 +384,8 @@ _UNDERFLOW: Final = 1e-290
 """p-value below which the next digits are lost: the least number is 2e-308."""
 _MOST_REFITTED: Final = 9
 """Effects that are refitted side by side: a choice, of time."""
-_SCORE_MARGIN: Final = 0.3
-"""Part of the best score that a refit may catch up."""
-_SCORE_MARGIN_AT_BOUND: Final = 0.6
-"""The same where a value at its bound lowers the scores."""
+_REACH_AT_BOUND: Final = 0.6
+"""`REACH` where a value at its bound lowers the scores."""
 
 
 def refit_leads(
@@ -446,9 +441,9 @@ def _worth_refitting(found: Sequence[Lead], phase_lost: bool, most: int, wide: b
     leads = sorted(found, key=lambda lead: -_rank(lead))
     if not leads:
         return []
-    best = _rank(leads[0])
-    part = 0.9 if phase_lost else _SCORE_MARGIN_AT_BOUND if wide else _SCORE_MARGIN
-    near = [lead for lead in leads if _rank(lead) > best - NEAR - part * best]
+    part = 0.9 if phase_lost else _REACH_AT_BOUND if wide else REACH
+    reached = within_reach(np.array(list(map(_rank, leads))), part)
+    near = list(compress(leads, reached))
     # Several forms of one effect count as one. Curves lead in many misfits; but for a lost phase
     # they don't count beside names.
     told = [lead for lead in near if phase_lost or lead.effect.kind != "unnamed"]

@@ -1,4 +1,4 @@
-"""From the baseline to the answer: go to a neighbour of a smaller score, until there is none.
+"""The neighbours of a set of effects, from the baseline to the answer (`pendpipe.search`).
 
 The neighbours of a set of effects are compared by one score (docs/score.md):
 
@@ -10,8 +10,9 @@ sizes, less its prior (`rivals.Rival.charge`), with what its set predicts worse 
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -56,7 +57,6 @@ from pendpipe.diagnosis.refine import (
 )
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.rivals import (
-    NEAR,
     NO_SCAN,
     Rival,
     Scale,
@@ -75,7 +75,8 @@ from pendpipe.effects.catalogue.in_time import PlaneCoupling
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES
 from pendpipe.estimate import LISTED, NAMED
 from pendpipe.quantities import compact
-from pendpipe.score import Trials
+from pendpipe.score import NEAR, Trials
+from pendpipe.search import descend
 
 
 def with_other_noise(state: Hypothesis, task: Task) -> Hypothesis:
@@ -421,11 +422,11 @@ def baseline_fitted(beginning: Beginning, task: Task) -> Hypothesis:
 
 
 def run_search(state: Hypothesis, task: Task) -> Hypothesis:
-    """Go to a neighbour of a smaller score, until there is none that was not seen.
+    """Descend to the set of effects of the smallest score, and weigh each of them."""
 
-    Cheap neighbours come first, and the first kind that has a better one is taken.
-    """
-    seen = set()
+    def in_order(at: Hypothesis) -> Hypothesis:
+        return with_other_noise(task.scanned(correct(at, task)), task)
+
     if state.beginning.starts:
         # Before any fault of the record: at the nodes of a beat the phase turns as if rows were
         # lost.
@@ -434,23 +435,18 @@ def run_search(state: Hypothesis, task: Task) -> Hypothesis:
         if begun is not None and begun.lower > 0.0:
             task.progress(begun.words)
             state = begun.settle(begun.fit)
+    state, seen = in_order(state), set[Hashable]()
+    kinds = [partial(some, task=task) for some in (_additions, simpler, describing)]
     while True:
-        state = with_other_noise(task.scanned(correct(state, task)), task)
-        seen.add(state.key)
-        for some in (_additions, simpler, describing):
-            new = [each for each in some(state, task) if each.key not in seen]
-            best = max(new, key=lambda each: each.lower, default=None)
-            if best is not None and best.lower > 0.0:
-                task.progress(best.words)
-                state = best.settle(best.fit)
-                break
-        else:
-            found = _weighed(_judged(examine(state, task)))
-            other = _likelier(found)
-            if other is None or other.key in seen:
-                return found
-            task.progress(other.words)
-            state = other.settle(other.fit)
+        state = descend(
+            state, kinds, lambda each: in_order(each.settle(each.fit)), task.progress, seen
+        )
+        found = _weighed(_judged(examine(state, task)))
+        other = _likelier(found)
+        if other is None or other.key in seen:
+            return found
+        task.progress(other.words)
+        state = in_order(other.settle(other.fit))
 
 
 def _weighed(state: Hypothesis) -> Hypothesis:

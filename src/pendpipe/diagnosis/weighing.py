@@ -16,7 +16,6 @@ from pendpipe.diagnosis.missing_force import force_of
 from pendpipe.diagnosis.refine import SETTLED, Fit, best_fit, is_gross, refine
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.rivals import (
-    NEAR,
     Rival,
     Scale,
     class_width,
@@ -31,6 +30,7 @@ from pendpipe.dynamics.any_law import NoMotionError
 from pendpipe.effects import Effect
 from pendpipe.estimate import LISTED
 from pendpipe.levels import FALSE_ALARM
+from pendpipe.score import NEAR
 
 _CLEAN_CHARGE: Final = 5.0
 """Charge (in chi^2) against "none of these" if the model leaves only noise: then one effect
