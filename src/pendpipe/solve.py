@@ -209,15 +209,20 @@ def of_normal(
     """The linear problem of ``d' H d/2 - g' d`` in what is free of d, with a root of H."""
     chosen = np.arange(len(normal)) if free is None else np.asarray(free, dtype=np.int64)
     part, scale = _scaled(normal, chosen)
-    try:
-        root = np.asarray(np.linalg.cholesky(part).T)
-    except np.linalg.LinAlgError:
-        root = np.zeros((1, 1))
-    if len(root) != len(part) or root.diagonal().min(initial=1.0) < _SAFE:
+    root = _root(part)
+    if root is None:
         # A hair for what the readings do not tell apart.
         squares, axes = np.linalg.eigh(part)
         root = np.sqrt(np.maximum(squares, _HAIR))[:, None] * axes.T
     return Linear(root, scale, np.zeros(0), chosen).pulled(gradient)
+
+
+def _root(matrix: FloatArray) -> FloatArray | None:
+    """The upper triangular root of a matrix whose columns are told apart; None of another."""
+    with suppress(np.linalg.LinAlgError):
+        root = np.asarray(np.linalg.cholesky(matrix).T)
+        return root if root.diagonal().min(initial=1.0) >= _SAFE else None
+    return None
 
 
 def bounded_step(
@@ -252,28 +257,109 @@ def bounded_least_squares(
     floor, ceiling
         Shape (n,); infinite for no bound.
     """
-    x = np.clip(np.zeros(len(floor)), floor, ceiling)
-    held = np.zeros(len(floor), dtype=bool)
-    for _ in range(10 * len(floor) + 10):
-        goal = x.copy()
-        rest = right - matrix[:, held] @ x[held]
-        goal[~held] = np.linalg.lstsq(matrix[:, ~held], rest, rcond=1e-11)[0]
-        within = np.clip(goal, floor, ceiling)
-        out = within != goal
-        if out.any():
-            share = np.full(len(x), np.inf)
-            np.divide(within - x, goal - x, out=share, where=out)
-            met = int(np.argmin(share))
-            x = np.clip(x + max(float(share[met]), 0.0) * (goal - x), floor, ceiling)
-            x[met], held[met] = within[met], True
-            continue
-        x, pull = goal, matrix.T @ (right - matrix @ goal)
-        inwards = np.where(x <= floor, pull, -pull) * held
-        released = int(np.argmax(inwards))
-        if inwards[released] <= _SLACK * (1.0 + float(np.abs(right).max())):
-            break
-        held[released] = False
+    rows, size = matrix.shape
+    x, work = np.clip(np.zeros(size), floor, ceiling), np.empty((size + 4, rows + size))
+    _active_set(np.ascontiguousarray(matrix.T), right, floor, ceiling, work, x)
     return x
+
+
+@kernel()
+def _active_set(
+    columns: Matrix,
+    right: FloatArray,
+    floor: FloatArray,
+    ceiling: FloatArray,
+    work: Matrix,
+    x: FloatArray,
+) -> None:
+    """Move x to where `bounded_least_squares` has it; `work` has shape (n + 4, m + n)."""
+    size, rows = columns.shape[0], columns.shape[1]
+    rest, goal, held, largest = work[size], work[size + 1], work[size + 2], 0.0
+    for i in range(rows):
+        largest = max(largest, abs(right[i]))
+    for p in range(size):
+        held[p] = 0.0
+    for _ in range(10 * size + 10):
+        _free_optimum(columns, right, x, held, work)
+        share, met = np.inf, -1
+        for p in range(size):
+            within = min(max(goal[p], floor[p]), ceiling[p])
+            if within != goal[p]:
+                part = (within - x[p]) / (goal[p] - x[p])
+                if part < share:
+                    share, met = part, p
+        for p in range(size):
+            step = goal[p] - x[p]
+            step *= 1.0 if met < 0 else max(share, 0.0)
+            x[p] = min(max(x[p] + step, floor[p]), ceiling[p])
+        if met >= 0:
+            x[met], held[met] = min(max(goal[met], floor[met]), ceiling[met]), 1.0
+            continue
+        most, released = _SLACK * (1.0 + largest), -1
+        for i in range(rows):
+            rest[i] = right[i]
+            for p in range(size):
+                rest[i] -= columns[p, i] * x[p]
+        for p in range(size):
+            pull = 0.0
+            for i in range(rows):
+                pull += columns[p, i] * rest[i]
+            pull = pull if x[p] <= floor[p] else -pull
+            if held[p] != 0.0 and pull > most:
+                most, released = pull, p
+        if released < 0:
+            return
+        held[released] = 0.0
+
+
+@kernel()
+def _free_optimum(
+    columns: Matrix, right: FloatArray, x: FloatArray, held: FloatArray, work: Matrix
+) -> None:
+    """Fill the row of `work` behind the next with the best x, some of it held, by reflections.
+
+    A row of its own for each value, as long as what is not seen of it, keeps that at zero.
+    """
+    size, rows = columns.shape[0], columns.shape[1]
+    rest, goal, diagonal = work[size], work[size + 1], work[size + 3]
+    for i in range(rows + size):
+        rest[i] = right[i] if i < rows else 0.0
+    for p in range(size):
+        square = 0.0
+        for i in range(rows):
+            work[p, i], square = columns[p, i], square + columns[p, i] * columns[p, i]
+            rest[i] -= columns[p, i] * x[p] if held[p] != 0.0 else 0.0
+        for i in range(size):
+            own = _PRECISE * math.sqrt(square) if square > 0.0 else 1.0
+            work[p, rows + i] = own if i == p else 0.0
+    used = 0
+    for p in range(size):
+        if held[p] != 0.0:
+            continue
+        square = 0.0
+        for i in range(used, rows + size):
+            square += work[p, i] * work[p, i]
+        diagonal[p] = -math.copysign(math.sqrt(square), work[p, used])
+        work[p, used] -= diagonal[p]
+        half = -diagonal[p] * work[p, used]
+        for q in range(p + 1, size + 1):
+            if q < size and held[q] != 0.0:
+                continue
+            along = 0.0
+            for i in range(used, rows + size):
+                along += work[p, i] * work[q, i]
+            for i in range(used, rows + size):
+                work[q, i] -= along / half * work[p, i]
+        used += 1
+    for p in range(size - 1, -1, -1):
+        if held[p] != 0.0:
+            goal[p] = x[p]
+            continue
+        used -= 1
+        goal[p] = rest[used]
+        for q in range(p + 1, size):
+            goal[p] -= work[q, used] * goal[q] if held[q] == 0.0 else 0.0
+        goal[p] /= diagonal[p]
 
 
 @dataclass(frozen=True)
@@ -690,7 +776,8 @@ def covariance(
     if not np.isfinite(scaled).all():
         # A search that got to where nothing moves has no errors, and does not count as settled.
         return np.full_like(normal, np.nan)
-    result, own = np.zeros_like(normal), np.linalg.pinv(scaled, rcond=1e-14, hermitian=True)
+    result, clear = np.zeros_like(normal), _root(scaled) is not None
+    own = np.linalg.inv(scaled) if clear else np.linalg.pinv(scaled, rcond=1e-14, hermitian=True)
     result[np.ix_(free, free)] = own / scale[:, None] / scale
     return result if beyond is None else result + result @ beyond @ result
 

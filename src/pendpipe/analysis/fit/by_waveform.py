@@ -109,10 +109,7 @@ class Waveform(Eq8Model):
         """Readings less model, shape (n,)."""
         last = self._residuals
         if not (last and np.array_equal(last[0][0], value)):
-            # A rate takes the derivatives, which fill the memory.
-            pieces = self._pieces(value) if self.seen == "rate" else [(..., self.evaluate(value))]
-            found = np.concatenate([each.reading for _, each in pieces])
-            last[:] = [(value.copy(), self.values - found)]
+            self.quadratic(value)
         return last[0][1]
 
     def _pieces(self, value: FloatArray) -> Iterator[tuple[slice, Followed]]:
@@ -134,12 +131,14 @@ class Waveform(Eq8Model):
 
     def at(self, value: FloatArray) -> Summed | None:
         """chi^2 at some values; None where nothing moves, or it is overdamped."""
+        # Nearly every step is taken, and the next one needs the derivatives there.
         try:
-            chi2 = self.deviance(self.residual(value)) if self._has_motion(value) else math.inf
+            there = self.quadratic(value) if self._has_motion(value) else None
         except ValueError:
             return None
-        count, chi2 = len(self.values), chi2 + float(np.sum(SHARES.residual(value) ** 2))
-        return Summed(value, chi2, self.quadratic, count) if math.isfinite(chi2) else None
+        if there is None or not math.isfinite(there.chi2):
+            return None
+        return Summed(value, there.chi2, lambda _: there, len(self.values))
 
     def deviance(self, residual: FloatArray) -> float:
         """Return -2 ln likelihood of some residuals."""
@@ -151,6 +150,7 @@ class Waveform(Eq8Model):
     def quadratic(self, value: FloatArray) -> Quadratic:
         """chi^2, gradient and normal matrix, summed over pieces of the record."""
         chi2, slope, normal = 0.0, np.zeros(len(value)), np.zeros((len(value), len(value)))
+        left = []
         for piece, there in self._pieces(value):
             reading, jacobian = there.by_engine
             residual = self.values[piece] - reading
@@ -160,9 +160,11 @@ class Waveform(Eq8Model):
                 score, weights = np.empty_like(residual), np.empty_like(residual)
                 part = rounded(residual, 0.5 * self.step, self.noise_rms, score, weights)
                 weighted = jacobian * weights[:, None]
+            left.append(residual)
             chi2 += part
             slope += jacobian.T @ score
             normal += jacobian.T @ weighted
+        self._residuals[:] = [(value.copy(), np.concatenate(left))]
         unit = self.noise_rms**-2 if self.step == 0.0 else 1.0
         chi2, slope, normal = unit * chi2, unit * slope, unit * normal
         prior, row = SHARES.residual(value), SHARES.rows(len(value))

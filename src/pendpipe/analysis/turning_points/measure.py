@@ -419,68 +419,77 @@ def measure(
         known = np.maximum(smoothed(amplitude), 1e-12)
         held = (samples.noise_rms / (known * (_PHASE_PRIOR + places.unsteady_phase))) ** 2
         prior = np.where(one_sided, held, 0.0)
-    solution, inverse = _solved(gram, right, prior)
-    flat = gram[:, 1:, 0]
-    best = solution[:, :, 0]
-    return Measured(
-        amplitude=best[:, 0] * places.side,
-        sine=best[:, 1] * places.side,
-        variance=inverse[:, 0, 0],
-        sine_variance=inverse[:, 1, 1],
-        coupling=solution[:, 0, 1],
-        harmonics=best[:, 2:] * places.side[:, None],
-        peak=_peak(best, inverse, solution[:, :, 1], places.side),
-        information=gram[:, 0, 0] - np.sum(flat * solution[:, :, 1], axis=1),
-        score=right[:, 0] - np.sum(flat * best, axis=1),
-        residual_square=square - np.sum(best * right[:, 1:], axis=1),
-        readings=gram[:, 0, 0],
-        coverage=gram[:, 1, 1],
-        one_sided=one_sided,
-        single=np.zeros(number, dtype=bool),
-    )
+    harmonics, found = np.empty((number, free)), np.empty((13, number))
+    system = np.empty((number, terms - 1, terms - 1))
+    _solve(gram, right, square, prior, places.side, system, harmonics, found)
+    single = np.zeros(number, dtype=bool)
+    peak, rest = found[5:8].T, (*found[8:], one_sided, single)
+    return Measured._make((*found[:5], harmonics, peak, *rest))
 
 
-def _solved(
-    gram: FloatArray, right: FloatArray, prior: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+@kernel()
+def _solve(
+    gram: Stack,
+    right: Matrix,
+    square: FloatArray,
+    prior: FloatArray,
+    side: FloatArray,
+    system: Stack,
+    harmonics: Matrix,
+    found: Matrix,
+) -> None:
     """Solve each half cycle for amplitude, sine and harmonics at a given level.
 
     Parameters
     ----------
-    gram, right
+    gram, right, square
         From `half_cycle_sums`; row 0 is the level.
     prior
         Added to the sine's diagonal (an inverse variance about zero, over the noise's).
-
-    Returns
-    -------
-    solution
-        Shape (k, size, 2): for a level that is right, and minus the change per unit of level; NaN
-        for half cycles without readings.
-    inverse
-        Of the Gram matrix without the level, (k, size, size).
+    side
+        Of each half cycle.
+    system
+        Room for the Gram matrices without the level, (k, size, size).
+    harmonics, found
+        To be filled: what `Measured` holds of each, the peak in three rows; NaN for half cycles
+        without readings.
     """
-    one = np.eye(right.shape[1] - 1)
-    # A hair of regularisation: few samples can't tell harmonics apart.
-    system = gram[:, 1:, 1:] * (1.0 + 1e-9 * one)
-    system[:, 1, 1] += prior + 1e-12
-    empty = gram[:, 0, 0] == 0.0
-    system[empty] = one
-    inverse = np.ascontiguousarray(system)
-    invert(inverse)
-    inverse[empty] = np.nan
-    told = np.stack([right[:, 1:], gram[:, 1:, 0]], axis=2)
-    return np.asarray(inverse @ told), inverse
-
-
-def _peak(
-    best: FloatArray, inverse: FloatArray, by_level: FloatArray, side: FloatArray
-) -> FloatArray:
-    """Value at the turning point: the amplitude and the free harmonics add up there."""
-    even = np.ones(best.shape[1])
-    even[1] = 0.0
-    variance = np.einsum("kpq,p,q->k", inverse, even, even)
-    return np.stack([best @ even * side, variance, by_level @ even], axis=1)
+    size = system.shape[1]
+    for k in range(side.size):
+        for p in range(size):
+            for q in range(size):
+                system[k, p, q] = gram[k, p + 1, q + 1]
+            # A hair of regularisation: few samples can't tell harmonics apart.
+            system[k, p, p] *= 1.0 + 1e-9
+        system[k, 1, 1] += prior[k] + 1e-12
+    invert(system)
+    for k in range(side.size):
+        inverse, row = system[k], found[:, k]
+        peak, variance, by_level = 0.0, 0.0, 0.0
+        row[8], row[9], row[10] = gram[k, 0, 0], right[k, 0], square[k]
+        row[11], row[12] = gram[k, 0, 0], gram[k, 1, 1]
+        for p in range(size):
+            # For a level that is right, and minus the change per unit of level.
+            best, change = 0.0, 0.0
+            for q in range(size):
+                best += inverse[p, q] * right[k, q + 1]
+                change += inverse[p, q] * gram[k, q + 1, 0]
+                variance += inverse[p, q] if p != 1 and q != 1 else 0.0
+            if gram[k, 0, 0] == 0.0:
+                best = change = np.nan
+            row[8] -= gram[k, p + 1, 0] * change
+            row[9] -= gram[k, p + 1, 0] * best
+            row[10] -= right[k, p + 1] * best
+            if p < 2:
+                row[p], row[p + 2] = best * side[k], inverse[p, p]
+            else:
+                harmonics[k, p - 2] = best * side[k]
+            if p == 0:
+                row[4] = change
+            # Amplitude and free harmonics add up at the turning point.
+            peak += best * side[k] if p != 1 else 0.0
+            by_level += change if p != 1 else 0.0
+        row[5], row[6], row[7] = peak, variance, by_level
 
 
 _BEGINNING: Final = 2048
