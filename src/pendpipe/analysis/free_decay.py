@@ -8,6 +8,8 @@ repositioning, and every decay but the most telling one.
 A decay is a run of half cycles that follow one another.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,12 +26,14 @@ from pendpipe.analysis.half_cycles import (
     HalfCycles,
     half_cycles,
     least_swing,
+    running_median,
     usual_half_period,
 )
 from pendpipe.analysis.noise import noise_rms
 from pendpipe.analysis.turning_points.find import find_turning_points
 from pendpipe.analysis.turning_points.table import Cut, TurningPoints
 from pendpipe.arrays import BoolArray, FloatArray, IntArray, median
+from pendpipe.dynamics.kernel import Matrix, kernel
 from pendpipe.errors import NotAnalysableError, refuse_if
 from pendpipe.quantities import after_number, with_error
 from pendpipe.recording import Recording
@@ -137,7 +141,7 @@ def best_runs(
     # No half cycle follows in a front that is held up, or cut off by the sensor: where chains have
     # one they are aligned again without it.
     while len(fronts) > asked:
-        asked, chains = len(fronts), _chains(cycles, piece, half.tolist(), follows.tolist())
+        asked, chains = len(fronts), _chains(cycles, piece, half, follows)
         for one in (one for _, one in chains if one[0] not in fronts):
             whole = slice(one[0], one[-1] + 1)
             held = _held(cycles.swing[whole], cycles.step)
@@ -159,45 +163,24 @@ def _usual(cycles: HalfCycles, gap: BoolArray) -> FloatArray:
     """
     half = np.diff(cycles.middle_s)
     parts = np.split(np.where(gap, np.nan, half), np.flatnonzero(gap) + 1)
-    known = np.concatenate([_running_median(part) for part in parts if len(part)])
+    known = np.concatenate([running_median(part, 2) for part in parts if len(part)])
     return np.where(np.isnan(known), median(half), known)
 
 
 def _chains(
-    cycles: HalfCycles, piece: IntArray, usual: Sequence[float], follows: Sequence[float]
+    cycles: HalfCycles, piece: IntArray, usual: FloatArray, follows: FloatArray
 ) -> list[tuple[float, list[int]]]:
     """Align half cycles to chains, each of one free motion: a chain ends where its score is most.
 
     (Smith and Waterman's alignment of pieces.) A half cycle goes on from the one before at a score
     of up to 1, or over disturbed ones, or a gap to the next `piece` of the record, at a price.
     """
-    swing, step = cycles.swing.tolist(), cycles.step
-    score, before = [0.0] * len(swing), [-1] * len(swing)
-    # Of the chain up to each: its first and its least swing, and the largest of the last three.
-    first, floor, top = swing[:], swing[:], swing[:]
-    for here in range(1, len(swing)):
-        size, at = swing[here], here - 1
-        links = [(score[at] + follows[at], at)]
-        if follows[at] < 0.0 or size > _RISE * floor[at] + _TAIL * first[at] + step:
-            links = [
-                (
-                    score[at]
-                    + _over(cycles, at, here, top[at], usual, gap=piece[at] < piece[here]),
-                    at,
-                )
-                for at in range(max(0, here - _NEAR), here)
-            ]
-        # What is smaller than the next, and begins the motion, is a pull.
-        pulled = 0.93 * size - 0.5 * step
-        links = [link for link in links if before[link[1]] >= 0 or swing[link[1]] >= pulled]
-        most, at = max(links, default=(0.0, 0))
-        if most > 0.0:
-            three = sorted((size, swing[at], swing[before[at]] if before[at] >= 0 else size))
-            score[here], before[here], first[here], top[here] = most, at, first[at], three[-1]
-            # Of the least a wild one is none.
-            floor[here] = min(floor[at], three[1])
-    chains, free = list[tuple[float, list[int]]](), [True] * len(swing)
-    for last in sorted(range(len(swing)), key=score.__getitem__, reverse=True):
+    size = len(cycles)
+    numbers, places = np.zeros((4, size)), np.full(size, -1)
+    _link(cycles.swing, cycles.middle_s, piece, usual, follows, cycles.step, numbers, places)
+    score, before = numbers[0].tolist(), places.tolist()
+    chains, free = list[tuple[float, list[int]]](), [True] * size
+    for last in sorted(range(size), key=score.__getitem__, reverse=True):
         chain, at = [last], before[last]
         while at >= 0 and free[last]:
             chain.append(at)
@@ -232,8 +215,62 @@ def _follows(cycles: HalfCycles, usual: FloatArray) -> FloatArray:
     return np.asarray(1.0 - worst)
 
 
+@kernel()
+def _link(
+    swing: FloatArray,
+    middle_s: FloatArray,
+    piece: IntArray,
+    usual: FloatArray,
+    follows: FloatArray,
+    step: float,
+    numbers: Matrix,
+    before: IntArray,
+) -> None:
+    """Fill in which half cycle goes on `before` each, or -1, with the chain's score up to it.
+
+    Behind it in `numbers`: the first and the least swing, and the largest of the last three.
+    """
+    score, first, floor, top = numbers[0], numbers[1], numbers[2], numbers[3]
+    for here in range(swing.size):
+        first[here] = floor[here] = top[here] = size = swing[here]
+        last, most = here - 1, 0.0
+        if here == 0:
+            continue
+        disturbed = size > _RISE * floor[last] + _TAIL * first[last] + step
+        disturbed = disturbed or follows[last] < 0.0
+        # What is smaller than the next, and begins the motion, is a pull.
+        pulled = 0.93 * size - 0.5 * step
+        for at in range(max(0, here - _NEAR) if disturbed else last, here):
+            if before[at] < 0 and swing[at] < pulled:
+                continue
+            link = score[at]
+            if disturbed:
+                gap = piece[at] < piece[here]
+                link += _over(swing, middle_s, at, here, top[at], usual, step, gap)
+            else:
+                link += follows[at]
+            if link > 0.0 and link >= most:
+                most, before[here] = link, at
+        at = before[here]
+        if at >= 0:
+            third = swing[before[at]] if before[at] >= 0 else size
+            score[here], first[here] = most, first[at]
+            top[here] = max(size, swing[at], third)
+            # Of the least a wild one is none.
+            middle = max(min(size, swing[at]), min(max(size, swing[at]), third))
+            floor[here] = min(floor[at], middle)
+
+
+@kernel()
 def _over(
-    cycles: HalfCycles, at: int, here: int, top: float, usual: Sequence[float], *, gap: bool
+    swing: FloatArray,
+    middle_s: FloatArray,
+    at: int,
+    here: int,
+    top: float,
+    usual: FloatArray,
+    step: float,
+    gap: bool,
 ) -> float:
     """Score whether a motion goes on over a disturbance (a tracking error, lost samples), or a gap.
 
@@ -242,32 +279,26 @@ def _over(
     periods before and behind it say the same whole number, and the side that of that number. So
     must their loss.
     """
-    size, pause = float(cycles.swing[here]), float(cycles.middle_s[here] - cycles.middle_s[at])
+    size, pause = swing[here], middle_s[here] - middle_s[at]
     # Half periods of the five half cycles before, and behind.
-    behind, ahead = usual[max(at - 3, 0)], usual[min(here + 2, len(usual) - 1)]
+    behind, ahead = usual[max(at - 3, 0)], usual[min(here + 2, usual.size - 1)]
     off = math.log(size / top) / math.log(1.15 if size > top else 2.0)
     short, alike = pause < _COUNTLESS * behind, abs(ahead / behind - 1.0) < _PERIOD
-    if not (gap or short) or not alike or size < 3.0 * cycles.step:
-        return -math.inf
+    if not (gap or short) or not alike or size < 3.0 * step:
+        return -np.inf
     if short:
-        return 1.0 - off**2 - _PRICE if abs(off) < 1.0 else -math.inf
-    before, after = cycles.swing[max(at - _BLOCKS, 0) : at + 1], cycles.swing[here : here + _BLOCKS]
-    counts = pause / behind, pause / ahead
-    number = round(0.5 * sum(counts))
-    losses = [-float(np.mean(np.diff(part))) for part in (before, after) if len(part) > 1]
-    few, many = 0.5 * number * min(losses, default=0.0), 2.0 * number * max(losses, default=0.0)
-    agree = max(abs(count - number) for count in counts) < _COUNTED
-    falls = few - cycles.step < top - size < many + cycles.step
-    return 1.0 - _PRICE if agree and falls and (here - at - number) % 2 == 0 else -math.inf
-
-
-def _running_median(values: FloatArray) -> FloatArray:
-    """The median of each value and its two neighbours to each side, fewer at the ends."""
-    padded = np.concatenate([np.full(2, np.nan), values, np.full(2, np.nan)])
-    # What is no number is sorted behind the others.
-    windows = np.sort(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
-    rows, count = np.arange(len(values)), 5 - np.count_nonzero(np.isnan(windows), axis=1)
-    return np.asarray(0.5 * (windows[rows, (count - 1) // 2] + windows[rows, count // 2]))
+        return 1.0 - off**2 - _PRICE if abs(off) < 1.0 else -np.inf
+    number, least, largest = round(0.5 * (pause / behind + pause / ahead)), np.inf, -np.inf
+    for one, other in ((max(at - _BLOCKS, 0), at), (here, min(here + _BLOCKS, swing.size) - 1)):
+        if other > one:
+            loss = (swing[one] - swing[other]) / (other - one)
+            least, largest = min(least, loss), max(largest, loss)
+    if largest < least:
+        least = largest = 0.0
+    counted = max(abs(pause / behind - number), abs(pause / ahead - number)) < _COUNTED
+    falls = 0.5 * number * least - step < top - size < 2.0 * number * largest + step
+    agree = counted and falls and (here - at - number) % 2 == 0
+    return 1.0 - _PRICE if agree else -np.inf
 
 
 def _wavering(cycles: HalfCycles, first: int, last: int) -> float:
@@ -306,8 +337,8 @@ def _held(swing: FloatArray, step: float) -> int:
     k = np.arange(4, count - 4)
     ahead = np.minimum(np.maximum(4, k // 2), count - 1 - k)
     # Medians of seven: a disturbed half cycle inside the run is no drive.
-    padded = np.pad(swing, 3, mode="reflect", reflect_type="odd")
-    smooth = median(np.lib.stride_tricks.sliding_window_view(padded, 7))
+    ends = 2.0 * swing[0] - swing[3:0:-1], swing, 2.0 * swing[-1] - swing[-2:-5:-1]
+    smooth = running_median(np.concatenate(ends), 3)[3:-3]
     falls = smooth[k] - smooth[k + ahead]
     expected = k * falls / ahead
     lost = smooth[0] - smooth[k]
@@ -628,7 +659,7 @@ def _beating(
     if len(block) < _MANY:
         return None
     first, last = int(block[0]), int(block[-1]) + 1
-    smooth = median(np.lib.stride_tricks.sliding_window_view(cycles.swing[first:last], 5))
+    smooth = running_median(cycles.swing[first:last], 2)[2:-2]
     rises = np.max(smooth - np.minimum.accumulate(smooth)) > 0.2 * np.max(smooth)
     if not (rises or held):
         return None

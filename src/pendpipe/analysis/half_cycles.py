@@ -140,10 +140,38 @@ def without_ripples(values: FloatArray, turns: IntArray) -> IntArray:
     return np.array(kept, dtype=np.int64)
 
 
+def running_median(values: FloatArray, reach: int) -> FloatArray:
+    """The median of each value and of so many to each side, fewer at the ends; NaN do not count."""
+    found = np.empty(len(values))
+    _running_median(np.ascontiguousarray(values), reach, np.empty(2 * reach + 1), found)
+    return found
+
+
+@kernel()
+def _running_median(values: FloatArray, reach: int, window: FloatArray, found: FloatArray) -> None:
+    """Fill `found`; in `window` the values about each are put in order."""
+    for i in range(values.size):
+        count = 0
+        for j in range(max(i - reach, 0), min(i + reach + 1, values.size)):
+            place = count
+            while place > 0 and window[place - 1] > values[j]:
+                window[place] = window[place - 1]
+                place -= 1
+            window[place] = values[j]
+            count += 0 if math.isnan(values[j]) else 1
+        low, high = window[max(count - 1, 0) // 2], window[count // 2 if count else 0]
+        found[i] = 0.5 * (low + high)
+
+
 def _range(values: FloatArray) -> float:
     """Tell the range of most readings: of all, a wild one would hide every swing."""
     some = values[:: max(1, len(values) // _SOME)]
-    return float(np.ptp(np.percentile(some, (0.5, 99.5))))
+    aside, rest = divmod(0.005 * (len(some) - 1), 1.0)
+    low, high = int(aside), len(some) - 1 - int(aside)
+    beside = min(low + 1, high), max(high - 1, low)
+    order = np.partition(some, (low, high, *beside))
+    lower, upper = order[[low, high]] + rest * (order[list(beside)] - order[[low, high]])
+    return float(upper - lower)
 
 
 def usual_half_period(time_s: FloatArray, values: FloatArray) -> float | None:

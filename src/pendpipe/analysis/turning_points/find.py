@@ -19,6 +19,7 @@ from pendpipe.analysis.half_cycles import (
     LEAST_HALF_CYCLES,
     half_cycles,
     least_swing,
+    running_median,
     usual_half_period,
 )
 from pendpipe.analysis.noise import TOLD, scatter, undithered_rms
@@ -698,8 +699,7 @@ def _usual(coverage: FloatArray) -> FloatArray:
     if len(coverage) < 2 * _NEAR + 2 or np.max(np.abs(coverage[1:-1] - middle)) < 0.3 * middle:
         return np.full(len(coverage), middle)
     padded = np.pad(coverage, _NEAR, mode="reflect")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _NEAR + 1)
-    return np.asarray(median(windows))
+    return running_median(padded, _NEAR)[_NEAR:-_NEAR]
 
 
 def _notes(samples: Samples, keep: BoolArray, level: Level) -> tuple[str, ...]:
