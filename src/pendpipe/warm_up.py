@@ -17,13 +17,13 @@ from pendpipe.dynamics.kernel import SHIPPED, Kernel, shipped
 def kernels() -> list[Kernel]:
     """Return the kernels that Python calls."""
     from pendpipe import solve
-    from pendpipe.analysis import demodulation, free_decay, half_cycles
+    from pendpipe.analysis import demodulation, free_decay, half_cycles, noise
     from pendpipe.analysis.fit import rounding
     from pendpipe.analysis.turning_points import find, long_records, measure
     from pendpipe.dynamics import any_law, eq8, march
     from pendpipe.effects import two_planes
 
-    fits = (half_cycles, free_decay, find, measure, long_records, demodulation, rounding)
+    fits = (noise, half_cycles, free_decay, find, measure, long_records, demodulation, rounding)
     modules = (march, eq8, any_law, *fits, two_planes, solve)
     own = [each for module in modules for each in vars(module).values() if isinstance(each, Kernel)]
     called = {id(part) for each in own for part in each.parts()[1:]}

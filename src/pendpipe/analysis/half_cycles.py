@@ -262,21 +262,6 @@ def _without_wild(values: FloatArray, turn: float) -> FloatArray:
     return np.where(np.abs(values - middle) > allowed, middle, values)
 
 
-def _crests(values: FloatArray, turns: IntArray) -> FloatArray:
-    """Values at the turning points, from the parabola through three samples about each.
-
-    With 16 samples a cycle the largest sample lies up to 2 % below the turning point, and
-    now more, now less: as if the amplitude were held up.
-    """
-    at = np.clip(turns, 1, len(values) - 2)
-    before, after = values[at - 1] - values[at], values[at + 1] - values[at]
-    bend = before + after
-    rise = -((after - before) ** 2) / (8.0 * np.where(bend != 0.0, bend, np.inf))
-    # No farther than the parabola of a turning point between even samples can go.
-    limit = np.where(at == turns, 0.125 * np.abs(bend), 0.0)
-    return values[turns] + np.clip(rise, -limit, limit)
-
-
 def half_cycles(
     time_s: FloatArray, values: FloatArray, least: float, half_period_s: float
 ) -> HalfCycles:
@@ -288,35 +273,47 @@ def half_cycles(
     # The last one found is where the record happens to end, or any point of the final rest.
     ending = float(np.abs(np.diff(smooth[turns[-2:]])).sum())
     turns = turns[:-1]
-    extremes = _crests(smooth, turns)
+    extremes, middle_s = np.empty(len(turns)), np.empty(max(len(turns) - 1, 0))
+    _read_off(np.ascontiguousarray(time), smooth, turns, extremes, middle_s)
     return HalfCycles(
         turn_time_s=time[turns],
         turn=extremes,
         swing=np.abs(np.diff(extremes)),
-        middle_s=_passages(time, smooth, turns),
+        middle_s=middle_s,
         step=least,
         ending=ending,
     )
 
 
-def _passages(time: FloatArray, values: FloatArray, turns: IntArray) -> FloatArray:
-    """Find when each swing passes the middle between its ends, for the last time."""
-    if len(turns) < 2:
-        return np.empty(0)
-    start, stop = turns[:-1], turns[1:]
-    middle = 0.5 * (values[start] + values[stop])
-    swing = np.repeat(np.arange(len(middle)), stop - start)
-    inside = slice(turns[0], turns[-1] + 1)
-    reading = values[inside]
-    above = reading[:-1] > middle[swing]
-    passed = np.flatnonzero(above != (reading[1:] > middle[swing]))
-    # Noise alone ends where it began, and passes nothing.
-    found = 0.5 * (time[start] + time[stop])
-    # Of several the last is written last.
-    at, swing = passed + turns[0], swing[passed]
-    share = (middle[swing] - values[at]) / (values[at + 1] - values[at])
-    found[swing] = time[at] + share * (time[at + 1] - time[at])
-    return found
+@kernel()
+def _read_off(
+    time: FloatArray, values: FloatArray, turns: IntArray, crest: FloatArray, middle_s: FloatArray
+) -> None:
+    """Fill in values at the turning points, and when each swing passes its middle the last time.
+
+    The values are from the parabola through three samples about each: with 16 samples a cycle the
+    largest sample lies up to 2 % below the turning point, and now more, now less, as if the
+    amplitude were held up.
+    """
+    for k in range(turns.size):
+        at = min(max(turns[k], 1), values.size - 2)
+        before, after = values[at - 1] - values[at], values[at + 1] - values[at]
+        bend = before + after
+        crest[k] = values[turns[k]]
+        # No farther than the parabola of a turning point between even samples can go.
+        if at == turns[k] and bend != 0.0:
+            limit = 0.125 * abs(bend)
+            rise = -((after - before) ** 2) / (8.0 * bend)
+            crest[k] += min(max(rise, -limit), limit)
+    for k in range(middle_s.size):
+        start, stop = turns[k], turns[k + 1]
+        middle = 0.5 * (values[start] + values[stop])
+        # Noise alone ends where it began, and passes nothing.
+        middle_s[k] = 0.5 * (time[start] + time[stop])
+        for i in range(start, stop):
+            if (values[i] > middle) != (values[i + 1] > middle):
+                share = (middle - values[i]) / (values[i + 1] - values[i])
+                middle_s[k] = time[i] + share * (time[i + 1] - time[i])
 
 
 _LARGER: Final = 0.1

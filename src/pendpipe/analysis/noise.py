@@ -1,11 +1,14 @@
 """The noise of a recording, from what no slow motion can touch."""
 
+from __future__ import annotations
+
 import math
 from typing import Final
 
 import numpy as np
 
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, IntArray
+from pendpipe.dynamics.kernel import kernel
 
 _ORDER: Final = 4
 """Differences that a smooth motion does not survive: (2 sin(pi/20))^4, 1 %, is left of a swing of
@@ -95,11 +98,10 @@ def noise_rms(values: FloatArray, step: float | None = None, *, quieter: float =
     length = min(length, len(values))
     number = min(_BLOCKS, len(values) // length)
     starts = (len(values) - length) * np.arange(number) // max(number - 1, 1)
-    blocks = values[starts[:, None] + np.arange(length)]
-    fourth = _fourth_differences(blocks)
-    squares = np.sort(np.einsum("kn,kn->k", fourth, fourth)) / fourth.shape[1]
-    square = np.interp(quieter * (number - 1), np.arange(number), squares)
-    return scatter(float(square), _GAIN, step)
+    squares = np.sort(_fourth_differences(values, starts, length)).tolist()
+    place, share = divmod(quieter * (number - 1), 1.0)
+    low, high = squares[int(place)], squares[min(int(place) + 1, number - 1)]
+    return scatter(low + share * (high - low), _GAIN, step)
 
 
 def white_rms(residual: FloatArray) -> float:
@@ -109,15 +111,27 @@ def white_rms(residual: FloatArray) -> float:
     """
     if len(residual) < 2 * _ORDER:
         return scatter(float(residual @ residual), len(residual))
-    fourth = _fourth_differences(residual)
-    return scatter(float(fourth @ fourth), len(fourth) * _GAIN)
+    square = _fourth_differences(residual, np.zeros(1, dtype=np.int64), len(residual))
+    return scatter(float(square[0]), _GAIN)
 
 
-def _fourth_differences(values: FloatArray) -> FloatArray:
-    """Differences of the differences, four times, along the last axis."""
-    # One pass over the numbers; what runs over the end of a row is left out.
-    weighted = np.convolve(values.ravel(), (1.0, -4.0, 6.0, -4.0, 1.0))[_ORDER:]
-    return np.asarray(weighted.reshape(values.shape)[..., :-_ORDER])
+def _fourth_differences(values: FloatArray, starts: IntArray, length: int) -> FloatArray:
+    """Mean square of the differences, four times, in blocks of a length; shape (blocks,)."""
+    squares = np.empty(len(starts))
+    _mean_squares(np.ascontiguousarray(values, dtype=np.float64), starts, length, squares)
+    return squares
+
+
+@kernel(any_order=True)
+def _mean_squares(values: FloatArray, starts: IntArray, length: int, squares: FloatArray) -> None:
+    """Fill in what `_fourth_differences` returns."""
+    for k in range(starts.size):
+        total, block = 0.0, values[starts[k] : starts[k] + length]
+        for i in range(length - 4):
+            outer, inner = block[i] + block[i + 4], block[i + 1] + block[i + 3]
+            fourth = outer - 4.0 * inner + 6.0 * block[i + 2]
+            total += fourth * fourth
+        squares[k] = total / (length - 4)
 
 
 def undithered_rms(amplitude: FloatArray, step: float | None, noise: float) -> FloatArray:

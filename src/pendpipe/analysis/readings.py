@@ -303,10 +303,10 @@ def find_step(values: FloatArray) -> float | None:
         return None
     smallest = float(jumps[min(2, len(jumps) - 1)])
     near = float(jumps[jumps <= 1.35 * smallest].mean())
-    step = _refined(jumps, near) or _refined(jumps, smallest)
+    if not (step := _refined(jumps, near) or _refined(jumps, smallest)):
+        return None
     sizes = np.unique(np.abs(finite))
-    large = sizes[3 * len(sizes) // 4 :]
-    tenths = large / (10.0 * step) if step else np.empty(0)
+    tenths = sizes[3 * len(sizes) // 4 :] / (10.0 * step)
     # All large ones multiples of ten steps: numbers of fixed digits.
     return None if len(tenths) > 8 and np.all(np.abs(tenths - np.rint(tenths)) < 0.02) else step
 

@@ -70,14 +70,20 @@ def unit_shown(
     return fitting[0] if len(fitting) == 1 else None
 
 
+_APART: Final = 1e-8
+"""Relative, of two means whose next ones differ by its square over eight."""
+
+
 def elliptic(m: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Complete elliptic integrals K and E of the parameter m = k^2 < 1, by Gauss's means."""
     a, b = np.ones_like(m), np.sqrt(1.0 - m)
-    total = 0.5 * m
-    # Each step doubles the digits: of m = 1/2 the means differ by 1e-21 after the fifth.
-    for step in range(5 if np.max(m, initial=0.0) < 0.5 else 8):
+    total, step, most = 0.5 * m, 0, 1.0
+    least = math.sqrt(1.0 - float(np.max(m, initial=0.0)))
+    # Each step doubles the digits: behind one that began 1e-8 apart the means are one number.
+    while step == 0 or most - least > _APART:
+        most, least = 0.5 * (most + least), math.sqrt(most * least)
         a, b, difference = 0.5 * (a + b), np.sqrt(a * b), 0.5 * (a - b)
-        total = total + 2.0**step * difference**2
+        total, step = total + 2.0**step * difference**2, step + 1
     k = 0.5 * math.pi / a
     return k, k * (1.0 - total)
 
@@ -108,21 +114,28 @@ def sine_share(
     weight
         The reciprocal of each one's standard deviation, up to a common factor.
     """
-    right = lasts * weight
+    columns = np.stack([*others, plain, sine - plain, drift, lasts], axis=1)
+    weighted = np.zeros((max(len(lasts), columns.shape[1]), columns.shape[1]))
+    weighted[: len(lasts)] = columns * np.reshape(weight, (-1, 1))
+    # Of the triangle what others do not explain: models differ by its last columns.
+    triangle = np.asarray(np.linalg.qr(weighted, mode="r"))
+    first, *last = triangle[len(others) :, len(others) :].tolist()
+    (_, by_sine, across, second), (*_, by_drift, third), (*_, rest) = last
+    by_sine, by_drift = (each or math.ulp(first[0]) for each in (by_sine, by_drift))
+    freedom = max(len(lasts) - len(others) - 2, 1)
 
-    def fitted(*columns: FloatArray) -> tuple[float, float, float]:
-        """The second factor over the first, its error, and chi^2."""
-        design = np.stack([*columns, *others], axis=1) * np.reshape(weight, (-1, 1))
-        inverse = np.linalg.pinv(design, rcond=1e-13)
-        values = inverse @ right
-        rest = right - design @ values
-        chi2 = float(rest @ rest)
-        noise = math.sqrt(chi2 / max(len(lasts) - len(values), 1))
-        second = float(values[1] / values[0]) if len(columns) > 1 else 0.0
-        return second, float(noise * np.linalg.norm(inverse[1 % len(inverse)]) / values[0]), chi2
+    def share(sines: float, drifts: float = 0.0) -> tuple[float, float]:
+        """Factor of sin x over that of `plain`, and the latter."""
+        own = (first[3] - first[1] * sines - first[2] * drifts) / first[0]
+        return sines / own, own
 
-    value, error, _ = fitted(plain, sine - plain)
-    drifting, *_ = fitted(plain, sine - plain, drift)
-    (*_, linear), (*_, whole) = fitted(plain), fitted(sine)
+    value, own = share(second / by_sine)
+    error = math.sqrt((third**2 + rest**2) / freedom) / abs(by_sine * own)
+    drifts = third / by_drift
+    drifting, _ = share((second - across * drifts) / by_sine, drifts)
+    linear, left = second**2 + third**2 + rest**2, third**2 + rest**2
+    # The whole of sin x goes with both columns.
+    off = (first[0] + first[1]) * second - by_sine * first[3]
+    whole = off**2 / ((first[0] + first[1]) ** 2 + by_sine**2) + left
     removed = 1.0 - whole / linear if linear > 0.0 else 0.0
     return Coefficient(value, math.hypot(error, drifting - value), removed)

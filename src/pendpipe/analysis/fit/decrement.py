@@ -180,11 +180,12 @@ def seen_loss(points: TurningPoints) -> tuple[float, float, float, float]:
     weight = amplitude / points.angle_sd_rad
     design = np.stack(columns, axis=1) * weight[:, None]
     scale = np.linalg.norm(design, axis=0)
-    inverse = np.linalg.pinv(design / scale, rcond=1e-9)
-    values = inverse @ (weight * np.log(amplitude)) / scale
-    residual = weight * np.log(amplitude) - design @ values
+    design, logs = design / scale, weight * np.log(amplitude)
+    inverse = np.linalg.inv(design.T @ design)
+    sizes = inverse @ (design.T @ logs)
+    values, residual = sizes / scale, logs - design @ sizes
     freedom = len(points) - len(columns)
-    variance, scatter = float(inverse[1] @ inverse[1]) / scale[1] ** 2, 1.0
+    variance, scatter = float(inverse[1, 1]) / scale[1] ** 2, 1.0
     if freedom > 0:
         square = float(residual @ residual)
         scatter = max(1.0, square / freedom * of_neighbours(residual, 0.8))

@@ -421,14 +421,14 @@ def measure(
         prior = np.where(one_sided, held, 0.0)
     harmonics, found = np.empty((number, free)), np.empty((13, number))
     system = np.empty((number, terms - 1, terms - 1))
-    _solve(gram, right, square, prior, places.side, system, harmonics, found)
+    solve_half_cycles(gram, right, square, prior, places.side, system, harmonics, found)
     single = np.zeros(number, dtype=bool)
     peak, rest = found[5:8].T, (*found[8:], one_sided, single)
     return Measured._make((*found[:5], harmonics, peak, *rest))
 
 
 @kernel()
-def _solve(
+def solve_half_cycles(
     gram: Stack,
     right: Matrix,
     square: FloatArray,
@@ -458,7 +458,7 @@ def _solve(
     for k in range(side.size):
         for p in range(size):
             for q in range(size):
-                system[k, p, q] = gram[k, p + 1, q + 1]
+                system[k, p, q] = gram[k, p + 1, q + 1] if gram[k, 0, 0] != 0.0 else np.nan
             # A hair of regularisation: few samples can't tell harmonics apart.
             system[k, p, p] *= 1.0 + 1e-9
         system[k, 1, 1] += prior[k] + 1e-12
@@ -475,8 +475,6 @@ def _solve(
                 best += inverse[p, q] * right[k, q + 1]
                 change += inverse[p, q] * gram[k, q + 1, 0]
                 variance += inverse[p, q] if p != 1 and q != 1 else 0.0
-            if gram[k, 0, 0] == 0.0:
-                best = change = np.nan
             row[8] -= gram[k, p + 1, 0] * change
             row[9] -= gram[k, p + 1, 0] * best
             row[10] -= right[k, p + 1] * best
