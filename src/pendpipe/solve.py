@@ -778,7 +778,7 @@ def covariance(
         return np.full_like(normal, np.nan)
     result, clear = np.zeros_like(normal), _root(scaled) is not None
     own = np.linalg.inv(scaled) if clear else np.linalg.pinv(scaled, rcond=1e-14, hermitian=True)
-    result[np.ix_(free, free)] = own / scale[:, None] / scale
+    result[free[:, None], free] = own / scale[:, None] / scale
     return result if beyond is None else result + result @ beyond @ result
 
 
@@ -794,7 +794,7 @@ def _scaled(normal: FloatArray, free: IntArray) -> tuple[FloatArray, FloatArray]
 
     Parameters differ by many orders of size.
     """
-    part = normal[np.ix_(free, free)]
+    part = normal if len(free) == len(normal) else normal[free[:, None], free]
     scale = np.sqrt(np.maximum(part.diagonal(), _TINY))
     return part / scale[:, None] / scale, scale
 

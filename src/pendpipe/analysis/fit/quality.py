@@ -195,24 +195,20 @@ def without_swings(result: Fit) -> Fit:
 def quality_by_law(result: Fitted, amplitude: float) -> Quality:
     """Evaluate the fitted law at one amplitude."""
     loss, parts = losses_of(result.law, amplitude)
-    losses, total = dict(zip("abc", parts.tolist(), strict=True)), float(parts.sum())
-    period = period_of(result, amplitude)
-    covariance = _covariance_of_losses(result, amplitude)
+    total, period = float(parts.sum()), period_of(result, amplitude)
+    shares = parts / total if total > 0.0 else np.full(3, math.nan)
     value = 1.0 / loss if loss > 0.0 else math.inf
-    shares = {name: each / total if total > 0.0 else math.nan for name, each in losses.items()}
-    by_rate = np.array([amplitude, 1.0, 1.0 / amplitude]) * value
+    # By each of the losses: of the whole, and of each share.
+    weights = np.vstack([np.ones(3), np.eye(3) - shares[:, None]])
+    whole, *sds = _sds(weights, _covariance_of_losses(result, amplitude)).tolist()
+    by_rate = amplitude * value, value, value / amplitude
     return Quality(
         amplitude,
-        Estimate(value, value * _sd(np.ones(3), covariance), "s"),
+        Estimate(value, value * whole, "s"),
         period,
         {
-            name: _share(
-                share,
-                _sd(np.eye(3)[index] - share, covariance),
-                result.parameters[name],
-                by_rate[index],
-            )
-            for index, (name, share) in enumerate(shares.items())
+            name: _share(share, sd, result.parameters[name], each)
+            for name, share, sd, each in zip("abc", shares.tolist(), sds, by_rate, strict=True)
         },
     )
 
@@ -227,13 +223,14 @@ def _share(share: float, sd: float, rate: Estimate, by_rate: float) -> Estimate:
 
 def relative_loss_sd(result: Fitted, amplitude: float) -> float:
     """Relative standard deviation of the law's loss, and so of Q, at one amplitude."""
-    return _sd(np.ones(3), _covariance_of_losses(result, amplitude))
+    return float(_sds(np.ones((1, 3)), _covariance_of_losses(result, amplitude))[0])
 
 
-def _sd(weights: FloatArray, covariance: FloatArray) -> float:
+def _sds(weights: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Standard deviations of weighted sums, shape (k,)."""
     if not np.isfinite(covariance).all():
-        return math.inf
-    return math.sqrt(max(float(weights @ covariance @ weights), 0.0))
+        return np.full(len(weights), math.inf)
+    return np.asarray(np.sqrt(np.maximum(np.sum(weights @ covariance * weights, axis=1), 0.0)))
 
 
 def _covariance_of_losses(result: Fitted, amplitude: float) -> FloatArray:
