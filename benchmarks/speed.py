@@ -10,9 +10,13 @@ and the lower quartiles are compared, since others at work on the machine only a
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable
 from itertools import cycle, islice
+from pathlib import Path
 from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
 from typing import Final
 
@@ -23,6 +27,7 @@ from benchmarks.journal import judge_parser
 from benchmarks.table import head, table_row
 from pendpipe.arrays import FloatArray as Array
 from pendpipe.dynamics import Eq8, Release, sample, sample_with_jacobian, turning_points
+from pendpipe.recording import write_plain
 
 OMEGA: Final = 2.0 * math.pi * 0.516
 MODEL: Final = Eq8(OMEGA, quadratic=0.45, hysteretic=0.00596, viscous=0.00596, coulomb=1.4e-6)
@@ -82,6 +87,53 @@ def fit_of_peaks(values: Array) -> Array:
     return np.asarray(curve_fit(eq_14, SAMPLES[at] - SAMPLES[at[0]], size[at], start)[0][1:])
 
 
+def fit_of_cosine(recording: pp.Recording, *, by_lmfit: bool = False) -> Array:
+    """Size, loss, frequency, phase and level of a damped cosine by curve_fit, from the spectrum."""
+    import lmfit
+    from scipy.optimize import curve_fit
+
+    def swing(t: Array, size: float, loss: float, rate: float, phase: float, level: float) -> Array:
+        return size * np.exp(-loss * t) * np.cos(rate * t + phase) + level
+
+    time_s, values = recording.time_s, recording.values
+    peak = int(np.argmax(np.abs(np.fft.rfft(values - values.mean()))))
+    rate = 2.0 * math.pi * peak / float(time_s[-1] - time_s[0])
+    start = [float(np.ptp(values)) / 2.0, 0.01, rate, 0.0, float(values.mean())]
+    if by_lmfit:
+        model = lmfit.Model(swing)
+        names = dict(zip(model.param_names, start, strict=True))
+        return np.array([*model.fit(values, t=time_s, **names).best_values.values()])
+    return np.asarray(curve_fit(swing, time_s, values, start)[0])
+
+
+def cold_s(command: str, recording: pp.Recording) -> float:
+    """CPU seconds of a command on a file, in a process of its own: the least of three."""
+    words, spent = [sys.executable, "-m", "pendpipe", command, "decay.csv"], list[float]()
+    with tempfile.TemporaryDirectory() as folder:
+        write_plain(Path(folder, "decay.csv"), recording)
+        for _ in range(3):
+            before = getrusage(RUSAGE_CHILDREN)
+            subprocess.run(words, cwd=folder, check=True, capture_output=True)
+            after = getrusage(RUSAGE_CHILDREN)
+            spent.append(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
+    return min(spent)
+
+
+def long_s() -> tuple[float, float]:
+    """CPU seconds of the turning points of 10^7 readings, 100 a second, and of find_peaks there."""
+    from scipy.signal import find_peaks
+
+    law, time_s = Eq8(OMEGA, hysteretic=5e-6, viscous=5e-6), np.arange(10_000_000) / 100.0
+    noise = NOISE * np.random.default_rng(0).standard_normal(len(time_s))
+    many = pp.Recording(time_s=time_s, angle_rad=sample(law, START, time_s) + noise)
+    both: dict[str, Callable[[], object]] = {
+        "points": lambda: pp.turning_points(many),
+        "peaks": lambda: find_peaks(many.values, prominence=5.0 * NOISE),
+    }
+    spent = cpu_s(both, 2)
+    return spent["points"], spent["peaks"]
+
+
 def cpu_s(contenders: dict[str, Callable[[], object]], rounds: int) -> dict[str, float]:
     """Lower quartile of the CPU time of each contender; each is called once before."""
     times: dict[str, list[float]] = {name: [] for name in contenders}
@@ -137,10 +189,16 @@ def rows(rounds: int) -> list[tuple[str, str, str, bool]]:
         "fit": lambda: pp.fit(recording),
         "peaks": lambda: fit_of_peaks(values),
         "one": lambda: pp.fit(plain),
+        "cosine": lambda: fit_of_cosine(plain),
+        "lmfit": lambda: fit_of_cosine(plain, by_lmfit=True),
     }
     t = cpu_s(contenders, rounds)
     t |= cpu_s({"solve_ivp": lambda: solve_ivp_turning_points(count)}, 1)
     t |= cpu_s({"null": lambda: pp.diagnose(plain), "line": lambda: pp.diagnose(shaken)}, 2)
+    with tempfile.TemporaryDirectory() as folder:
+        fitted, target = pp.fit(plain), Path(folder, "fit")
+        t |= cpu_s({"save": lambda: fitted.save(target, figures=False, force=True)}, rounds)
+    many, (points, peaks) = many_s(), long_s()
     found = (
         (f"`solve_ivp` DOP853 over {count} turning points", t["solve_ivp"] / t["turns"], 1e4, 1),
         ("32,768 samples over one `np.cos` of them", t["samples"] / t["cos"], 0.5, 0),
@@ -149,7 +207,15 @@ def rows(rounds: int) -> list[tuple[str, str, str, bool]]:
         ("with 8 columns of derivatives", t["sine jacobian"] / t["cos"], 3.0, 0),
         ("`pp.fit` of 32,768 readings, ms", 1e3 * t["fit"], 5.0, 0),
         ("over `find_peaks`, `curve_fit`", t["fit"] / t["peaks"], 1.0, 0),
-        ("`fit_many` in two processes over `fit`, a recording", many_s() / t["one"], 2.0, 0),
+        ("`pp.fit` of 2,048 readings, ms", 1e3 * t["one"], 3.0, 0),
+        ("over `curve_fit` of a damped cosine", t["one"] / t["cosine"], 1.0, 0),
+        ("over `lmfit` of it", t["one"] / t["lmfit"], 1.0, 0),
+        ("`fit_many` in two processes over `fit`, a recording", many / t["one"], 2.0, 0),
+        ("fits a second in two processes, on two free cores", 2.0 / many, 400.0, 1),
+        ("`FitResult.save` without figures, ms", 1e3 * t["save"], 1.0, 0),
+        ("`pendpipe fit FILE` in a new process, s", cold_s("fit", plain), 0.45, 0),
+        ("`pendpipe inspect FILE` in a new process, s", cold_s("inspect", plain), 0.3, 0),
+        ("`pp.turning_points` of 10⁷ readings over `find_peaks`", points / peaks, 1.0, 0),
         ("`pp.diagnose` where nothing is missing, 2,048 readings, s", t["null"], 1.0, 0),
         ("`pp.diagnose` where a line is missing, s", t["line"], 3.0, 0),
     )

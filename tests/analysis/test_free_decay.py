@@ -14,13 +14,12 @@ import pendpipe
 from pendpipe.analysis.free_decay import (
     FreeDecay,
     _falls,
-    _running_median,
     _stop,
     best_runs,
     find_free_decay,
     stretches,
 )
-from pendpipe.analysis.half_cycles import HalfCycles
+from pendpipe.analysis.half_cycles import HalfCycles, running_median
 from pendpipe.api import fit
 from pendpipe.errors import NotAnalysableError
 from pendpipe.recording import Recording
@@ -309,7 +308,7 @@ def test_a_wiggle_within_a_swing_makes_no_half_cycles() -> None:
 @given(st.lists(st.floats(0.1, 10.0), min_size=3, max_size=12))
 def test_the_usual_half_period_is_the_median_of_five_neighbours(values: list[float]) -> None:
     expected = [np.median(values[max(0, i - 2) : i + 3]) for i in range(len(values))]
-    np.testing.assert_array_equal(_running_median(np.array(values)), expected)
+    np.testing.assert_array_equal(running_median(np.array(values), 2), expected)
 
 
 def test_of_random_walks_few_pass_for_a_decay() -> None:

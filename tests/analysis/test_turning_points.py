@@ -472,6 +472,12 @@ def test_a_pause_in_a_long_record_is_counted_over() -> None:
     assert np.max(np.abs(points.time_s - turning)) < 0.01
 
 
+def test_few_half_cycles_of_very_many_readings_are_measured_one_by_one() -> None:
+    """In the beginning, from which a long record is followed, there is none."""
+    samples, _ = long_record(1000.0, 60.0)
+    assert len(turning_points_of(samples, long=1 << 12)) >= 58
+
+
 @pytest.mark.parametrize("noise", [3e-5, 1e-4])
 def test_the_noise_of_a_long_record_is_found_wherever_its_readings_lie(noise: float) -> None:
     """The half cycles hold no whole number of readings: none turns on a reading."""

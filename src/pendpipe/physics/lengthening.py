@@ -71,16 +71,17 @@ def unit_shown(
 
 
 _APART: Final = 1e-8
-"""Relative, of two means whose next ones differ by its square over eight."""
+"""Of two means, both 0.1 to 1, whose next ones differ by its square over eight of them."""
 
 
 def elliptic(m: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Complete elliptic integrals K and E of the parameter m = k^2 < 1, by Gauss's means."""
     a, b = np.ones_like(m), np.sqrt(1.0 - m)
-    total, step, most = 0.5 * m, 0, 1.0
+    total, step, apart, most = 0.5 * m, 0, 1.0, 1.0
     least = math.sqrt(1.0 - float(np.max(m, initial=0.0)))
     # Each step doubles the digits: behind one that began 1e-8 apart the means are one number.
-    while step == 0 or most - least > _APART:
+    while apart > _APART:
+        apart = most - least
         most, least = 0.5 * (most + least), math.sqrt(most * least)
         a, b, difference = 0.5 * (a + b), np.sqrt(a * b), 0.5 * (a - b)
         total, step = total + 2.0**step * difference**2, step + 1
@@ -119,6 +120,7 @@ def sine_share(
     weighted[: len(lasts)] = columns * np.reshape(weight, (-1, 1))
     # Of the triangle what others do not explain: models differ by its last columns.
     triangle = np.asarray(np.linalg.qr(weighted, mode="r"))
+    triangle /= np.max(np.abs(triangle))  # squares must not overflow
     first, *last = triangle[len(others) :, len(others) :].tolist()
     (_, by_sine, across, second), (*_, by_drift, third), (*_, rest) = last
     by_sine, by_drift = (each or math.ulp(first[0]) for each in (by_sine, by_drift))

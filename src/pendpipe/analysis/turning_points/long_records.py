@@ -21,6 +21,7 @@ from pendpipe.analysis.turning_points.measure import Samples, cosine_sine, loss_
 from pendpipe.analysis.turning_points.table import TurningPoints
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.kernel import Matrix, kernel
+from pendpipe.errors import NotAnalysableError
 
 LEVEL_BLOCK = 256
 """Half cycles over which level and period are one number each."""
@@ -310,9 +311,12 @@ def _start(
     samples: Samples, measure: Callable[[Samples], TurningPoints], length: int
 ) -> TurningPoints | None:
     """The turning points from which a record is followed; None if it isn't plain there."""
-    first = measure(
-        replace(samples, time_s=samples.time_s[:length], values=samples.values[:length])
-    )
+    part = replace(samples, time_s=samples.time_s[:length], values=samples.values[:length])
+    try:
+        first = measure(part)
+    except NotAnalysableError:
+        # Of few half cycles, each of very many readings, it is not told.
+        return None
     plain = first.noise_rms_rad < _PLAIN * max(samples.noise_rms, 1e-300)
     amplitude = float(first.amplitude_rad[0])
     if not plain or amplitude > _LARGEST or len(first) < _FEWEST:
