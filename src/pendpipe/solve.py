@@ -165,8 +165,10 @@ class Linear(NamedTuple):
         """
         nothing = np.zeros(len(floor))
         while True:
-            matrix = np.vstack([self.triangle, math.sqrt(damping) * np.eye(len(floor))])
-            right = np.append(self.right, nothing)
+            matrix, right = self.triangle, self.right
+            if damping > 0.0:
+                matrix = np.vstack([matrix, math.sqrt(damping) * np.eye(len(floor))])
+                right = np.append(right, nothing)
             best = bounded_least_squares(matrix, right, floor, ceiling)
             if float(np.linalg.norm(best)) <= (1.0 + 2.0 * _RADIUS_MET) * radius:
                 return best

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from typing import Final, NamedTuple, cast
 
 import numpy as np
@@ -315,19 +316,19 @@ def fitted_waveform(
 
 def _with_drag(found: Fitted, samples: Samples, points: TurningPoints) -> Forms:
     """Ask for the other form of the drag: a step from the first one's minimum tells how likely."""
-    goodness = _judged(found, samples, points)
-    without, plain = found.value[A] <= 0.0, goodness.misfit == 1.0
-    if A in found.held or not found.minimum.converged or (without and plain):
-        return Forms(found, goodness, None)
+    own = cache(partial(_judged, found, samples, points))
+    without = found.value[A] <= 0.0
+    if A in found.held or not found.minimum.converged or (without and own().misfit == 1.0):
+        return Forms(found, own(), None)
     begun = found.start.value if without else found.value
     other = replace(found.problem, drag="speed")
     speed = _fitted(other, begun, found.held, found.start, found.chi2)
-    if not plain or speed.better_by(found) > -ODDS:
+    if speed.better_by(found) > -ODDS or own().misfit > 1.0:
         speed = _settled(speed, samples)
     if not speed.minimum.converged:
-        return Forms(found, goodness, None)
+        return Forms(found, own(), None)
     if speed.better_by(found) < 0.0:
-        return Forms(found, goodness, speed)
+        return Forms(found, own(), speed)
     return Forms(speed, _judged(speed, samples, points), found)
 
 

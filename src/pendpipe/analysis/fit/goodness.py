@@ -189,12 +189,11 @@ def _binned(
     edges = np.linspace(first, last, math.ceil((last - first) / (2.0 * math.pi) * _BINS) + 1)
     place = np.searchsorted(time_s, np.interp(edges, turns, turn_s))
     place[0], place[-1] = 0, len(time_s)
-    running = np.concatenate([[0.0], np.cumsum(residual)])
     weights = np.diff(place).astype(np.float64)
     some = weights > 0.0
     middle = 0.5 * (edges[1:] + edges[:-1])
     times = np.interp(middle[some], turns, turn_s)
-    return middle[some], times, np.diff(running[place])[some], weights[some]
+    return middle[some], times, np.add.reduceat(residual, place[:-1][some]), weights[some]
 
 
 class _Blocks(NamedTuple):

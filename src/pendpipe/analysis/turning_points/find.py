@@ -280,14 +280,15 @@ def _further(places: Places, measured: Measured, noise: float, count: int) -> Pl
     """Carry the last known half cycles on at their own mean period."""
     time, weight = times_and_weights(places, measured, noise)
     known = np.flatnonzero(weight > 0.0)[-60:]
-    line = np.polynomial.Polynomial.fit(
-        places.number[known], time[known], 1, w=np.sqrt(weight[known])
-    )
+    own, late, weight = places.number[known], time[known] - time[known[-1]], weight[known]
+    total = float(weight.sum())
+    middle, mean = float(weight @ own) / total, float(weight @ late) / total
+    half = float(weight @ ((own - middle) * late)) / float(weight @ (own - middle) ** 2)
     number = places.number[-1] + 1 + np.arange(count)
     return Places(
         number,
-        line(number),
-        np.full(count, line.deriv()(0.0)),
+        time[known[-1]] + mean + half * (number - middle),
+        np.full(count, half),
         places.side[-1] * (2.0 * (np.arange(count) % 2) - 1.0),
     )
 
@@ -581,18 +582,32 @@ def _local_lines(
 
     It takes the neighbours within `window`, fewer at the ends.
     """
-    k = np.arange(len(score))
-    running = np.zeros((5, len(score) + 1))
-    columns = (information, information * k, information * k * k, score, score * k)
-    np.cumsum(columns, axis=1, out=running[:, 1:])
-    upper, lower = np.minimum(k + window + 1, len(score)), np.maximum(k - window, 0)
-    w, wk, wkk, s, sk = running[:, upper] - running[:, lower]
-    centre = wk / w
-    spread = wkk - wk * centre
-    slope = (sk - s * centre) / np.maximum(spread, 1e-300)
-    offset = k - centre
-    leverage = information * (1.0 / w + offset**2 / np.maximum(spread, 1e-300))
-    return s / w + slope * offset, float(leverage.sum())
+    line = np.empty(len(score))
+    used = _fill_lines(np.ascontiguousarray(information), np.ascontiguousarray(score), window, line)
+    return line, used
+
+
+@kernel()
+def _fill_lines(information: FloatArray, score: FloatArray, window: int, line: FloatArray) -> float:
+    """Fill in the line at each; return the freedom."""
+    used, upper, lower = 0.0, 0, 0
+    w, wk, wkk, s, sk = 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(score.size):
+        # The window's sums, what has come in and less what is left behind.
+        while upper < min(k + window + 1, score.size):
+            weight, moment = information[upper], information[upper] * upper
+            w, wk, wkk = w + weight, wk + moment, wkk + moment * upper
+            s, sk, upper = s + score[upper], sk + score[upper] * upper, upper + 1
+        while lower < k - window:
+            weight, moment = information[lower], information[lower] * lower
+            w, wk, wkk = w - weight, wk - moment, wkk - moment * lower
+            s, sk, lower = s - score[lower], sk - score[lower] * lower, lower + 1
+        centre = wk / w
+        spread = max(wkk - wk * centre, 1e-300)
+        offset = k - centre
+        line[k] = s / w + (sk - s * centre) / spread * offset
+        used += information[k] * (1.0 / w + offset * offset / spread)
+    return used
 
 
 _LEAST_SHARE: Final = 0.3
