@@ -1,5 +1,7 @@
 """How much of a pendulum's sin x periods ask for: the one test of a period that lengthens so."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
@@ -7,6 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pendpipe.arrays import FloatArray
+from pendpipe.dynamics.kernel import kernel
 from pendpipe.estimate import Z95
 
 SEEN: Final = 3.0
@@ -76,17 +79,23 @@ _APART: Final = 1e-8
 
 def elliptic(m: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Complete elliptic integrals K and E of the parameter m = k^2 < 1, by Gauss's means."""
-    a, b = np.ones_like(m), np.sqrt(1.0 - m)
-    total, step, apart, most = 0.5 * m, 0, 1.0, 1.0
-    least = math.sqrt(1.0 - float(np.max(m, initial=0.0)))
-    # Each step doubles the digits: behind one that began 1e-8 apart the means are one number.
-    while apart > _APART:
-        apart = most - least
-        most, least = 0.5 * (most + least), math.sqrt(most * least)
-        a, b, difference = 0.5 * (a + b), np.sqrt(a * b), 0.5 * (a - b)
-        total, step = total + 2.0**step * difference**2, step + 1
-    k = 0.5 * math.pi / a
-    return k, k * (1.0 - total)
+    k, e = np.empty_like(m), np.empty_like(m)
+    _elliptic(np.ravel(m), k.reshape(-1), e.reshape(-1))
+    return k, e
+
+
+@kernel()
+def _elliptic(m: FloatArray, k: FloatArray, e: FloatArray) -> None:
+    """Fill in both."""
+    for i in range(m.size):
+        a, b, total, factor, apart = 1.0, math.sqrt(1.0 - m[i]), 0.5 * m[i], 0.25, 1.0
+        # Each step doubles the digits: behind one that began 1e-8 apart the means are one number.
+        while apart > _APART:
+            apart, factor = a - b, 2.0 * factor
+            a, b = 0.5 * (a + b), math.sqrt(a * b)
+            total += 0.5 * factor * apart * apart
+        k[i] = 0.5 * math.pi / a
+        e[i] = k[i] * (1.0 - total)
 
 
 def sine_share(
@@ -120,7 +129,9 @@ def sine_share(
     weighted[: len(lasts)] = columns * np.reshape(weight, (-1, 1))
     # Of the triangle what others do not explain: models differ by its last columns.
     triangle = np.asarray(np.linalg.qr(weighted, mode="r"))
-    triangle /= np.max(np.abs(triangle))  # squares must not overflow
+    # The unit of time does not matter, nor that of the weights: no square overflows.
+    for part in triangle[:, :-1], triangle[:, -1]:
+        part /= np.max(np.abs(part))
     first, *last = triangle[len(others) :, len(others) :].tolist()
     (_, by_sine, across, second), (*_, by_drift, third), (*_, rest) = last
     by_sine, by_drift = (each or math.ulp(first[0]) for each in (by_sine, by_drift))
