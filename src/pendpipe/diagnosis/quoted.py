@@ -2,9 +2,10 @@
 
 A description is a set of effects: of each that was found its name, a mate of its class, or "none
 of these", with the product of their probabilities. Each is fitted as it is named; with none at all
-it is the fit, with its widened errors. Where some leave only noise, the others do not describe the
-recording. The frequency, a, b, c and Q are averaged (`pendpipe.estimate.averaged`). What leaves
-more than noise is neither surer nor less sure than the fit; a curve without a name is no surer.
+it is the fit, with its widened errors. Where those that leave only noise have half of the
+probability, the others do not describe the recording. The frequency, a, b, c and Q are averaged
+(`pendpipe.estimate.averaged`). What leaves more than noise is neither surer nor less sure than the
+fit; a curve without a name is no surer.
 """
 
 import itertools
@@ -24,7 +25,7 @@ from pendpipe.diagnosis.refine import Fit, best_fit, with_errors
 from pendpipe.diagnosis.released_parameters import ReleasedParameter
 from pendpipe.diagnosis.rivals import Rival
 from pendpipe.diagnosis.values import constants_of, quality_factors_of, small_periods
-from pendpipe.estimate import LISTED, Estimate, averaged
+from pendpipe.estimate import LISTED, NAMED, Estimate, averaged
 
 _STARTS: Final = 2
 """Fits of other descriptions from which one begins: those that have most in common with it."""
@@ -60,7 +61,8 @@ _Chosen = tuple[_Choice, ...]
 def descriptions_of(found: Hypothesis) -> list[Description]:
     """Fit each description of a probability of 5 % and more, the most probable first.
 
-    Where some leave only noise, these alone. Of a recording that lacks nothing it is the fit, and
+    Where some leave only noise, these alone, if they have half of the probability: a few unlikely
+    names together may imitate what has none. Of a recording that lacks nothing it is the fit, and
     where none of them has a motion it is the search's own.
     """
     choices = [_choices(step) for step in found.steps]
@@ -82,7 +84,9 @@ def descriptions_of(found: Hypothesis) -> list[Description]:
             described.append(Description(probability, with_errors(fit, found.data, found.noise)))
     if not described:
         return [Description(1.0, with_errors(found.fit, found.data, found.noise))]
-    return [each for each in described if each.fit.scatter is None] or described
+    clean = [each for each in described if each.fit.scatter is None]
+    share = sum(each.probability for each in clean) / sum(each.probability for each in described)
+    return clean if share >= NAMED else described
 
 
 def _choices(step: Step) -> list[_Choice]:
