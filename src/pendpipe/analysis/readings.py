@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from pendpipe.analysis.half_cycles import larger_half_cycles
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, quantiles
 from pendpipe.errors import refuse_if
 from pendpipe.facts import Fact
 from pendpipe.physics.pendulum import STANDARD_GRAVITY_M_PER_S2
@@ -222,11 +222,11 @@ def only_falls(values: FloatArray) -> bool:
         return False
     sizes = sizes / sizes.max()
     # A long rest behind a decay tells nothing of it, and a wild reading makes no range.
-    largest = float(np.percentile(sizes, 98))
+    largest = float(quantiles(sizes, 0.98)[0])
     moving = sizes[: int(np.flatnonzero(sizes > _REST * largest)[-1]) + 1]
     above = float(np.mean(moving - np.minimum.accumulate(moving)))
     # None is above 1: of a swing no range need be asked for.
-    if not above < _LEVEL or not above < _LEVEL * float(np.ptp(np.percentile(moving, (2, 98)))):
+    if not above < _LEVEL or not above < _LEVEL * float(np.ptp(quantiles(moving, 0.02, 0.98))):
         return False
     steps = np.diff(sizes)
     falls, rises = float(np.mean(steps < 0.0)), float(np.mean(steps > 0.0))

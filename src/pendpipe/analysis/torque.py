@@ -10,7 +10,7 @@ import numpy as np
 from pendpipe.analysis.half_cycles import LEAST_HALF_CYCLES
 from pendpipe.analysis.turning_points import TurningPoints
 from pendpipe.analysis.turning_points.measure import loss_rates
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import BoolArray, FloatArray
 from pendpipe.dynamics.eq8 import Restoring
 from pendpipe.physics.lengthening import SEEN, Coefficient, elliptic, sine_share
 
@@ -80,8 +80,12 @@ def phases(
 
 def clear(points: TurningPoints) -> TurningPoints:
     """Take those below the top that stand out of the noise."""
+    return points.chosen(_is_clear(points))
+
+
+def _is_clear(points: TurningPoints) -> BoolArray:
     amplitude = points.amplitude_rad
-    return points.chosen((amplitude > SEEN * points.angle_sd_rad) & (amplitude < TOP))
+    return (amplitude > SEEN * points.angle_sd_rad) & (amplitude < TOP)
 
 
 def told_apart(points: TurningPoints, readings: int, noise: float) -> float:
@@ -92,9 +96,9 @@ def told_apart(points: TurningPoints, readings: int, noise: float) -> float:
     amplitude, number = part.amplitude_rad, part.half_cycle - part.half_cycle[0]
     swings = (swing_phase(amplitude, "sine") - math.pi) * np.diff(number)
     late = np.concatenate([[0.0], np.cumsum(swings)])
-    line = amplitude[:, None] * np.stack([np.ones_like(late), number], axis=1)
-    first, each = np.linalg.lstsq(line, amplitude * late)[0]
-    left = amplitude * (late - first - each * number)
+    weight = amplitude**2 / float(amplitude @ amplitude)
+    off, left = number - weight @ number, late - weight @ late
+    left = amplitude * (left - (weight * off @ left) / (weight * off @ off) * off)
     in_half_cycle = readings / max(float(np.ptp(points.half_cycle)), 1.0)
     return 0.5 * in_half_cycle * float(left @ left) / noise**2
 
@@ -114,7 +118,7 @@ def restoring_of(points: TurningPoints, *, stated: bool = True) -> Restoring:
 def may_be_sine(points: TurningPoints) -> bool:
     """Whether these are angles below the top, enough of them clear of the noise."""
     inside = points.unit == "rad" and float(np.max(points.amplitude_rad)) < math.pi
-    return inside and len(clear(points)) >= LEAST_HALF_CYCLES
+    return inside and int(np.count_nonzero(_is_clear(points))) >= LEAST_HALF_CYCLES
 
 
 def sine_coefficient(points: TurningPoints) -> Coefficient:

@@ -14,6 +14,7 @@ from typing import Final, NamedTuple, cast
 
 import numpy as np
 
+from pendpipe.analysis.demodulation import normal_equations
 from pendpipe.analysis.fit.fitted import Agreement, Baseline, DragForm, Form, view
 from pendpipe.analysis.fit.fixed import Held
 from pendpipe.analysis.fit.goodness import Goodness, Left, combined, judge
@@ -55,6 +56,8 @@ from pendpipe.solve import (
 
 _PIECE: Final = 1 << 18
 """Readings whose Jacobian is in memory at a time: 16 MB."""
+_WINDOW: Final = 512
+"""Readings whose Jacobian stays in the processor's nearest cache: 36 kB."""
 _DITHERED: Final = 0.4
 """Noise over step from which the rounding is as good as random."""
 _TOLERANCE: Final = 1e-2
@@ -155,16 +158,19 @@ class Waveform(Eq8Model):
         for piece, there in self._pieces(value):
             reading, jacobian = there.by_engine
             residual = self.values[piece] - reading
-            if self.step == 0.0:
-                part, score, weighted = float(residual @ residual), residual, jacobian
-            else:
-                score, weights = np.empty_like(residual), np.empty_like(residual)
-                part = rounded(residual, 0.5 * self.step, self.noise_rms, score, weights)
-                weighted = jacobian * weights[:, None]
             left.append(residual)
-            chi2 += part
-            slope += jacobian.T @ score
-            normal += jacobian.T @ weighted
+            if self.step == 0.0:
+                # Windows that stay in the nearest cache: BLAS takes half as long again.
+                sums = normal_equations(jacobian.T, residual, np.arange(0, len(residual), _WINDOW))
+                part, (gram, score) = (
+                    float(residual @ residual),
+                    (each.sum(axis=0) for each in sums),
+                )
+            else:
+                pull, weights = np.empty_like(residual), np.empty_like(residual)
+                part = rounded(residual, 0.5 * self.step, self.noise_rms, pull, weights)
+                gram, score = jacobian.T @ (jacobian * weights[:, None]), jacobian.T @ pull
+            chi2, slope, normal = chi2 + part, slope + score, normal + gram
         self._residuals[:] = [(value.copy(), np.concatenate(left))]
         unit = self.noise_rms**-2 if self.step == 0.0 else 1.0
         chi2, slope, normal = unit * chi2, unit * slope, unit * normal
