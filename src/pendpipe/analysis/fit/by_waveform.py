@@ -433,11 +433,13 @@ def waveform_result(
     """Put the numbers of the likelier form of the drag together, with errors that cover both."""
     fitted, goodness, other = forms
     problem, start_s = fitted.problem, float(samples.time_s[0])
-    value, matrix, ends, drift_sd = _numbers(fitted, goodness, start_s)
+    value, ends, by_own = _numbers(fitted, goodness, start_s)
+    own = _covariance(fitted, goodness)
+    matrix = by_own @ own @ by_own.T
     form: DragForm = problem.drag
     if other is not None and fitted.better_by(other) < ODDS:
         form = "undecided"
-        others, _, other_ends, _ = _numbers(other, goodness, start_s)
+        others, other_ends, _ = _numbers(other, goodness, start_s)
         apart = others - value
         apart[5] = math.remainder(apart[5], math.tau)
         matrix = matrix + np.outer(apart, apart)
@@ -448,7 +450,8 @@ def waveform_result(
     inside = (points.time_s >= times[0]) & (points.time_s <= times[-1])
     drift, said = None, [*fitted.start.warnings]
     if DRIFT not in fitted.held:
-        drift = Estimate(float(fitted.value[DRIFT]), drift_sd, f"{samples.unit}/s")
+        sd = math.sqrt(own[DRIFT, DRIFT])
+        drift = Estimate(float(fitted.value[DRIFT]), sd, f"{samples.unit}/s")
         per = with_error(drift.value, drift.sd, drift.unit, short=True)
         said.append(f"the zero drifts by {per}; it is followed by a line")
     return result_of(
@@ -478,16 +481,21 @@ def waveform_result(
 
 def _numbers(
     fitted: Fitted, goodness: Goodness, start_s: float
-) -> tuple[FloatArray, FloatArray, list[tuple[float, float]], float]:
-    """The seven parameters, their covariance, the intervals of a, b, c, and the drift's error."""
-    value, held = fitted.value, fitted.held
+) -> tuple[FloatArray, list[tuple[float, float]], FloatArray]:
+    """The seven parameters, the intervals of a, b, c, and derivatives of the seven by ours."""
+    value, bounds = fitted.value, fitted.problem.bounds
     _, gradient, normal = fitted.quadratic(goodness)
-    left, noise = goodness.left, goodness.noise_rms
-    own = covariance(normal, held, None if left is None else _beyond_noise(fitted, left, noise))
     (amplitude, phase), jacobian = _first_turning_point(fitted, start_s)
     numbers = np.array([*value[:3], value[OMEGA] / math.tau, amplitude, phase, value[OFFSET]])
-    ends = intervals95(value, normal, gradient, fitted.problem.bounds, range(3), held)
-    return numbers, jacobian @ own @ jacobian.T, ends, math.sqrt(own[DRIFT, DRIFT])
+    ends = intervals95(value, normal, gradient, bounds, range(3), fitted.held)
+    return numbers, ends, jacobian
+
+
+def _covariance(fitted: Fitted, goodness: Goodness) -> FloatArray:
+    """Covariance of our nine parameters, by the noise and by what the law misses."""
+    left, noise = goodness.left, goodness.noise_rms
+    beyond = None if left is None else _beyond_noise(fitted, left, noise)
+    return covariance(fitted.quadratic(goodness).normal, fitted.held, beyond)
 
 
 def _beyond_noise(fitted: Fitted, left: Left, noise_rms: float) -> FloatArray:

@@ -151,12 +151,14 @@ def _seen(points: TurningPoints) -> list[tuple[float, float, float, float]]:
         beyond = np.abs(logs[order] - logs[centre]) > reach
         beyond[:_FEWEST] = False
         window = order[np.cumsum(beyond) == 0]
-        found.append(seen_loss(points.chosen(slice(window.min(), window.max() + 1))))
+        found.append(seen_loss(points, slice(window.min(), window.max() + 1)))
     return found
 
 
-def seen_loss(points: TurningPoints) -> tuple[float, float, float, float]:
-    """Relative loss of amplitude of some neighbouring turning points.
+def seen_loss(
+    points: TurningPoints, part: slice = slice(None)
+) -> tuple[float, float, float, float]:
+    """Relative loss of amplitude of a part of some turning points, neighbours all.
 
     A parabola in time is fitted to ln y, beside an error of the level, which raises the
     amplitudes of one side and lowers those of the other.
@@ -168,23 +170,22 @@ def seen_loss(points: TurningPoints) -> tuple[float, float, float, float]:
         the scatter about the parabola (neighbours may scatter alike) and not below the turning
         points' own.
     """
-    amplitude = points.amplitude_rad
-    centre = float(np.mean(points.time_s))
-    span = float(np.ptp(points.time_s))
-    z = (points.time_s - centre) / span
+    amplitude, side, time_s = points.amplitude_rad[part], points.side[part], points.time_s[part]
+    centre, span = float(np.mean(time_s)), float(np.ptp(time_s))
+    z = (time_s - centre) / span
     columns = [np.ones_like(z), z]
-    if len(points) > SIDES and np.ptp(points.side):
-        columns.append(points.side * float(np.mean(amplitude)) / amplitude)
-    if len(points) > SIDES + 1:
+    if len(z) > SIDES and np.ptp(side):
+        columns.append(side * float(np.mean(amplitude)) / amplitude)
+    if len(z) > SIDES + 1:
         columns.append(z**2)
-    weight = amplitude / points.angle_sd_rad
+    weight = amplitude / points.angle_sd_rad[part]
     design = np.stack(columns, axis=1) * weight[:, None]
     scale = np.linalg.norm(design, axis=0)
     design, logs = design / scale, weight * np.log(amplitude)
     inverse = np.linalg.inv(design.T @ design)
     sizes = inverse @ (design.T @ logs)
     values, residual = sizes / scale, logs - design @ sizes
-    freedom = len(points) - len(columns)
+    freedom = len(z) - len(columns)
     variance, scatter = float(inverse[1, 1]) / scale[1] ** 2, 1.0
     if freedom > 0:
         square = float(residual @ residual)

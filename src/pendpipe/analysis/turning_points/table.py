@@ -144,6 +144,8 @@ class TurningPoints:
 
     def chosen(self, keep: BoolArray | slice) -> Self:
         """Some of them, with all that they share."""
+        if not isinstance(keep, slice) and keep.all():
+            return self
         return replace(self, **{name: getattr(self, name)[keep] for name in COLUMNS})
 
     def covariance(self) -> FloatArray:
