@@ -56,8 +56,8 @@ from pendpipe.solve import (
 
 _PIECE: Final = 1 << 18
 """Readings whose Jacobian is in memory at a time: 16 MB."""
-_WINDOW: Final = 512
-"""Readings whose Jacobian stays in the processor's nearest cache: 36 kB."""
+_WINDOW: Final = 256
+"""Readings whose Jacobian stays in the processor's nearest cache: 18 kB."""
 _DITHERED: Final = 0.4
 """Noise over step from which the rounding is as good as random."""
 _TOLERANCE: Final = 1e-2
