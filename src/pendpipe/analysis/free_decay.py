@@ -181,10 +181,9 @@ def _chains(
     score, before = numbers[0].tolist(), places.tolist()
     chains, free = list[tuple[float, list[int]]](), [True] * size
     for last in sorted(range(size), key=score.__getitem__, reverse=True):
-        chain, at = [last], before[last]
-        while at >= 0 and free[last]:
-            chain.append(at)
-            at = before[at]
+        chain = [last]
+        while free[last] and before[chain[-1]] >= 0:
+            chain.append(before[chain[-1]])
         if all(free[chain[-1] : last + 1]) and len(chain) > 1:
             free[chain[-1] : last + 1] = [False] * (last + 1 - chain[-1])
             chains.append((score[last], chain[::-1]))
