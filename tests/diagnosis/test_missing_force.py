@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 
 from pendpipe.arrays import FloatArray
-from pendpipe.diagnosis.missing_force import curve_told, seen_as, share_of_loss
+from pendpipe.diagnosis.missing_force import (
+    curve_told,
+    polynomial_of,
+    seen_as,
+    share_of_loss,
+)
 from pendpipe.diagnosis.refine import refine
 from pendpipe.diagnosis.values import drawn_of
 from pendpipe.dynamics.any_law import Motion
@@ -114,6 +119,23 @@ def test_a_torque_of_two_terms_is_told_by_its_coefficients(
         for size, power in zip(terms.values(), kind.powers.values(), strict=True)
     )
     assert ("stiffer" if relative > 0.0 else "softer") in told["summary"]
+
+
+def test_the_polynomial_is_that_of_the_whole_torque_or_none() -> None:
+    """A curve of one combination has x|x| beside a torque that has x^3, and can't alone."""
+    cubic, combination = by_identifier("cubic-stiffness"), np.array([[0.8], [0.6]])
+    curve = second_curve(Model(TIME_S, INTERVAL_S).evaluate(TRUTH).span, combination)
+    model, sizes = Model(TIME_S, INTERVAL_S, (cubic, curve)), [-0.2, -0.02]
+    data, noise = prepared(model.reading(np.append(TRUTH, sizes)) + white(3))
+    fit = refine(model, data, noise, np.append(TRUTH, sizes))
+    found, largest = polynomial_of(fit, "rad"), curve.span.first_amplitude
+    # A tenth of the swing is a curve's unit.
+    own = 0.1 * largest * sizes[1] * combination[:, 0]
+    truth = {"x|x|": own[0] / largest**2, "x³": sizes[0] + own[1] / largest**3}
+    for name, each in truth.items():
+        assert abs(found[name].value - each) < 3.0 * found[name].sd
+    bare = refine(Model(TIME_S, INTERVAL_S, (curve,)), data, noise, np.append(TRUTH, sizes[1]))
+    assert polynomial_of(bare, "rad") == {}
 
 
 def test_what_is_only_noise_is_told_nowhere() -> None:

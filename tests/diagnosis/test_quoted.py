@@ -80,6 +80,7 @@ def relaxing(rate: float, tau_s: float) -> float:
         ("frequency-drift", (6e-6, 40.0), -relaxing(6e-6, 40.0)),
         ("clock-drift", (6e-6, 40.0), -relaxing(6e-6, 40.0)),
         ("frequency-step", (1e-3, 0.25 * END_S), -0.75e-3),
+        ("damping-step", (0.25, 0.4 * END_S), 0.0),
     ],
 )
 def test_the_period_of_small_swings_is_what_an_effect_leaves_it_in_the_mean(

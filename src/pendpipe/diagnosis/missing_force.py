@@ -8,6 +8,7 @@ kept none, the curve whose signature explains most is fitted.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final
@@ -156,39 +157,50 @@ def curve_told(fit: Fit, effect: Curve, drawn: Drawn, unit: str) -> dict[str, An
         told = f"{subject} {larger if size > 0.0 else smaller} by {number} {place}"
         share = share_of_loss(fit, effect, low, high)
         told += f", {percent(abs(share))} of the loss there" if share else ""
-    if formula := polynomial_of(fit, effect, unit):
-        largest = fit.at.span.first_amplitude
-        # The law's own part of it is none of the curve.
-        share = sum(
-            each.value * largest ** (effect.powers[name] - 1) for name, each in formula.items()
-        )
-        at_most = f"{100.0 * abs(share):.2g} % {larger if share > 0.0 else smaller}"
-        at_most += f" at {short_size(largest, per)} than at rest"
-        told = f"the torque is as x {_signed(formula)}: {at_most}"
-        found["polynomial"] = formula
+    if effect.powers and (terms := polynomial_of(fit, unit)):
+        told, found["polynomial"] = _formula(terms, fit, per), terms
     return {"name": effect.name, "summary": told, **found}
 
 
-def polynomial_of(fit: Fit, curve: Curve, unit: str) -> dict[str, Estimate]:
-    """Return the coefficients of a torque over omega^2 of two terms, by term; else none."""
-    place = next(place for other, place in fit.model.places() if other is curve)
-    covariance, value = fit.covariance()[place, place], fit.value[place]
-    each = [curve.told(row) for row in np.eye(curve.sizes)]
+def polynomial_of(fit: Fit, unit: str) -> dict[str, Estimate]:
+    """Return the whole torque over omega^2 beyond the law's by powers of the angle, by term.
+
+    All torques with a formula are summed. None where the fit has fewer values than terms: it
+    knows but some combinations of these.
+    """
+    mixing, powers = dict[str, FloatArray](), dict[str, tuple[int, str]]()
+    for effect, place in fit.model.places():
+        for index, row in zip(range(place.start, place.stop), np.eye(effect.count), strict=True):
+            for name, each in effect.told(row).items():
+                mixing.setdefault(name, np.zeros(len(fit.value)))[index] = each
+        powers |= {name: (power, effect.acts_on(unit)) for name, power in effect.powers.items()}
+    rows = [mixing[name] * fit.at.span.first_amplitude ** powers[name][0] for name in mixing]
+    if not rows or np.linalg.matrix_rank(np.array(rows)[:, fit.free]) < len(rows):
+        return {}
     found = {}
-    for name in each[0]:
-        mixing = np.array([one[name] for one in each])
-        power = curve.powers[name] - 1
-        of = f"1/{curve.acts_on(unit)}" + (f"^{power}" if power > 1 else "")
-        found[name] = Estimate(
-            float(mixing @ value), float(np.sqrt(mixing @ covariance @ mixing)), of
-        )
+    for name in sorted(mixing, key=lambda name: powers[name][0]):
+        power, of = powers[name]
+        sd = math.sqrt(float(mixing[name] @ fit.covariance() @ mixing[name]))
+        value = float(mixing[name] @ fit.value)
+        found[name] = Estimate(value, sd, f"1/{of}^{power - 1}".removesuffix("^1"))
     return found
 
 
-def _signed(formula: Mapping[str, Estimate]) -> str:
-    """Print terms with their signs."""
-    said = []
-    for name, each in formula.items():
-        size = with_error(abs(each.value), each.sd, each.unit, short=True)
-        said.append(f"{'+' if each.value > 0.0 else '−'} {size} {name}")
-    return " ".join(said)
+def _formula(terms: Mapping[str, Estimate], fit: Fit, unit: str) -> str:
+    """Print the whole torque as terms of the largest swing A: each is its part of the torque there.
+
+    The law's own part of it is none of them.
+    """
+    largest, said, share = fit.at.span.first_amplitude, list[str](), 0.0
+    for name, each in terms.items():
+        # The unit is that of so many lengths.
+        power = int(each.unit.partition("^")[2] or 1)
+        part = Estimate(each.value * largest**power, each.sd * largest**power, "")
+        number = with_error(abs(part.value), part.sd, short=True)
+        over = "/A" + " ²³⁴"[power - 1].strip()
+        said.append(f"{'+' if part.value > 0.0 else '−'} {number} {name}{over}")
+        share += part.value
+    law = "sin x" if fit.model.restoring == "sine" else "x"
+    way = "stiffer" if share > 0.0 else "softer"
+    at = f"A = {short_size(largest, unit)}: {100.0 * abs(share):.2g} % {way} there than at rest"
+    return f"the torque is as {law} {' '.join(said)}, {at}"

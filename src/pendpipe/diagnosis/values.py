@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from pendpipe.analysis.fit.fitted import PARAMETERS, units
 from pendpipe.arrays import FloatArray
@@ -89,7 +88,11 @@ def small_periods(fit: Fit, value: FloatArray) -> FloatArray:
     if at.parts:
         part = max(at.parts, key=lambda each: each.at.span.first_amplitude)
         model, at, value = part.at.model, part.at, part.mixing @ value
-    motion, omega, pendulum = at.tangent.motion, float(value[OMEGA]), model.pendulum(value)
+    motion, omega, own = at.tangent.motion, float(value[OMEGA]), model.pendulum(value)
+    # A loss that jumps within a half cycle pulls one way there, and is no stiffness; by dry
+    # friction small swings stop.
+    smooth = replace(own, coulomb=0.0)
+    middle_s = np.broadcast_to(motion.time_s.mean(axis=1, keepdims=True), motion.time_s.shape)
     begun = motion.time_s[:, 0]
     seen = (at.span.start_s <= begun) & (begun <= at.span.stop_s)
     stiffer, late = np.zeros(len(begun)), np.zeros(np.count_nonzero(seen) + 1)
@@ -101,13 +104,12 @@ def small_periods(fit: Fit, value: FloatArray) -> FloatArray:
         late += 0.0 if delay is None or effect.local else delay
         for upwards in (1.0, -1.0):
             log_amplitude = np.full_like(motion.time_s, math.log(size))
-            small = Motion(motion.clock, omega, log_amplitude, motion.time_s, upwards)
+            time_s, pendulum = (middle_s, smooth) if effect.local else (motion.time_s, own)
+            small = Motion(motion.clock, omega, log_amplitude, time_s, upwards)
             force = effect.acceleration(small, pendulum, value[place])
             if force is not None:
                 done = motion.clock.integral(force * motion.clock.cosine)
                 stiffer -= upwards / math.pi * (done[:, -1] - done[:, 0]) / (omega**2 * size)
-    # A loss that jumps within a half cycle pulls one way there, and is no stiffness.
-    stiffer = np.median(sliding_window_view(np.pad(stiffer, 1, "edge"), 3), axis=1)
     with np.errstate(invalid="ignore"):
         true = 2.0 * math.pi / (omega * np.sqrt(1.0 + stiffer[seen]))
     return np.asarray(true / (1.0 + np.gradient(late[1:], begun[seen])))

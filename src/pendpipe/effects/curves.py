@@ -56,8 +56,6 @@ class Curve(Effect):
     taken: ClassVar[Callable[[FloatArray, Pendulum], Sequence[FloatArray]]]
     """Returns what the law (or a straight sensor) has itself, at values of the argument: the curve
     is what is beyond it."""
-    powers: ClassVar[Mapping[str, int]] = {}
-    """Of the angle, by term, where it has a formula."""
     along: ClassVar[Callable[[Any], FloatArray]]
     """Returns the argument, from a motion or a sampled motion."""
 
@@ -124,10 +122,6 @@ class Curve(Effect):
             at, knots = np.log(at), np.log(knots)
         heights = np.split(self.coefficients @ values, len(self.drawn))
         return np.array([np.interp(at, knots, height) for height in heights])
-
-    def told(self, values: FloatArray) -> Mapping[str, float]:
-        """Return the coefficients of what has a formula, by its term; none of a curve by knots."""
-        return {}
 
     def axes(self, unit: str) -> tuple[str, str]:
         """Return what it is drawn against, and what is drawn, with units, of readings in `unit`."""
@@ -295,7 +289,7 @@ class Polynomial(Curve):
         return np.tensordot(self.coefficients @ values, rows, 1)[None]
 
     def told(self, values: FloatArray) -> Mapping[str, float]:
-        """Return the coefficients of the powers of the angle, of the torque over omega^2."""
+        """Return the coefficients of the powers."""
         heights = self.coefficients @ values * self.scale(self.span.pendulum)
         first = self.span.first_amplitude
         return {

@@ -218,6 +218,8 @@ class Effect:
     angular: ClassVar[bool] = False
     """Whether it is about angles, and means nothing for an oscillator in metres."""
 
+    powers: ClassVar[Mapping[str, int]] = {}
+    """Of the angle, by term, where it is a torque that is odd in it and has a formula."""
     contact: ClassVar[bool] = False
     """Whether it holds or frees swings that are small enough, so that the period of small swings is
     that of the smallest that were seen."""
@@ -284,6 +286,10 @@ class Effect:
     def believable(self, values: FloatArray) -> bool:
         """Whether fitted values are those of the thing that is named."""
         return True
+
+    def told(self, values: FloatArray) -> Mapping[str, float]:
+        """Return the coefficients of its `powers` of the angle, of the torque over omega^2."""
+        return dict(zip(self.powers, values, strict=False))
 
     def displacement(self, values: FloatArray, duration_s: float) -> float:
         """Return how far the reading is moved within a record at most, rad."""

@@ -86,6 +86,7 @@ CIRCULAR_ERROR_IN: Final[dict[str, Effect]] = {
 @enters(
     "acceleration",
     identifier="cubic-stiffness",
+    powers={"x³": 3},
     name="cubic restoring torque",
     equation=r"\omega^2 x \to \omega^2 (x + k_3 x^3)",
     parameters=(Parameter("k3", "1/rad^2", -100.0, 100.0, word="cubic stiffness"),),
@@ -121,6 +122,7 @@ def quadratic_stiffness(motion: Motion, pendulum: Pendulum, k2: float) -> FloatA
 @enters(
     "acceleration",
     identifier="amplitude-linear-stiffness",
+    powers={"x|x|": 2},
     name="restoring torque with x|x|",
     equation=r"\omega^2 x \to \omega^2 (x + \kappa\, x |x|)",
     parameters=(Parameter("kappa", "1/rad", -30.0, 30.0, word="stiffness with x|x|"),),
