@@ -21,11 +21,11 @@ def kernels() -> list[Kernel]:
     from pendpipe.analysis.fit import rounding
     from pendpipe.analysis.turning_points import find, long_records, measure
     from pendpipe.dynamics import any_law, eq8, march
-    from pendpipe.effects import two_planes
+    from pendpipe.effects import catalogue, two_planes
     from pendpipe.physics import lengthening
 
     fits = (noise, half_cycles, free_decay, find, measure, long_records, demodulation, rounding)
-    modules = (march, eq8, any_law, *fits, two_planes, solve, lengthening)
+    modules = (march, eq8, any_law, *fits, two_planes, catalogue.losses, solve, lengthening)
     own = [each for module in modules for each in vars(module).values() if isinstance(each, Kernel)]
     called = {id(part) for each in own for part in each.parts()[1:]}
     return [each for each in own if id(each) not in called]

@@ -302,13 +302,16 @@ class Model(Eq8Model):
     def law(self, value: FloatArray) -> Law:
         """Return x'' + omega^2 x of the baseline and of all effects, as a function of a motion."""
         pendulum = self.pendulum(value)
+        # Another form is in the pendulum already.
+        others = [(effect, value[place]) for effect, place in self.places() if not effect.form]
 
         def acceleration(motion: Motion) -> FloatArray:
-            def of(effect: Effect, own: FloatArray) -> FloatArray | None:
-                # Another form is in the pendulum already.
-                return None if effect.form else effect.acceleration(motion, pendulum, own)
-
-            return self._added(pendulum.along(motion), value, of)
+            total = pendulum.along(motion)
+            for effect, own in others:
+                extra = effect.acceleration(motion, pendulum, own)
+                if extra is not None:
+                    total = total + extra
+            return total
 
         return acceleration
 
@@ -511,10 +514,13 @@ def _jacobian(at: Evaluated) -> FloatArray:
     model, value, pendulum = at.model, at.value, at.span.pendulum
     sampled, tangent = at.sampled, at.tangent
     columns = np.empty((len(at.reading), model.size), order="F")
-    changes = {index: tangent.of_force(_by_loss(at, index)) for index in (A, B, C, SHARE)}
+    losses = A, B, C, SHARE
+    by_loss = tangent.of_force(np.stack([_by_loss(at, index) for index in losses]))
+    changes = dict(zip(losses, zip(*by_loss, strict=True), strict=True))
     changes[OMEGA] = _by_omega(at)
-    for index, change in changes.items():
-        columns[:, index] = sampled.change(*change)
+    for index, change in zip(losses, sampled.change(*by_loss), strict=True):
+        columns[:, index] = change
+    columns[:, OMEGA] = sampled.change(*changes[OMEGA])
     if model.seen == "rate":
         # At the same amplitude and phase it is larger.
         columns[:, OMEGA] += sampled.angle / float(value[OMEGA])

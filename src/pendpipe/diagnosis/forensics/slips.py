@@ -13,6 +13,7 @@ One changes chi^2 more than physics.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -35,6 +36,9 @@ _SLOW_CYCLES: Final = 10.0
 """Cycles in which a level, or a rate, may turn once: slips are single, a drift is slow."""
 _HARMONICS: Final = 3
 """Of the motion that may drift: a pendulum at 60 degrees has 6e-5 of its swing in the fifth."""
+_SAME: Final = 1e-12
+"""Singular value of steps' products over the largest, below which two steps are one: rounding
+errors of ten thousand readings."""
 _NUMBERS: Final = 1 << 22
 """Numbers in the basis of what varies slowly, at most."""
 _MOST: Final = 150
@@ -141,68 +145,104 @@ def whole_steps(evidence: Evidence, unit: FloatArray) -> Slips | None:
     if fit.chi2 <= CLEAN * data.used and not evidence.noise.coloured:
         return None
     unit, whole_left = unit * data.weight, evidence.error * data.weight
-    slow = _slow(data, fit)
-    known = slow.shape[1]
-    basis = np.empty((len(slow), known + _MOST), order="F")
-    basis[:, :known] = slow
-    left = whole_left - slow @ (slow.T @ whole_left)
-    whole = _later(unit**2)
-    alone = whole - np.sum(_later(unit[:, None] * slow) ** 2, axis=1)
-    found: list[int] = []
+    steps = _Steps(unit, _slow(data, fit), _later(unit**2))
+    first = left = whole_left - steps.slow @ (steps.slow.T @ whole_left)
+    alone = steps.alone([len(left)])[len(left)]
+    found = np.zeros(0, dtype=np.int64)
     for _ in range(_MOST):
-        seen = alone > 1e-6 * whole[0]
+        seen = alone > 1e-6 * steps.squares[0]
         gain = np.where(seen, _later(unit * left) ** 2 / np.where(seen, alone, 1.0), 0.0)
         row = int(np.argmax(gain))
         if gain[row] < (2.0 * math.log(len(left)) + _CHOICE) * spread(left) ** 2:
             break
-        found.append(row)
-        column = _steps(np.array([row]), unit)[:, 0]
-        # Twice, lest rounding leave a part of what is known.
-        for _ in range(2):
-            column = column - basis[:, :known] @ (basis[:, :known].T @ column)
+        found = np.append(found, row)
+        # What the steps before leave of it.
+        products = steps.products(found)
+        sizes = np.append(-np.linalg.solve(products[:-1, :-1], products[:-1, -1]), 1.0)
+        column = steps.beside(found, sizes)
         column /= np.linalg.norm(column)
         left = left - column * float(column @ left)
         alone -= _later(unit * column) ** 2
-        basis[:, known] = column
-        known += 1
-    rows = np.sort(np.array(found, dtype=np.int64))
+    rows = np.sort(found)
     # All sizes together, beside what varies slowly; again where each has its best place.
-    left, free = whole_left - slow @ (slow.T @ whole_left), None
+    free = None
     while len(rows) >= _FEWEST:
-        columns = _steps(rows, unit)
-        columns -= slow @ (slow.T @ columns)
-        sizes = np.asarray(np.linalg.lstsq(columns, left, rcond=1e-10)[0], dtype=np.float64)
-        kept, slips = np.abs(sizes) > 0.5, Slips(rows, sizes, free)
+        right = _later(unit * first)[rows]
+        sizes = np.asarray(np.linalg.lstsq(steps.products(rows), right, rcond=_SAME)[0])
+        kept, slips = np.abs(sizes) > 0.5, Slips(rows, sizes.astype(np.float64), free)
         if not kept.all():
             rows = rows[kept]
         elif free or slips.p_value > FALSE_ALARM:
             return slips
         else:
-            rows, free = _at_best_places(slips, unit, slow, left), slips
+            rows, free = _at_best_places(slips, steps, first), slips
     return None
 
 
-def _at_best_places(slips: Slips, unit: FloatArray, slow: FloatArray, left: FloatArray) -> IntArray:
+class _Steps(NamedTuple):
+    """Steps of a unit beside what varies slowly.
+
+    A step is its unit from one reading on, so that products of steps are sums over the unit from
+    the later one on, and no step need be kept as a column.
+
+    Parameters
+    ----------
+    unit
+        What a step of one changes in each reading, shape (n,).
+    slow
+        An orthonormal basis of what varies slowly, shape (n, k).
+    squares
+        Sums of the squares of the unit from each reading on, shape (n,).
+    """
+
+    unit: FloatArray
+    slow: FloatArray
+    squares: FloatArray
+
+    def alone(self, lengths: Sequence[int]) -> dict[int, FloatArray]:
+        """Return the squares of what is left of a unit over some lengths from each reading on."""
+        found = {length: _between(self.squares, length) for length in lengths}
+        for column in self.slow.T:
+            later = _later(self.unit * column)
+            for length, squares in found.items():
+                squares -= _between(later, length) ** 2
+        return found
+
+    def products(self, rows: IntArray) -> FloatArray:
+        """Return the inner products of what is left of steps at some readings."""
+        order = np.argsort(rows)
+        edges = rows[order]
+        slow = np.empty((len(rows), self.slow.shape[1]))
+        total = np.zeros(self.slow.shape[1])
+        for place, start, stop in zip(
+            order[::-1], edges[::-1], [len(self.unit), *edges[:0:-1]], strict=True
+        ):
+            total = total + self.unit[start:stop] @ self.slow[start:stop]
+            slow[place] = total
+        return np.asarray(self.squares[np.maximum.outer(rows, rows)] - slow @ slow.T)
+
+    def beside(self, rows: IntArray, sizes: FloatArray) -> FloatArray:
+        """Return what is left of the sum of steps, shape (n,)."""
+        stairs = np.zeros(len(self.unit))
+        np.add.at(stairs, rows, sizes)
+        steps = self.unit * np.cumsum(stairs)
+        return np.asarray(steps - self.slow @ (self.slow.T @ steps))
+
+
+def _at_best_places(slips: Slips, steps: _Steps, left: FloatArray) -> IntArray:
     """Return where whole steps leave least, and units that are lost and soon regained.
 
     A search that adds one step after the other has placed the first ones without the last, and sees
     no two that make good for each other.
     """
-    rows, sizes, count = slips.rows, slips.whole, len(unit)
+    rows, sizes, unit, beside = slips.rows, slips.whole, steps.unit, steps.beside
+    count = len(unit)
     lengths = np.unique(np.geomspace(2, count // 2, _LENGTHS).astype(np.int64)).tolist()
-    alone = {
-        length: _between(unit**2, length)
-        - np.sum(_between(unit[:, None] * slow, length) ** 2, axis=1)
-        for length in (count, *lengths)
-    }
-
-    def beside(rows: IntArray, sizes: FloatArray) -> FloatArray:
-        steps = _steps(rows, unit) @ sizes
-        return np.asarray(steps - slow @ (slow.T @ steps))
+    alone = steps.alone([count, *lengths])
 
     def gain(size: float, length: int) -> FloatArray:
         """By how much it lowers the squares, shape (n,), from each reading on."""
-        return np.asarray(2.0 * size * _between(unit * left, length) - size**2 * alone[length])
+        return 2.0 * size * _between(_later(unit * left), length) - size**2 * alone[length]
 
     left = left - beside(rows, sizes)
     price = 2.0 * (2.0 * math.log(count) + _CHOICE) * spread(left) ** 2
@@ -223,14 +263,13 @@ def _at_best_places(slips: Slips, unit: FloatArray, slow: FloatArray, left: Floa
     return np.sort(rows)
 
 
-def _later(columns: FloatArray) -> FloatArray:
-    """Sum each column from every reading on."""
-    return np.asarray(np.cumsum(columns[::-1], axis=0)[::-1])
+def _later(column: FloatArray) -> FloatArray:
+    """Sum a column from every reading on."""
+    return np.asarray(np.cumsum(column[::-1])[::-1])
 
 
-def _between(columns: FloatArray, length: int) -> FloatArray:
-    """Sum each column over `length` readings from every reading on."""
-    later = _later(columns)
+def _between(later: FloatArray, length: int) -> FloatArray:
+    """Sum over `length` readings from every reading on, from sums to the end."""
     return np.concatenate([later[:-length] - later[length:], later[-length:]])
 
 
@@ -254,13 +293,9 @@ def _slow(data: Data, fit: Fit) -> FloatArray:
         turns = harmonic * sampled.phase[:, None]
         parts += [waves * np.cos(turns), waves * np.sin(turns)]
     parts.append(fit.at.jacobian[:, list(fit.free)])
-    columns = np.concatenate(parts, axis=1) * data.weight[:, None]
+    columns = np.concatenate(parts, axis=1)
+    columns *= data.weight[:, None]
     return span_of(columns, 1e-6)
-
-
-def _steps(rows: IntArray, unit: FloatArray) -> FloatArray:
-    """Return what steps change in the readings, shape (n, steps)."""
-    return np.where(np.arange(len(unit))[:, None] >= rows, unit[:, None], 0.0)
 
 
 def find_counts(evidence: Evidence) -> Finding | None:

@@ -1,5 +1,7 @@
 """Losses: friction and drag that follow amplitude, velocity or history; dry contacts; a fluid."""
 
+from __future__ import annotations
+
 import math
 from typing import Final
 
@@ -8,6 +10,7 @@ import numpy as np
 from pendpipe.arrays import FloatArray
 from pendpipe.dynamics.any_law import Motion
 from pendpipe.dynamics.half_derivative import half_derivative
+from pendpipe.dynamics.kernel import kernel
 from pendpipe.effects.effect import (
     Parameter,
     Pendulum,
@@ -211,20 +214,20 @@ def presliding_friction(
     left = np.exp(-(np.abs(motion.angle - motion.turning_angle) / breakaway))
     # z in closed form since the last reversal, in the direction of motion:
     # z/z_c = 1 - (1 - s) e^(-moved), s at the reversal.
-    start = _at_reversals(left[:, -1])[:, None]
+    start = np.empty((len(left), 1))
+    _at_reversals(left[:, -1].copy(), start[:, 0])
     deflection = breakaway * (1.0 - (1.0 - start) * left)
     size = stiffness * pendulum.angular_frequency**2
     return np.asarray(-size * motion.direction * deflection)
 
 
-def _at_reversals(left: FloatArray) -> FloatArray:
-    """z/z_c at the start of each half cycle, in the direction that follows."""
-    found = []
+@kernel()
+def _at_reversals(left: FloatArray, found: FloatArray) -> None:
+    """Write z/z_c at the start of each half cycle, in the direction that follows."""
     deflection = (left[0] - 1.0) / (left[0] + 1.0)
-    for part in left.tolist():
-        found.append(deflection)
-        deflection = (1.0 - deflection) * part - 1.0
-    return np.array(found)
+    for k in range(left.size):
+        found[k] = deflection
+        deflection = (1.0 - deflection) * left[k] - 1.0
 
 
 _RESOLVED: Final = 0.65
