@@ -129,6 +129,17 @@ LISTED: Final = 0.05
 """Probability from which a description counts in an average; as from which a rival is listed."""
 NAMED: Final = 0.5
 """Probability from which causes are named, two or three of a class together."""
+ALONE: Final = 0.8
+"""Probability from which a cause is named without its rivals."""
+MOST_NAMES: Final = 3
+"""In a sentence: more are no finding."""
+
+
+def named_together(shares: Sequence[float], most: int = MOST_NAMES) -> int:
+    """Return how many of a class are named, the most likely first; none where more were needed."""
+    listed = max(sum(share >= LISTED for share in shares), 1)
+    count = 1 if shares[0] >= ALONE else min(listed, MOST_NAMES)
+    return count if sum(shares[:count]) >= NAMED and count <= most else 0
 
 
 def averaged(estimates: Sequence[Estimate], probabilities: Sequence[float]) -> Estimate:

@@ -17,6 +17,11 @@ CLASS: Final = 6.0
 """A rival whose likelihood is within exp(-3) of the best one's is in its class (chi^2)."""
 
 
+CHOICE: Final = 7.4
+"""Price of a name or curve beside a remaining misfit, in chi^2: it is one of forty (2 ln 40)."""
+FURTHER: Final = 22.0
+"""Price of each further name: a choice, in data that need two at once, which is as rare
+again as two choices."""
 NEAR: Final = 16.0
 """Twice the log-likelihood by which a lead may be behind the best and still win in the end."""
 REACH: Final = 0.3
@@ -33,6 +38,11 @@ def shares(logs: FloatArray) -> FloatArray:
     """Return probabilities, of which one is true, from their logarithms, shape kept."""
     weights = np.exp(logs - np.max(logs))
     return np.asarray(weights / weights.sum())
+
+
+def price_of_another(names: int) -> float:
+    """Return the price of a name beside others."""
+    return FURTHER if names else CHOICE
 
 
 def unit_rows(

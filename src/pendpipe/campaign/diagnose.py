@@ -27,6 +27,7 @@ from pendpipe.campaign.next_runs import NextRun, next_measurements
 from pendpipe.campaign.search import NOTHING_MISSING, CampaignSearch, Found
 from pendpipe.campaign.seen import (
     PULLED,
+    Excess,
     Far,
     Groups,
     bump,
@@ -41,7 +42,7 @@ from pendpipe.campaign.seen import (
 )
 from pendpipe.campaign.values import campaign_values
 from pendpipe.diagnosis.found import FoundEffect, Location, Mate
-from pendpipe.estimate import LISTED, Estimate, averaged
+from pendpipe.estimate import LISTED, Estimate, averaged, named_together
 from pendpipe.files import plain
 from pendpipe.levels import FALSE_ALARM
 
@@ -398,9 +399,9 @@ def _rows(search: CampaignSearch, ranked: Sequence[Sequence[NextRun]]) -> list[t
             if search.scatter
             else "",
         ),
-        ("most probable", ", beside ".join(map(_likely, search.found))),
+        ("most probable", ", beside ".join(filter(None, map(_likely, search.found)))),
         ("or", f"{off(search.suspect)}: take it anew first" if search.suspect else ""),
-        *(("beside it", _others(one)) for one in search.found),
+        *(("or else", _others(one)) for one in search.found),
         *(
             ("decide by", _deciding(runs) if one.rivals else "")
             for one, runs in zip(search.found, ranked, strict=True)
@@ -427,8 +428,8 @@ _MOST_PULLED: Final = 5
 
 
 def seen_in(search: CampaignSearch) -> list[dict[str, Any]]:
-    """Return what the records show, where the model does not describe them."""
-    if search.described:
+    """Return what the records show beyond the model, whatever its cause."""
+    if not search.missing:
         return []
     fit = search.baseline
     found: list[dict[str, Any]] = []
@@ -458,39 +459,60 @@ def _kinds(fit: JointFit, kinds: Groups) -> str:
 
 
 def _where(search: CampaignSearch) -> dict[str, Any]:
-    """Return the extent of what is left: the loss in the fluid against frequency, or a scatter.
+    """Return the extent of what is left: the loss against frequency, or a scatter.
 
     A scatter beyond a digit is no error of records: inputs far from what is told hold it.
     """
     factor, _ = scatter(search.improved)
-    if is_orderly(search.improved) or factor.value > WRONG:
-        told = told_by_frequency(search.baseline)
-        _, frequency, excess, _ = told_and_measured(told, wet=True)
-        low, high = int(np.argmin(excess)), int(np.argmax(excess))
-        least, most = (
-            f"{100.0 * excess[at]:+.1f} % at {frequency[at]:.2g} Hz" for at in (low, high)
-        )
-        text = f"the loss in the fluid differs from what is told by {least}, {most}"
-        return {"kind": "order", "excess": [excess[low], excess[high]], "text": text}
-    text = f"the records scatter {factor.value:.2g} times more than their errors say"
-    return {"kind": "scatter", "factor": factor.as_json(), "text": text}
+    if not (search.found or is_orderly(search.improved) or factor.value > WRONG):
+        text = f"the records scatter {factor.value:.2g} times more than their errors say"
+        return {"kind": "scatter", "factor": factor.as_json(), "text": text}
+    told = told_by_frequency(search.baseline)
+    parts = [told_and_measured(told, wet) for wet in (True, False)]
+    # Where it stands out most beyond its errors.
+    part = max((each for each in parts if len(each.records)), key=_stands_out)
+    rows, frequency = part.records, part.frequency_hz
+    excess = told.data.values[rows, 1] / told.prediction[rows, 1] - 1.0
+    low, high = int(np.argmin(excess)), int(np.argmax(excess))
+    least, most = (f"{100.0 * excess[at]:+.2g} % at {frequency[at]:.2g} Hz" for at in (low, high))
+    where = "in the fluid" if part is parts[0] else "without a fluid"
+    text = f"the loss {where} differs from what is told by {least}, {most}"
+    return {"kind": "order", "excess": [excess[low], excess[high]], "text": text}
+
+
+def _stands_out(part: Excess) -> float:
+    return float(np.max(np.abs(part.excess / part.sd)))
 
 
 def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
+def _split(one: Found) -> tuple[list[tuple[JointFit, float]], list[tuple[JointFit, float]]]:
+    """Return those of a class that are named, and the rest: A, A or B, or none."""
+    members = [(one.leader, one.probability), *one.rivals]
+    count = named_together([share for _, share in members])
+    return members[:count], members[count:]
+
+
 def _likely(one: Found) -> str:
-    """Print a cause with its size, its probability and what it explains."""
-    last, shape = one.leader.last, one.leader.added[-1].shape
-    size = f"{_words(last.parameter.name)} {one.leader.size()}"
+    """Print a cause, or the two or three that share the probability, and what they explain."""
+    named, _ = _split(one)
+    causes = " or ".join(f"{_sized(fit)} {percent(share)}" for fit, share in named)
+    return f"{causes}, chi^2 falls by {one.delta_chi2:.0f}" if named else ""
+
+
+def _sized(fit: JointFit) -> str:
+    last, shape = fit.last, fit.added[-1].shape
+    size = f"{_words(last.parameter.name)} {fit.size()}"
     size += f" at {_of(shape)}" if last.finer else ""
-    return f"{last.name} ({size}) {percent(one.probability)}, chi^2 falls by {one.delta_chi2:.0f}"
+    size += f" in {shape}" if isinstance(shape, str) and shape not in last.name else ""
+    return f"{last.name} ({size})"
 
 
 def _others(one: Found) -> str:
     """Print the rest of its class, and nothing at all."""
-    rivals = [(rival.last.name, share) for rival, share in one.rivals]
+    rivals = [(rival.last.name, share) for rival, share in _split(one)[1]]
     nothing = [("nothing at all", one.nothing)] if one.nothing >= FALSE_ALARM else []
     return ", ".join(f"{name} {percent(share)}" for name, share in (*rivals, *nothing))
 

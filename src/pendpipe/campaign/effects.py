@@ -99,6 +99,10 @@ def campaign_effect(
     return declare
 
 
+def _dragged(terms: Terms, factor: FloatArray) -> Terms:
+    return replace(terms, steady=terms.steady * factor, history=terms.history * factor)
+
+
 @campaign_effect(
     "terms",
     "uniform-drag-excess",
@@ -113,8 +117,7 @@ def uniform(terms: Terms, size: FloatArray) -> Terms:
     Roughness thinner than the boundary layer, swollen wood, bubbles. Area, radius and lever
     beyond their errors look the same.
     """
-    factor = 1.0 + size
-    return replace(terms, steady=terms.steady * factor, history=terms.history * factor)
+    return _dragged(terms, 1.0 + size)
 
 
 @campaign_effect(
@@ -446,6 +449,43 @@ def moment_of_inertia(
     return replace(terms, inertia=terms.inertia + size * np.array(there, dtype=np.float64))
 
 
+def _wet_branches(design: Design) -> Sequence[str]:
+    runs = zip(design.runs, design.wet, strict=True)
+    found = list(dict.fromkeys(run.branch for run, wet in runs if wet))
+    return found if len(found) > 1 else []
+
+
+@campaign_effect(
+    "terms",
+    "branch-loss",
+    "another drag in the records of one branch",
+    r"D \to (1 + \epsilon) D \text{ in one branch}",
+    Parameter("excess", "", -0.5, 1.0),
+    0.1,
+    _wet_branches,
+)
+def branch_loss(terms: Terms, size: FloatArray, design: Design, shape: str) -> Terms:
+    """One factor for all records of a branch: taken in another fluid, or on another day."""
+    there = np.array([run.branch == shape for run in design.runs], dtype=np.float64)
+    return _dragged(terms, 1.0 + size * there)
+
+
+@campaign_effect(
+    "terms",
+    "drag-exponent",
+    "a drag that grows with another power of the frequency",
+    r"D \to D\, (\omega/\bar\omega)^n",
+    Parameter("exponent_excess", "", -1.0, 1.0),
+    0.2,
+    drag_law=True,
+)
+def drag_exponent(terms: Terms, size: FloatArray, design: Design) -> Terms:
+    """A body that is no smooth sphere, or a flow that is not laminar, about the records' middle."""
+    log = np.log(terms.angular_frequency)
+    log = log - np.mean(log[..., design.wet > 0.0], axis=-1, keepdims=True)
+    return _dragged(terms, np.exp(size * log))
+
+
 WRONG: Final = 10.0
 """Stated errors by which a wrong input is off, or factor of errors that are stated: a digit."""
 
@@ -475,7 +515,7 @@ def wrong_inputs(design: Design) -> list[CampaignEffect]:
 
 def _drag_of_one(terms: Terms, size: FloatArray, design: Design, shape: str) -> Any:
     there = np.array([run.record == shape for run in design.runs], dtype=np.float64)
-    return uniform.put(terms, size * there, design, None)
+    return _dragged(terms, 1.0 + size * there)
 
 
 DRAG_OF_ONE_RECORD: Final = CampaignEffect(

@@ -32,7 +32,15 @@ from pendpipe.campaign.seen import (
 )
 from pendpipe.estimate import Estimate, chi_square_p_value
 from pendpipe.levels import FALSE_ALARM
-from pendpipe.score import CLASS, shares, trials_of, unit_rows, within_reach
+from pendpipe.score import (
+    CHOICE,
+    CLASS,
+    price_of_another,
+    shares,
+    trials_of,
+    unit_rows,
+    within_reach,
+)
 from pendpipe.search import descend
 
 MOST_EFFECTS: Final = 3
@@ -126,8 +134,10 @@ class CampaignSearch:
     @property
     def score(self) -> float:
         """-2 ln L, with the prices of causes, of records left out, and of larger errors."""
-        far = len(self.left_out) * FAR_SIGMA**2
-        return self.improved.chi2 + self.widened + sum(one.price for one in self.found) + far
+        names = len(self.found) + bool(self.left_out)  # records may well be foreign for one reason
+        prices = [price_of_another(number) - CHOICE for number in range(names)]
+        prices += [one.price for one in self.found] + [FAR_SIGMA**2 for _ in self.left_out]
+        return self.improved.chi2 + self.widened + sum(prices)
 
     @property
     def key(self) -> tuple[frozenset[Any], frozenset[str], bool]:

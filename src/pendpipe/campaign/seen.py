@@ -289,4 +289,5 @@ _MEDIAN: Final = 0.6745
 
 def has_shape(fit: JointFit) -> bool:
     """Whether the records differ from the model by more than a scatter: by an order, or kinds."""
-    return bool(groups(fit) or bump(fit)) or is_orderly(fit)
+    kinds = isinstance(fit.design, Design) and bool(groups(fit) or bump(fit))
+    return kinds or is_orderly(fit)

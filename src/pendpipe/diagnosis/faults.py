@@ -18,11 +18,12 @@ from pendpipe.diagnosis.detect import TESTS_SHARE
 from pendpipe.diagnosis.forensics import FINDERS, Finder
 from pendpipe.diagnosis.forensics.evidence import Evidence
 from pendpipe.diagnosis.found import Finding
-from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Task, is_further, price_of_another
+from pendpipe.diagnosis.hypothesis import RANDOM, Hypothesis, Task, is_further
 from pendpipe.diagnosis.instants import with_better_instants
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import SETTLED, Fit, refine
 from pendpipe.dynamics.any_law import NoMotionError
+from pendpipe.score import price_of_another
 
 _SHARE_OF_EACH: Final = TESTS_SHARE / len(FINDERS)
 _MOST_ROUNDS: Final = 12

@@ -54,17 +54,13 @@ from pendpipe.effects.catalogue.reading import (
 )
 from pendpipe.effects.catalogue.restoring import CIRCULAR_ERROR_IN, circular_error
 from pendpipe.effects.curves import CURVES, Curve
+from pendpipe.score import price_of_another
 
 if TYPE_CHECKING:
     from pendpipe.diagnosis.rivals import Rival
 
 MOST_EFFECTS: Final = 4
 """That are added: a choice, of time."""
-CHOICE: Final = 7.4
-"""Price of a name or curve beside a remaining misfit: it is one of some forty (2 ln 40)."""
-FURTHER: Final = 22.0
-"""Price of each further name: a choice, in a recording that needs two at once, which is as rare
-again as two choices."""
 RANDOM: Final = ("jitter", "broadband-drive")
 """Faults that count as names: a random cause can take what a wrong name leaves."""
 _ESTIMATE_AGAIN: Final = 0.95
@@ -112,11 +108,6 @@ def price(steps: Sequence[Step]) -> float:
     """Return the charges of a set of effects, with the prices of names and of predictions."""
     names = sum(map(price_of_another, range(sum(map(is_further, steps)))))
     return names + sum(step.winner.charge + step.predicted_worse for step in steps)
-
-
-def price_of_another(names: int) -> float:
-    """Return the price of a name beside others."""
-    return FURTHER if names else CHOICE
 
 
 def is_further(step: Step) -> bool:

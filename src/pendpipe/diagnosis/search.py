@@ -32,7 +32,6 @@ from pendpipe.diagnosis.detect import (
 from pendpipe.diagnosis.faults import correct, examine
 from pendpipe.diagnosis.held_out import predicted_worse
 from pendpipe.diagnosis.hypothesis import (
-    CHOICE,
     MOST_EFFECTS,
     Hypothesis,
     Step,
@@ -40,7 +39,6 @@ from pendpipe.diagnosis.hypothesis import (
     first_noise,
     is_further,
     price,
-    price_of_another,
     settled,
     undrawn,
 )
@@ -75,7 +73,7 @@ from pendpipe.effects.catalogue.in_time import PlaneCoupling
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES
 from pendpipe.estimate import LISTED, NAMED
 from pendpipe.quantities import compact
-from pendpipe.score import NEAR, Trials
+from pendpipe.score import CHOICE, NEAR, Trials, price_of_another
 from pendpipe.search import descend
 
 

@@ -25,17 +25,13 @@ from pendpipe.diagnosis.seen import Seen
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier, declared
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES
 from pendpipe.effects.effect import Effect
-from pendpipe.estimate import LISTED, NAMED, Z95, Estimate
+from pendpipe.estimate import ALONE, LISTED, MOST_NAMES, NAMED, Z95, Estimate, named_together
 from pendpipe.files import fields_of
 from pendpipe.levels import FALSE_ALARM
 from pendpipe.quantities import compact, listed, with_error
 
 BASELINES: Final = {"eq8": "Eq. 8", "viscous": "the viscous model (Eq. 3)"}
 """The baselines in words."""
-_ALONE: Final = 0.8
-"""Probability from which a cause is named without its rivals."""
-_MOST_NAMES: Final = 3
-"""In a sentence: more are no finding."""
 DOUBTFUL: Final = 0.05
 """Probability up to which a name only describes and is not to be quoted."""
 _SURE: Final = 0.95
@@ -334,7 +330,7 @@ def causes_of(found: Sequence[FoundEffect]) -> list[Cause]:
 
     Effects for which the same curve of unknown form is most likely are one cause.
     """
-    room, said, curves = _MOST_NAMES, dict[int, Cause](), dict[str, Cause]()
+    room, said, curves = MOST_NAMES, dict[int, Cause](), dict[str, Cause]()
     for effect in sorted(found, key=lambda each: -class_of(each)[0][0]):
         cause = curves.get(class_of(effect)[0][2])
         if cause is None:
@@ -348,11 +344,10 @@ def causes_of(found: Sequence[FoundEffect]) -> list[Cause]:
 def _cause(effect: FoundEffect, room: int) -> Cause:
     """Name a cause, or two or three that share one half; nothing where more would be needed."""
     members = class_of(effect)
-    likely = [each for each in members if each[0] >= LISTED] or members[:1]
-    likely = members[:1] if members[0][0] >= _ALONE else likely[:_MOST_NAMES]
-    total = min(sum(p for p, *_ in likely), 1.0)
-    if total < NAMED or len(likely) > room:
+    likely = members[: named_together([p for p, *_ in members], room)]
+    if not likely:
         return Cause(effect)
+    total = min(sum(p for p, *_ in likely), 1.0)
     (_, first, identifier), *others = likely
     numbers = numbers_of(effect) if identifier == effect.identifier and not others else ""
     if not others and effect.curve and effect.curve["name"] in NAMES_OF_CURVES.get(identifier, ()):
@@ -361,9 +356,7 @@ def _cause(effect: FoundEffect, room: int) -> Cause:
     inside = "; ".join(filter(None, (numbers, f"{percent(total)}{together}")))
     names = " or ".join([first, *(name for _, name, _ in others)])
     names = (
-        f"probably {names}"
-        if total < _ALONE and not others and identifier not in UNNAMED
-        else names
+        f"probably {names}" if total < ALONE and not others and identifier not in UNNAMED else names
     )
     return Cause(effect, f"{names} ({inside})", tuple(each for *_, each in likely))
 
@@ -595,7 +588,7 @@ def test_of(effect: FoundEffect) -> str:
     Where no name leads with 80 % it is that which tells apart what the likely ones differ in.
     """
     p, _, leader = class_of(effect)[0]
-    if p < _ALONE and (apart := _differing(effect)):
+    if p < ALONE and (apart := _differing(effect)):
         return _APART[apart][1]
     tests = {each.identifier: each.discriminating_test for each in reversed(CURVES)}
     tests |= {each.identifier: each.discriminating_test for each in CATALOGUE}
