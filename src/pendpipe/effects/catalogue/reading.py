@@ -570,7 +570,7 @@ def offset_step(sampled: Sampled, pendulum: Pendulum, jump: float, instant_s: fl
     "delay",
     Sudden,
     identifier="dropped-samples",
-    name="dropped samples",
+    name="lost samples, or a jump of the clock",
     equation=r"t \to t + d\, H(t - t_k)",
     parameters=(Parameter("d", "s", -1e5, 1e5, word="lost time"), INSTANT),
     tried=64,
