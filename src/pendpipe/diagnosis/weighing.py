@@ -53,10 +53,13 @@ def weigh(found: Hypothesis, step: Step) -> Step:
     others = [rival for rival in step.rivals if rival.identifier != effect.identifier]
     mates = _best_of_each([mate for mate in others if of_one_class(own, mate)])
     # An effect that every pendulum has gets its prior against rivals and against "none of these".
-    none = own.evidence - max(own.prior, 0.0) - _clean_charge(found)
+    none = own.evidence - max(own.prior, 0.0)
     gain = step.before.chi2 - found.fit.chi2
+    # A curve that leaves only noise says little: it can follow a law of another kind.
     if effect.kind != "unnamed":
-        none += _charge_for_several(found) - _little_left(found, effect, gain)
+        none += (
+            _charge_for_several(found) - _little_left(found, effect, gain) - _clean_charge(found)
+        )
     # Any law of the motion that nobody knows makes lines at its harmonics.
     none -= 2.0 * math.log(near_harmonic_by_chance(found.fit, effect))
     weights = probabilities([own, *mates], none)
