@@ -401,6 +401,10 @@ class Squares:
             raise np.linalg.LinAlgError("derivatives are not finite")
         return scaled_qr(self.columns)
 
+    def rest(self) -> None:
+        """Forget the factors: they are as large as the derivatives, which a kept point needs."""
+        vars(self).pop("factored", None)
+
     def linear(self, free: IntArray, at: Self | None = None) -> Linear:
         """About another point with the derivatives here; by default here."""
         basis, triangle, scale = self.factored
@@ -651,8 +655,8 @@ class Search(Generic[AnyPoint]):
             if self._ended or self.hopeless:
                 break
             self._round(useful)
-        # The factors are as large as the derivatives; a point that is kept needs only those.
-        vars(self.here).pop("factored", None)
+        if isinstance(self.here, Squares):
+            self.here.rest()
 
     def _cannot_reach(self, useful: float, left: int) -> bool:
         last = self._gains[-_LAST_STEPS:]

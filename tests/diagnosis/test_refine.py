@@ -61,6 +61,24 @@ from .records import (
 # Maximum likelihood: from far away, within bounds, with valid errors.
 
 
+def test_a_fit_of_very_many_readings_computes_again_what_it_no_longer_holds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    start = beginning_of(recording(Model(TIME_S, INTERVAL_S).reading(TRUTH), 2))
+    noise = white_noise(start.data, NOISE_RAD)
+    whole = refine(start.model, start.data, noise, start.value)
+    monkeypatch.setattr("pendpipe.diagnosis.refine._KEPT", 0)
+    fit = refine(start.model, start.data, noise, start.value)
+    assert "at" in vars(whole.evaluation)
+    assert "at" not in vars(fit.evaluation)
+    assert fit.chi2 == pytest.approx(whole.chi2, rel=1e-9)
+    assert noise.whiten(start.data.residual(fit.at.reading)) == pytest.approx(
+        fit.residual[:-1], abs=1e-4
+    )
+    errors = np.sqrt(np.diag(whole.covariance()))
+    assert np.sqrt(np.diag(fit.covariance())) == pytest.approx(errors, rel=1e-5)
+
+
 def test_circular_error_of_half_a_radian_is_fitted_from_the_start_of_a_law_with_x() -> None:
     """That law's frequency is off by 1.6 %, more than a turn in the record."""
     effect = by_identifier("circular-error")

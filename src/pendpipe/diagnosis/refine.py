@@ -149,6 +149,10 @@ _LARGEST_CHANGE: Final = 0.05
 """Of the frequency in one step."""
 
 
+_KEPT: Final = 100_000
+"""Readings up to which fits keep motion and derivatives: 350 bytes each, in forty fits 1.4 GB."""
+
+
 @dataclass(frozen=True)
 class Evaluation(Squares):
     """A model evaluated at some values; shapes are those of `refine.Fit`.
@@ -182,6 +186,21 @@ class Evaluation(Squares):
         # If one part of b is held, changing b changes the share.
         columns[:, B] += self.model.share_by_b(self.value) * columns[:, SHARE]
         return columns
+
+    def __getattr__(self, name: str) -> Evaluated:
+        """The model evaluated again, where that was forgotten."""
+        if name != "at":
+            raise AttributeError(name)
+        found = vars(self)["at"] = self.model.evaluate(self.value)
+        return found
+
+    def rest(self) -> None:
+        """Forget, of very many readings, what can be computed again."""
+        super().rest()
+        if len(self.residual) > _KEPT:
+            for name in ("at", "columns"):
+                vars(self).pop(name, None)
+            self.model.rest()
 
 
 def _shapes(model: Model) -> list[int]:
@@ -349,6 +368,7 @@ def best_fit(
         with suppress(NoMotionError, np.linalg.LinAlgError):
             if len(start) == model.size:
                 begun.append(searching(model, data, noise, start, held=fixed))
+                begun[-1].here.rest()
     for search in sorted(begun, key=lambda each: each.here.chi2):
         with suppress(NoMotionError, np.linalg.LinAlgError):
             search.go(ROUNDS, useful)

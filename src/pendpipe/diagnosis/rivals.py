@@ -174,6 +174,10 @@ class Rival:
     worth: float
     evidence: float
 
+    def __post_init__(self) -> None:
+        """Of what its evidence needed, keep what another needs."""
+        self.fit.evaluation.rest()
+
     @classmethod
     def of(cls, effect: Effect, fit: Fit, before: float, scale: Scale, chance: Chance) -> Rival:
         """Return the rival whose fit lowers chi^2 from `before`."""

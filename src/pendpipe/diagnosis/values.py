@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from pendpipe.analysis.fit.fitted import PARAMETERS, units
-from pendpipe.arrays import FloatArray
+from pendpipe.arrays import FloatArray, scaled_qr
 from pendpipe.diagnosis.data import Data
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.projection import whitened
@@ -382,8 +382,9 @@ def drawn_of(fit: Fit, effect: Curve, noise: Noise) -> Drawn:
         others[:, index] -= described * grown / (moved[index] - fit.value[index])
     others = others[:, [k for k in fit.free if not place.start <= k < place.stop]]
     law, columns = span_of(others, 1e-11), whitened(fit, noise, curve, ((),)).T
-    basis, seen = np.linalg.qr(columns - law @ (law.T @ columns))
-    basis, seen = basis.T / fit.error_scale, seen / fit.error_scale
+    columns -= law @ (law.T @ columns)
+    basis, triangle, lengths = scaled_qr(columns)
+    basis, seen = basis.T / fit.error_scale, triangle * lengths / fit.error_scale
     told = basis @ readings
     fitted, costs = [], []
     for variance in _SMOOTHNESS:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
@@ -247,6 +247,10 @@ class Model(Eq8Model):
         """The same, followed over so many half cycles."""
         return replace(self, half_cycles=half_cycles, _last={})
 
+    def rest(self) -> None:
+        """Keep no more of the last motion than what the next one begins with."""
+        self._last.update({name: replace(last, slopes=None) for name, last in self._last.items()})
+
     @property
     def size(self) -> int:
         """Number of values."""
@@ -476,11 +480,8 @@ def responses(
         for pair in changes
     ]
     forces = [force for force in found if force is not None]
-    # A few at a time stay in the processor's cache.
-    at_once = max(min(_AT_ONCE, _NUMBERS_AT_ONCE // tangent.motion.time_s.size), 1)
-    for first in range(0, len(forces), at_once):
-        part = slice(first, first + at_once)
-        total[part] += sampled.change(*tangent.of_force(np.stack(forces[part])))
+    for part in _a_few(range(len(forces)), tangent):
+        total[part] += sampled.change(*tangent.of_force(np.stack([forces[k] for k in part])))
     if effect.kick(changes[0][1]) is not None:
         before = at.after_kicks([effect.kick(low) for low, _ in changes])
         total += at.after_kicks([effect.kick(high) for _, high in changes]) - before
@@ -490,6 +491,13 @@ def responses(
         change += 0.0 if added is None else added
         change += 0.0 if late is None else sampled.velocity * late
     return total
+
+
+def _a_few(indices: Sequence[int], tangent: Tangent) -> Iterator[list[int]]:
+    """Yield some at a time, of which the accelerations stay in the processor's cache."""
+    at_once = max(min(_AT_ONCE, _NUMBERS_AT_ONCE // tangent.motion.time_s.size), 1)
+    for first in range(0, len(indices), at_once):
+        yield list(indices[first : first + at_once])
 
 
 def _change(
@@ -514,13 +522,13 @@ def _jacobian(at: Evaluated) -> FloatArray:
     model, value, pendulum = at.model, at.value, at.span.pendulum
     sampled, tangent = at.sampled, at.tangent
     columns = np.empty((len(at.reading), model.size), order="F")
-    losses = A, B, C, SHARE
-    by_loss = tangent.of_force(np.stack([_by_loss(at, index) for index in losses]))
-    changes = dict(zip(losses, zip(*by_loss, strict=True), strict=True))
-    changes[OMEGA] = _by_omega(at)
-    for index, change in zip(losses, sampled.change(*by_loss), strict=True):
-        columns[:, index] = change
+    changes = {OMEGA: _by_omega(at)}
     columns[:, OMEGA] = sampled.change(*changes[OMEGA])
+    for part in _a_few((A, B, C, SHARE), tangent):
+        by_loss = tangent.of_force(np.stack([_by_loss(at, index) for index in part]))
+        changes |= dict(zip(part, zip(*by_loss, strict=True), strict=True))
+        for index, change in zip(part, sampled.change(*by_loss), strict=True):
+            columns[:, index] = change
     if model.seen == "rate":
         # At the same amplitude and phase it is larger.
         columns[:, OMEGA] += sampled.angle / float(value[OMEGA])
