@@ -398,13 +398,20 @@ def test_the_curves_and_their_keys_stay_within_the_figure(content: Shown) -> Non
     told = dict.fromkeys(("value", "sd", "quadrature", "quadrature_sd", "named"), 0.01 * at)
     told |= {"at": at, "argument": "time, s", "ordinate": "torque over omega^2 y, 1"}
     told |= {"name": "", "summary": "the torque is stiffer " * 4, "named_as": name}
-    missing = [SimpleNamespace(curve=each) for each in (told, told, told | {"summary": ""})]
+    told |= {"stands_out": True, "named_quadrature": 0.03 * at}
+    missing = [SimpleNamespace(curve=each) for each in (told, told, told | {"stands_out": False})]
     figure = diagnosis.draw_curve(replace(content, diagnosis=SimpleNamespace(missing=missing)))
     FigureCanvasAgg(figure).draw()
+    first_lines = figure.axes[0].lines
     first, second = (each.get_legend().get_window_extent() for each in figure.axes)
     assert figure.bbox.y1 > first.y1 > first.y0 > figure.axes[0].title.get_window_extent().y1
     assert figure.axes[0].xaxis.label.get_window_extent().y0 > second.y1
     assert figure.axes[1].get_ylabel() == "Torque over ω² y"
+    # A part that the named effect has not is left out.
+    told |= {"named_quadrature": 0.0 * at}
+    missing = [SimpleNamespace(curve=told)]
+    figure = diagnosis.draw_curve(replace(content, diagnosis=SimpleNamespace(missing=missing)))
+    assert [len(figure.axes[0].collections), len(first_lines)] == [1, 5]
 
 
 def test_the_spectrum_of_noise_is_the_noise_level(content: Shown) -> None:
@@ -468,6 +475,7 @@ def curve(**more: Any) -> dict[str, Any]:
         "at": at,
         "value": 1e-3 * at,
         "sd": np.full(20, 1e-4),
+        "stands_out": True,
         **more,
     }
 

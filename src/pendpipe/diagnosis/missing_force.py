@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from pendpipe.analysis.fit.printed import short_size
-from pendpipe.answer import percent
+from pendpipe.answer import factor
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.detect import detect, prepare
 from pendpipe.diagnosis.hypothesis import Hypothesis, Step, undrawn
@@ -24,6 +24,7 @@ from pendpipe.diagnosis.refine import Fit, loses_phase, with_errors
 from pendpipe.diagnosis.rivals import Rival, refit_leads
 from pendpipe.diagnosis.values import Drawn, curve_values, drawn_of
 from pendpipe.dynamics.any_law import Motion
+from pendpipe.effects import Effect
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
 from pendpipe.estimate import Z95, Estimate
 from pendpipe.levels import deviations
@@ -48,6 +49,7 @@ def force_of(found: Hypothesis, step: Step) -> dict[str, Any] | None:
     likely = zip(step.weights[1:-1], step.mates, strict=True)
     drawn = [mate for _, mate in sorted(likely, key=lambda each: -each[0]) if mate.drawn]
     drawn += sorted((each for each in step.rivals if each.drawn), key=lambda each: -each.evidence)
+    drawn = [each for each in drawn if _is_of_kind(effect, each.effect)]
     if not drawn:
         if effect.local or effect.spectral or effect.kind == "parameter":
             return None
@@ -59,13 +61,24 @@ def force_of(found: Hypothesis, step: Step) -> dict[str, Any] | None:
     fit = with_errors(drawn[0].fit, found.data, found.noise)
     shown = drawn_of(fit, curve, found.noise)
     told, named = curve_told(fit, curve, shown, found.data.unit), seen_as(found.fit, fit, shown)
-    return {**told, "named": named, "named_as": effect.name}
+    parts = [None, None] if named is None else named.reshape(-1, len(shown.at))
+    names = ("named", *(f"named_{name}" for name in shown.names[1:]))
+    return {**told, **dict(zip(names, parts, strict=False)), "named_as": effect.name}
+
+
+def _is_of_kind(effect: Effect, curve: Effect) -> bool:
+    """Whether a curve is over what an effect follows: the time, else the motion or the reading."""
+    shapes = effect.parameters[effect.sizes :]
+    in_time = effect.local or effect.in_time or any(each.unit in ("s", "Hz") for each in shapes)
+    read = "measurement" in curve.identifier, effect.kind == "measurement"
+    return in_time if curve.in_time else not in_time and read[0] == read[1]
 
 
 def _curves_in_place(found: Hypothesis, step: Step) -> list[Rival]:
     """Fit the curve whose signature explains most of what an effect explains."""
     before, readings = step.before, (found.data, found.noise)
     curves = undrawn((*CURVES, *FOLLOW_UP_CURVES), before)
+    curves = [each for each in curves if _is_of_kind(step.winner.effect, each)]
     scanned = detect(prepare(before, *readings, curves), before, seed=0, known=found.scan)
     best = max(scanned.leads, key=lambda lead: lead.score, default=None)
     if best is None:
@@ -78,14 +91,17 @@ def seen_as(named: Fit, fit: Fit, drawn: Drawn) -> FloatArray | None:
     """Return what the curve of a fit would be if the readings were those of the model with a name.
 
     Both are then told beside the same baseline, whatever it takes of each, and equally smooth.
+    Of several curves one follows the other.
     """
     if named.residual.shape != fit.residual.shape:
         return None
-    return np.asarray(drawn.gain @ (drawn.readings - named.residual))[: len(drawn.at)]
+    return np.asarray(drawn.gain @ (drawn.readings - named.residual))
 
 
-def share_of_loss(fit: Fit, curve: Curve, low: float, high: float) -> float:
-    """Return which part of the work of all losses is a curve's, where its argument is within.
+def share_of_loss(
+    fit: Fit, curve: Curve, at: FloatArray, value: FloatArray, low: float, high: float
+) -> float:
+    """Return which part of the work of all losses a drawn curve does, its argument within.
 
     Zero of what is no loss, and where the losses do no work.
     """
@@ -94,11 +110,15 @@ def share_of_loss(fit: Fit, curve: Curve, low: float, high: float) -> float:
     pendulum, motion = fit.model.pendulum(fit.value), _closer(fit.at.tangent.motion)
     place = next(place for other, place in fit.model.places() if other is curve)
     inside = (low <= type(curve).along(motion)) & (type(curve).along(motion) <= high)
-    force = np.asarray(curve.acceleration(motion, pendulum, fit.value[place]))
+    drawn = curve.smooth(at)[0]
     # The work is that of each half cycle by itself, over the phase.
     own, whole = (
-        float(np.sum(_work(np.where(inside, each * motion.velocity, 0.0), motion)))
-        for each in (force, pendulum.losses(motion) + force)
+        float(np.sum(_work(np.where(inside, force * motion.velocity, 0.0), motion)))
+        for force in (
+            np.asarray(drawn.acceleration(motion, pendulum, value / drawn.scale(pendulum))),
+            pendulum.losses(motion)
+            + np.asarray(curve.acceleration(motion, pendulum, fit.value[place])),
+        )
     )
     return own / whole if whole < 0.0 else 0.0
 
@@ -119,44 +139,51 @@ def _work(power: FloatArray, motion: Motion) -> FloatArray:
 def curve_told(fit: Fit, effect: Curve, drawn: Drawn, unit: str) -> dict[str, Any]:
     """Return a fitted curve as `curve_values` does, with its ``name`` and a clause, ``summary``.
 
-    The clause says where and how large it is: of the points beyond their 95 % band on one side,
-    with none on the other side among them, those of the largest square, and their mean; of a torque
-    over the angle, that within the least of these; of a loss which part of the whole loss there it
-    is. Where none of them stands out over all knots it is empty.
+    The clause says where and how large it is: of the points whose 95 % band excludes zero on one
+    side, with none on the other side among them, those of the largest square, and their mean; of a
+    loss which part of the whole loss there it is. A torque is told as a stiffness, alike on both
+    sides of the lowest point. ``stands_out`` is whether one of them does so over all knots.
     """
     found = curve_values(fit, effect, drawn, unit)
     axes = (found[name].partition(", ") for name in ("argument", "ordinate"))
     (along, _, per), (_, _, across) = axes
-    told, most, whole = "", 0.0, found["at"]
+    told, most = f"the 95 % band of {effect.name} holds zero everywhere", (False, 0.0)
     # What is odd in the angle is the same on both sides.
-    right = whole > 0.0 if effect.is_torque else np.full(len(whole), True)
-    at = whole[right]
-    for name, both in drawn.curves(odd=effect.is_torque).items():
+    right = drawn.at > 0.0 if effect.is_torque else np.full(len(drawn.at), True)
+    at = drawn.at[right]
+    for name, (value, sd) in drawn.curves().items():
         subject, larger, smaller = effect.words[name]
-        value, sd = (each[right] / at if effect.is_torque else each for each in both)
-        whole_size = 1.0 if effect.is_torque else abs(effect.scale(fit.model.pendulum(fit.value)))
-        sure = np.abs(value) > deviations(len(effect.knots)) * sd
+        force, whole_size = value, abs(effect.scale(fit.model.pendulum(fit.value)))
+        if effect.is_torque:
+            value, sd = 0.5 * (value - value[::-1]), 0.5 * (sd + sd[::-1])
+            value, sd, whole_size = value[right] / at, sd[right] / at, 1.0
         beyond = np.flatnonzero(np.abs(value) > np.maximum(Z95 * sd, _ROUNDING * whole_size))
+        sure = np.abs(value) > deviations(len(effect.knots)) * sd
         sides = np.split(beyond, np.flatnonzero(np.diff(np.sign(value[beyond]))) + 1)
-        here = max(sides, key=lambda side: float(value[side] @ value[side] * np.any(sure[side])))
-        here = here[: len(here) * bool(np.any(sure[here]))]
-        total = float(value[here] @ value[here])
+        totals = [(bool(np.any(sure[side])), float(value[side] @ value[side])) for side in sides]
+        total, here = max(zip(totals, sides, strict=True), key=lambda each: each[0])
         if total <= most:
             continue
         # A point that stands out is no place.
         usual = np.quantile(np.abs(value[here]), 0.75)
         here, most = here[np.abs(value[here]) >= 0.5 * usual], total
-        here = here[:1] if effect.is_torque else here
         size, low, high = float(value[here].mean()), float(at[here[0]]), float(at[here[-1]])
         pure = effect.is_torque or not across
         number = f"{100.0 * abs(size):.2g} %" if pure else compact(abs(size), across)
         number += " of the restoring torque" if name == "quadrature" else ""
         place = f"from {short_size(low, per)} to {short_size(high, per)} ({along})"
-        if along == "angle" and (effect.is_torque or low <= 0.0 <= high):
+        if effect.is_torque and here[0] > 0:
+            place = f"from {short_size(low, per)} to {short_size(high, per)} off the lowest point"
+        elif along == "angle" and (effect.is_torque or low <= 0.0 <= high):
             place = f"within {short_size(max(-low, high), per)} of the lowest point"
         told = f"{subject} {larger if size > 0.0 else smaller} by {number} {place}"
-        share = share_of_loss(fit, effect, low, high)
-        told += f", {percent(abs(share))} of the loss there" if share else ""
+        share = share_of_loss(fit, effect, drawn.at, force, low, high)
+        of = (
+            f"{100.0 * share:.2g} % of" if (share := abs(share)) < 1.0 else f"{factor(share)} times"
+        )
+        told += f", {of} the loss there" if share else ""
+        told += "" if total[0] else ", or by chance"
+    found["stands_out"] = most[0]
     if effect.powers and (terms := polynomial_of(fit, unit)):
         told, found["polynomial"] = _formula(terms, fit, per), terms
     return {"name": effect.name, "summary": told, **found}

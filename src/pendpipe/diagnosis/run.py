@@ -162,7 +162,11 @@ def diagnose_recording(
     # A part of b that is held bounds b here alone.
     before, after = _models(found, None if beginning.model.parts else fit, baseline, level)
     gap = gap_note((whole or recording).time_s, 0.5 / points.apparent_frequency_hz, samples.counts)
-    stamps = tuple(note for note in (gap, *found.notes.values()) if note)
+    law = ""
+    if restoring == "sine" and found.baseline.model.restoring != "sine":
+        law = f"sin x is left out: it is of angles, for which {part.unit} need a length"
+        progress(law)
+    stamps = tuple(note for note in (law, gap, *found.notes.values()) if note)
     return Diagnosis(
         before,
         after,

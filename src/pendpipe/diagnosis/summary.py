@@ -215,7 +215,7 @@ def summarise(diagnosis: Outcome) -> Summary:
     """Make the answer of a diagnosis."""
     presumed = _presumed(diagnosis)
     found = [each for each in diagnosis.missing if each.identifier != COLOURED_NOISE]
-    seen = _seen(diagnosis.seen, presumed)
+    seen = _seen(diagnosis.seen, presumed) or _by_a_test(found)[:1]
     if not found:
         beyond = f" beyond {presumed}, which is fitted" if presumed else ""
         noise = any(each.identifier == COLOURED_NOISE for each in diagnosis.effects)
@@ -235,7 +235,7 @@ def summarise(diagnosis: Outcome) -> Summary:
     candidates = [_candidate(each.effect) for each in causes if not each.text]
     changes = _changes(diagnosis)
     rest = diagnosis.remainder is not None and diagnosis.remainder.systematic
-    family = family_of([each.effect for each in causes if not each.text])
+    family = family_of([each for each in causes if not each.text])
     if named:
         drawn = ["described by " * cause.described + text for text, cause in told.items()]
         headline, lacks = f"missing: {'; '.join(drawn)}", _lacks(list(told.values()))
@@ -248,18 +248,18 @@ def summarise(diagnosis: Outcome) -> Summary:
         headline = "its cause is NOT known" + (f": {family}" if family else "")
         headline = headline if seen else f"something is missing, {headline}"
         lacks = "The cause is not known" + (f": {family}" if family else "")
-    unit = diagnosis.unit
+    unit, where = diagnosis.unit, _where(diagnosis, causes)
     return Summary(
         f"{seen[0]}; {headline}" if seen else headline,
         tuple(named),
         _matters(diagnosis, changes, unit),
         changes,
-        _where(diagnosis, found),
+        where if where not in seen else "",
         _certainty(diagnosis, named, rest=rest),
         "; ".join(filter(None, candidates)) or ("none above 20 %" if not named else ""),
         _excluded(diagnosis, found),
-        _decide_by(found),
-        _quote(diagnosis, changes),
+        _decide_by(causes),
+        _quote(diagnosis, changes, causes),
         _sentence(diagnosis, seen, presumed, lacks),
         "; ".join(seen),
     )
@@ -342,9 +342,15 @@ def causes_of(found: Sequence[FoundEffect]) -> list[Cause]:
 
 
 def _cause(effect: FoundEffect, room: int) -> Cause:
-    """Name a cause, or two or three that share one half; nothing where more would be needed."""
+    """Name a cause, or two or three that share one half; nothing where more would be needed.
+
+    A curve is no name: it describes alone, or not at all.
+    """
     members = class_of(effect)
-    likely = members[: named_together([p for p, *_ in members], room)]
+    known = [each for each in members[:MOST_NAMES] if each[2] not in UNNAMED]
+    groups = [each for each in (known, members[:1]) if each]
+    counted = [each[: named_together([p for p, *_ in each], room)] for each in groups]
+    likely = next(filter(None, counted), [])
     if not likely:
         return Cause(effect)
     total = min(sum(p for p, *_ in likely), 1.0)
@@ -355,10 +361,8 @@ def _cause(effect: FoundEffect, room: int) -> Cause:
     together = " together" if others else ""
     inside = "; ".join(filter(None, (numbers, f"{percent(total)}{together}")))
     names = " or ".join([first, *(name for _, name, _ in others)])
-    names = (
-        f"probably {names}" if total < ALONE and not others and identifier not in UNNAMED else names
-    )
-    return Cause(effect, f"{names} ({inside})", tuple(each for *_, each in likely))
+    probably = "probably " * (total < ALONE and identifier not in UNNAMED)
+    return Cause(effect, f"{probably}{names} ({inside})", tuple(each for *_, each in likely))
 
 
 def _candidate(effect: FoundEffect) -> str:
@@ -389,17 +393,26 @@ def _differing(effect: FoundEffect) -> str:
     return "time" if len(in_time) > 1 else "sensor" if len(sensor) > 1 else ""
 
 
-def family_of(effects: Sequence[FoundEffect]) -> str:
-    """Say what the likely causes of effects without a name have in common."""
-    if not effects:
+def _subject(causes: Sequence[Cause]) -> FoundEffect | None:
+    """Return what is spoken of: of the causes with a name, else of all, the most probable class."""
+    known = [each for each in causes if each.text] or causes
+    effects = [each.effect for each in known]
+    return max(effects, key=lambda each: sum(p for p, *_ in class_of(each)), default=None)
+
+
+def family_of(causes: Sequence[Cause]) -> str:
+    """Say what the likely ones of causes without a name have in common."""
+    first = _subject(causes)
+    if first is None:
         return ""
-    first = max(effects, key=lambda each: sum(p for p, *_ in class_of(each)))
     members = class_of(first)
     if sum(p for p, *_ in members) < CANDIDATE:
         return ""
     if apart := _differing(first):
         return _APART[apart][0]
     identifier = members[0][2]
+    if moves_beside(identifier):
+        return "perhaps a second motion"
     if is_periodic(identifier):
         return "perhaps something periodic"
     if first.curve:
@@ -421,10 +434,18 @@ def kind_of(identifier: str) -> str:
 
 
 def is_periodic(identifier: str) -> bool:
-    """Whether an effect has a frequency of its own."""
+    """Whether an effect is a line or a force with a frequency of its own."""
     if identifier in UNNAMED or identifier.startswith("parameter-"):
         return False
-    return any(each.unit == "Hz" for each in by_identifier(identifier).parameters)
+    return any(each.word == "frequency" for each in by_identifier(identifier).parameters)
+
+
+def moves_beside(identifier: str) -> bool:
+    """Whether an effect is a motion beside the pendulum's that the sensor reads."""
+    if identifier in UNNAMED or kind_of(identifier) != "dynamics":
+        return False
+    effect = by_identifier(identifier)
+    return not effect.local and type(effect).reading is not Effect.reading
 
 
 def jumps(identifier: str) -> bool:
@@ -523,13 +544,16 @@ def _matters(diagnosis: Outcome, changes: Sequence[Change], unit: str) -> str:
     return f"the fit misses the readings by {left} (noise {noise}): {what}"
 
 
-def _where(diagnosis: Outcome, found: Sequence[FoundEffect]) -> str:
+def _where(diagnosis: Outcome, causes: Sequence[Cause]) -> str:
     """Say what tests have found, where the missing forces are how large, and where the rest lies.
 
-    What does not fit into a line is left out from its end.
+    A force is told of a name that it is the same law as, and of a description. What does not fit
+    into a line is left out from its end.
     """
-    first = max(found, key=lambda each: class_of(each)[0][0])
-    told = dict.fromkeys([*_by_a_test(found), *_forces((first, *found))])
+    first = _subject(causes)
+    assert first is not None
+    named = [each.effect for each in causes if each.text and each.effect is not first]
+    told = dict.fromkeys([*_by_a_test([each.effect for each in causes]), *_forces([first, *named])])
     described = class_of(first)[0][2] in UNNAMED and _forces([first])
     text = "; ".join(told if described else dict.fromkeys([*told, first.location.summary]))
     remainder = diagnosis.remainder
@@ -547,9 +571,19 @@ def _by_a_test(found: Sequence[FoundEffect]) -> list[str]:
 
 
 def _forces(found: Sequence[FoundEffect]) -> list[str]:
-    """Return where the missing forces are how large, each curve once."""
-    curves = [each.curve for each in found if each.curve and each.curve["summary"]]
-    return list({curve["name"]: curve["summary"] for curve in reversed(curves)}.values())
+    """Return where the forces of leaders are how large, each curve once.
+
+    Over the time a curve only imitates what is named.
+    """
+    told = dict[str, str]()
+    for each in found:
+        curve, leader = each.curve, class_of(each)[0][2]
+        if curve is None:
+            continue
+        own = leader == each.identifier and not curve["argument"].startswith("time")
+        if own or curve["name"] in NAMES_OF_CURVES.get(leader, ()):
+            told.setdefault(curve["name"], curve["summary"])
+    return list(told.values())
 
 
 def _certainty(diagnosis: Outcome, named: Sequence[str], *, rest: bool) -> str:
@@ -596,22 +630,23 @@ def test_of(effect: FoundEffect) -> str:
     return tests.get(leader, effect.discriminating_test)
 
 
-def _decide_by(found: Sequence[FoundEffect]) -> str:
-    """The test of what is least sure among the named, or of the first candidate."""
+def _decide_by(causes: Sequence[Cause]) -> str:
+    """The test of what is least sure among the named, or of the family."""
     doubted = [
         each
-        for each in found
-        if each.probability < _SURE or any(p > 1.0 - _SURE for _, p in each.indistinguishable)
+        for each in causes
+        if each.effect.probability < _SURE
+        or any(p > 1.0 - _SURE for _, p in each.effect.indistinguishable)
     ]
-    leaders = [(class_of(each)[0], each) for each in doubted]
-    best = max(leaders, key=lambda one: (one[0][2] not in UNNAMED, one[0][0]), default=None)
-    return test_of(best[1]) if best else ""
+    subject = _subject(doubted)
+    return test_of(subject) if subject else ""
 
 
-def _quote(diagnosis: Outcome, changes: Sequence[Change]) -> str:
+def _quote(diagnosis: Outcome, changes: Sequence[Change], causes: Sequence[Cause]) -> str:
     """What can be quoted: T0 and Q of the better model, a, b, c that stay."""
     said, unit, better = list[str](), diagnosis.unit, diagnosis.improved
-    modes = [each.parameters.get("f_2") for each in diagnosis.missing]
+    named = [each.effect for each in causes if each.effect.identifier in each.names]
+    modes = [each.parameters.get("f_2") for each in named]
     periods = [
         with_error(each.value, each.sd, "s", short=True)
         for frequency in (better.parameters.get("frequency"), *modes)

@@ -315,13 +315,11 @@ class Drawn(NamedTuple):
     gain: FloatArray
     readings: FloatArray
 
-    def curves(self, *, odd: bool = False) -> dict[str, tuple[FloatArray, FloatArray]]:
-        """Return the values and errors of each curve, or of its odd part, by name."""
-        whole = np.eye(len(self.at))
-        part = np.kron(np.eye(len(self.names)), 0.5 * (whole - whole[::-1]) if odd else whole)
-        each = zip(part @ self.value, _errors(np.asarray(part), self.covariance), strict=True)
-        rows = np.array(list(each)).reshape(len(self.names), -1, 2)
-        return {name: (row[:, 0], row[:, 1]) for name, row in zip(self.names, rows, strict=True)}
+    def curves(self) -> dict[str, tuple[FloatArray, FloatArray]]:
+        """Return the values and errors of each curve, by name."""
+        sd = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        values, sds = (each.reshape(len(self.names), -1) for each in (self.value, sd))
+        return dict(zip(self.names, zip(values, sds, strict=True), strict=True))
 
 
 def curve_values(fit: Fit, effect: Curve, drawn: Drawn, unit: str = "rad") -> dict[str, Any]:

@@ -465,7 +465,7 @@ def draw_curve(content: Shown) -> Figure:
     found = [effect.curve for effect in content.diagnosis.missing if effect.curve is not None]
     if not found:
         raise NothingToDrawError("nothing that is missing is a curve")
-    drawn = [each for each in found if each["summary"]] or found[:1]
+    drawn = [each for each in found if each["stands_out"]] or found[:1]
     below = [panel for each in drawn for panel in _curves(each)]
     # Above the axes, of two inches, stand up to two rows of a key and as many lines of a title.
     above = 0.38 + 0.18 * max(2 * bool(each.key) + 10.0 * (each.lift - 1.1) for each in below)
@@ -481,6 +481,11 @@ def _curves(drawn: Mapping[str, Any]) -> Iterator[Panel]:
     if "quadrature" in drawn:
         looks[0] = (*looks[0][:-1], "in phase")
         looks.append(("quadrature", "quadrature_sd", GREEN, "--", "in quadrature"))
+    named = {"value": drawn.get("named"), "quadrature": drawn.get("named_quadrature")}
+    if (other := named["quadrature"]) is not None:
+        # A part that a named effect has not would hide the one that it has.
+        reach = 1.96 * np.asarray(drawn["quadrature_sd"])
+        looks = looks[: 1 + bool(np.any(np.abs(np.asarray(other)) > reach))]
     name, _, unit = str(drawn["ordinate"]).replace("omega^2", "ω²").partition(", ")
     largest = max(float(np.max(np.abs(drawn[key]))) for key, *_ in looks)
     factor, short = prefixed(largest, unit) if unit in ("rad", "m") else (1.0, unit)
@@ -491,12 +496,14 @@ def _curves(drawn: Mapping[str, Any]) -> Iterator[Panel]:
             band(at, value, 1.96 * factor * np.asarray(drawn[sd]), colour),
             curve(at, value, colour, dashes, label=label),
         ]
-    if drawn.get("named") is not None:
-        over = factor * np.asarray(drawn["named"])
-        marks.append(curve(at, over, VERMILION, "--", label=drawn["named_as"]))
+    for key, *_ in looks:
+        if (over := named[key]) is not None:
+            # A name that begins so is not in the key.
+            named_as = drawn["named_as"] if key == "value" else "_"
+            marks.append(curve(at, factor * np.asarray(over), VERMILION, "--", label=named_as))
     label = f"{name[:1].upper()}{name[1:]} ({pretty_unit(short)})"
     about = {"xlabel": argument, "xmargin": 0.01}
-    title = textwrap.fill(drawn["summary"] or drawn["name"], 58)
+    title = textwrap.fill(drawn["summary"], 58)
     own = {"ylabel": textwrap.fill(label, 26), "title": title[:1].upper() + title[1:]}
     yield Panel(marks, about | own, key=2 * (len(marks) > 3), lift=1.1 + 0.1 * title.count("\n"))
     if "local_exponent" in drawn:

@@ -150,6 +150,9 @@ def _in_two_planes(
     return Start(string_planes, law, at, np.array([share.real, -share.imag, detuning]))
 
 
+_SEEN: Final = "part seen at the start"
+
+
 def _second_plane(**more: Any) -> Callable[[Callable[..., Any]], Effect]:
     """Declare a form of the second plane; `more` is what distinguishes it."""
     return enters(
@@ -158,8 +161,8 @@ def _second_plane(**more: Any) -> Callable[[Callable[..., Any]], Effect]:
         name="swing in a second plane",
         kind="dynamics",
         parameters=(
-            Parameter("q_cosine", "rad", -10.0, 10.0, word="amplitude"),
-            Parameter("q_sine", "rad", -10.0, 10.0, 0.0, word="amplitude"),
+            Parameter("q_cosine", "rad", -10.0, 10.0, word=_SEEN),
+            Parameter("q_sine", "rad", -10.0, 10.0, 0.0, word=_SEEN),
             Parameter("detuning", "Hz", -1e3, 1e3, word="detuning"),
         ),
         sizes=2,
