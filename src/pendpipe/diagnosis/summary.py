@@ -356,8 +356,9 @@ def _cause(effect: FoundEffect, room: int) -> Cause:
     total = min(sum(p for p, *_ in likely), 1.0)
     (_, first, identifier), *others = likely
     numbers = numbers_of(effect) if identifier == effect.identifier and not others else ""
-    if not others and effect.curve and effect.curve["name"] in NAMES_OF_CURVES.get(identifier, ()):
-        numbers = effect.curve["summary"]
+    curve = effect.curve if not others else None
+    if curve and curve["name"] in NAMES_OF_CURVES.get(identifier, ()):
+        numbers = curve["summary"] * curve["stands_out"]
     together = " together" if others else ""
     inside = "; ".join(filter(None, (numbers, f"{percent(total)}{together}")))
     names = " or ".join([first, *(name for _, name, _ in others)])
