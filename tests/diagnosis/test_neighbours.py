@@ -9,7 +9,7 @@ from hypothesis import given, strategies as st
 
 from pendpipe.arrays import FloatArray
 from pendpipe.diagnosis.held_out import completed, held_out, predicted_worse
-from pendpipe.diagnosis.hypothesis import CHOICE, FURTHER, Hypothesis, Step, price
+from pendpipe.diagnosis.hypothesis import Hypothesis, Step, price
 from pendpipe.diagnosis.noise import Noise
 from pendpipe.diagnosis.refine import Fit, refine, remainder_of
 from pendpipe.diagnosis.rivals import NO_SCAN, Rival, Scale, off_harmonics
@@ -18,6 +18,7 @@ from pendpipe.diagnosis.search import describing, run_search, shares_a_misfit, s
 from pendpipe.effects.catalogue import CATALOGUE, by_identifier
 from pendpipe.effects.model import Model
 from pendpipe.recording import Recording
+from pendpipe.score import CHOICE, FURTHER
 
 from ..effects.integration import swung
 from .records import (
