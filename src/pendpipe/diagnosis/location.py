@@ -167,7 +167,9 @@ def _summary(found: Location, data: Data, amplitude: FloatArray, opposite: str) 
         if width < 0.02 * span:
             clauses.append(f"at {with_error(0.5 * sum(found.time_s), 0.5 * width / 1.96, 's')}")
         elif width < 0.8 * span:
-            clauses.append(f"between {found.time_s[0]:.4g} and {found.time_s[1]:.4g} s")
+            # A thousandth of the record is as near as a reader is told it.
+            ends = (round(t, 3 - math.floor(math.log10(span))) + 0.0 for t in found.time_s)
+            clauses.append("between {:g} and {:g} s".format(*ends))
         else:
             clauses.append("throughout the record")
     low, high = found.amplitude_rad or (-math.inf, math.inf)
