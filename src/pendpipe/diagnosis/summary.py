@@ -271,7 +271,7 @@ def _lacks(causes: Sequence[Cause]) -> str:
     drawn = [cause.text for cause in causes if cause.described]
     if not known:
         return f"It is described by {listed(drawn)}"
-    verb = "It lacks" if len(known) > 1 else "The cause is"
+    verb = "The causes are" if len(known) > 1 else "The cause is"
     return "; ".join(
         [
             f"{verb} {listed(known)}",
