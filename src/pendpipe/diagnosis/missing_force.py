@@ -26,7 +26,7 @@ from pendpipe.diagnosis.values import Drawn, curve_values, drawn_of
 from pendpipe.dynamics.any_law import Motion
 from pendpipe.effects import Effect
 from pendpipe.effects.curves import CURVES, FOLLOW_UP_CURVES, Curve
-from pendpipe.estimate import Z95, Estimate
+from pendpipe.estimate import ALONE, Z95, Estimate
 from pendpipe.levels import deviations
 from pendpipe.quantities import compact, with_error
 
@@ -49,7 +49,7 @@ def force_of(found: Hypothesis, step: Step) -> dict[str, Any] | None:
     likely = zip(step.weights[1:-1], step.mates, strict=True)
     drawn = [mate for _, mate in sorted(likely, key=lambda each: -each[0]) if mate.drawn]
     drawn += sorted((each for each in step.rivals if each.drawn), key=lambda each: -each.evidence)
-    drawn = [each for each in drawn if _is_of_kind(effect, each.effect)]
+    drawn = [each for each in drawn if _may_be_drawn(step, each.effect)]
     if not drawn:
         if effect.local or effect.spectral or effect.kind == "parameter":
             return None
@@ -74,11 +74,19 @@ def _is_of_kind(effect: Effect, curve: Effect) -> bool:
     return in_time if curve.in_time else not in_time and read[0] == read[1]
 
 
+def _may_be_drawn(step: Step, curve: Effect) -> bool:
+    """Whether a curve may stand for an effect: of its kind for one that is named alone, else any.
+
+    What no name is sure of the readings themselves place: in the motion, the reading or the time.
+    """
+    return step.weights[0] < ALONE or _is_of_kind(step.winner.effect, curve)
+
+
 def _curves_in_place(found: Hypothesis, step: Step) -> list[Rival]:
     """Fit the curve whose signature explains most of what an effect explains."""
     before, readings = step.before, (found.data, found.noise)
     curves = undrawn((*CURVES, *FOLLOW_UP_CURVES), before)
-    curves = [each for each in curves if _is_of_kind(step.winner.effect, each)]
+    curves = [each for each in curves if _may_be_drawn(step, each)]
     scanned = detect(prepare(before, *readings, curves), before, seed=0, known=found.scan)
     best = max(scanned.leads, key=lambda lead: lead.score, default=None)
     if best is None:
