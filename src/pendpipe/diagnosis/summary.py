@@ -395,10 +395,18 @@ def _differing(effect: FoundEffect) -> str:
 
 
 def _subject(causes: Sequence[Cause]) -> FoundEffect | None:
-    """Return what is spoken of: of the causes with a name, else of all, the most probable class."""
+    """Return what is spoken of: of the causes with a name, else of all, the class that leads.
+
+    Of candidates it is the one that explains most, whatever describes the rest; else the likeliest.
+    """
     known = [each for each in causes if each.text] or causes
-    effects = [each.effect for each in known]
-    return max(effects, key=lambda each: sum(p for p, *_ in class_of(each)), default=None)
+    total = {id(each.effect): sum(p for p, *_ in class_of(each.effect)) for each in known}
+
+    def order(effect: FoundEffect) -> tuple[float, float]:
+        likely = total[id(effect)] >= CANDIDATE
+        return likely * effect.delta_chi2, total[id(effect)]
+
+    return max((each.effect for each in known), key=order, default=None)
 
 
 def family_of(causes: Sequence[Cause]) -> str:
