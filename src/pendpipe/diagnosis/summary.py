@@ -400,13 +400,11 @@ def _subject(causes: Sequence[Cause]) -> FoundEffect | None:
     Of candidates it is the one that explains most, whatever describes the rest; else the likeliest.
     """
     known = [each for each in causes if each.text] or causes
-    total = {id(each.effect): sum(p for p, *_ in class_of(each.effect)) for each in known}
-
-    def order(effect: FoundEffect) -> tuple[float, float]:
-        likely = total[id(effect)] >= CANDIDATE
-        return likely * effect.delta_chi2, total[id(effect)]
-
-    return max((each.effect for each in known), key=order, default=None)
+    classes = [(sum(p for p, *_ in class_of(each.effect)), each.effect) for each in known]
+    leading = sorted(
+        classes, key=lambda one: ((one[0] >= CANDIDATE) * one[1].delta_chi2, one[0]), reverse=True
+    )
+    return leading[0][1] if leading else None
 
 
 def family_of(causes: Sequence[Cause]) -> str:
