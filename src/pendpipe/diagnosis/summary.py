@@ -397,7 +397,7 @@ def _differing(effect: FoundEffect) -> str:
 def _subject(causes: Sequence[Cause]) -> FoundEffect | None:
     """Return what is spoken of: of the causes with a name, else of all, the class that leads.
 
-    Of candidates it is the one that explains most, whatever describes the rest; else the likeliest.
+    Of candidates it is the one that explains most, whatever describes the rest.
     """
     known = [each for each in causes if each.text] or causes
     classes = [(sum(p for p, *_ in class_of(each.effect)), each.effect) for each in known]
