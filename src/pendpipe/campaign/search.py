@@ -326,13 +326,17 @@ def _undescribed(answer: CampaignSearch) -> CampaignSearch:
 
 def _weighed(answer: CampaignSearch, level: float) -> CampaignSearch:
     """Weigh each cause beside all others."""
-    again = list[Found]()
+    again, best = list[Found](), answer.improved
     for own in answer.found:
-        others = [each for each in answer.improved.added if each != own.leader.added[-1]]
-        fit = answer.improved
-        fit = joint_fit(fit.design, fit.data, others, answer.whole.unknowns)
+        cause = own.leader.added[-1]
+        others = tuple(each for each in best.added if each != cause)
+        fit = joint_fit(best.design, best.data, others, answer.baseline.unknowns)
         one = _leading(fit, _scan(fit), level)
-        again.append(one if one and one.leader.added[-1] == own.leader.added[-1] else own)
+        if one is None or one.leader.added[-1] != cause:
+            # As it was found, but of the records and beside the causes that are there now.
+            leader = joint_fit(fit.design, fit.data, (*others, cause), fit.unknowns)
+            one = replace(own, leader=leader)
+        again.append(one)
     improved = again[-1].leader if again else answer.improved
     far = farthest(answer.baseline) if again else None
     if far and without(answer.baseline, far.record).chi2 > improved.chi2 + CLASS:
@@ -383,10 +387,11 @@ def _leading(fit: JointFit, scan: _Scan, level: float) -> Found | None:
 def refit(fit: JointFit, tried: Sequence[Candidate], scores: FloatArray) -> list[JointFit]:
     """Refit with each candidate whose linear gain is within reach of the best one's."""
     gains = np.where(_one_sided(tried), np.maximum(scores, 0.0), scores) ** 2
+    reached = within_reach(gains)
     near = [
         number
         for number, one in enumerate(tried)
-        if within_reach(gains)[number] and gains[number] >= _best_shape(tried, gains, one)
+        if reached[number] and gains[number] >= _best_shape(tried, gains, one)
     ]
     found = [
         joint_fit(fit.design, fit.data, (*fit.added, tried[number]), fit.unknowns)
